@@ -1,0 +1,258 @@
+"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR]``.
+
+An FMU carries the source of its component and of every module of ours that this imports, in a package
+whose name holds a hash of that source. So two FMUs in one process never run each other's code, nor that
+of an older build, and the same source gives the same bytes.
+"""
+
+import argparse
+import ast
+import difflib
+import hashlib
+import importlib
+import importlib.metadata
+import importlib.util
+import os
+import re
+import shutil
+import sys
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from filelock import FileLock
+from platformdirs import user_cache_path
+
+from .declare import Component, DeclarationError, discover
+
+ROOT = Path(__file__).parent
+FACE = "fmus.slave"
+# Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+
+SCRIPT = '''"""Entry point of the FMU {name}."""
+
+from {package}.{module} import COMPONENT
+from {package}.slave import Slave
+
+
+class {class_name}(Slave):
+    component = COMPONENT
+    code_hash = "{code_hash}"
+    code_version = "{version}"
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+'''
+
+
+class BuildError(Exception):
+    """What was asked for cannot be built; the message says why."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; prints the path of each FMU, one a line, in the order asked for."""
+    parser = argparse.ArgumentParser(
+        prog="python -m fmus.build",
+        description="Build the project's FMUs, or an FMU from a component file of your own.",
+        epilog="examples:  python -m fmus.build\n"
+        "           python -m fmus.build vessel controller_abs --out fmu\n"
+        "           python -m fmus.build my_controller.py --out fmu",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
+    parser.add_argument("--list", action="store_true", help="list the FMUs and stop")
+    options = parser.parse_args(arguments)
+    try:
+        if options.list:
+            for _, component in discover():
+                print(f"{component.name:24} {component.description}")
+            return 0
+        for path in build(options.names, options.out):
+            print(path)
+    except (BuildError, DeclarationError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def build(names: Sequence[str], out: Path | None = None) -> list[Path]:
+    """FMUs that are up to date with the source.
+
+    Args:
+        names: FMU names, with or without ``.fmu``, or paths of component files; none means all.
+        out: folder that receives copies; None leaves them in the user's cache.
+
+    Returns:
+        Path of each FMU, in the order of the names.
+
+    Raises:
+        BuildError: unknown name, or a file that declares no component.
+    """
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise BuildError(f"'{out}' is a file, not a folder") from None
+    names = list(names) or [component.name for _, component in discover()]
+    built = [_cached(name) for name in names]
+    return built if out is None else [_place(fmu, out / fmu.name) for fmu in built]
+
+
+def _place(source: Path, target: Path) -> Path:
+    """Copy a file so that the target is either the old one or the whole new one."""
+    with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".part", delete=False) as part:
+        part.write(source.read_bytes())
+    os.chmod(part.name, 0o644)
+    os.replace(part.name, target)
+    return target
+
+
+def cache_folder() -> Path:
+    """Where built FMUs are kept: ``CYBERSHIP_CACHE``, else the user's cache folder."""
+    chosen = os.environ.get("CYBERSHIP_CACHE")
+    return Path(chosen) if chosen else user_cache_path("cybership")
+
+
+def _cached(name: str) -> Path:
+    """Path of an up-to-date FMU, built now if the cache does not hold it."""
+    own_file = Path(name) if name.endswith(".py") else None
+    if own_file is not None and not own_file.is_file():
+        raise BuildError(f"no such component file: '{name}'")
+    stem = own_file.stem if own_file is not None else name.removesuffix(".fmu")
+    folder = cache_folder() / _source_hash(own_file)
+    fmu = folder / f"{stem}.fmu"
+    if fmu.is_file():
+        return fmu
+    module, component = _load(stem, own_file)
+    folder.mkdir(parents=True, exist_ok=True)
+    fmu = folder / f"{component.name}.fmu"
+    with FileLock(folder / "lock"):
+        if not fmu.is_file():
+            with tempfile.TemporaryDirectory(prefix="fmu_") as work:
+                _place(_pack(component, module, own_file, Path(work)), fmu)
+    return fmu
+
+
+def _source_hash(own_file: Path | None) -> str:
+    """Hash of everything that a build reads."""
+    digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
+    for path in [*sorted(ROOT.rglob("*.py")), *([own_file] if own_file else [])]:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
+    """Module name and component of an FMU of ours, or of a user's file."""
+    if own_file is None:
+        known = {component.name: (module, component) for module, component in discover()}
+        if name in known:
+            return known[name]
+        near = difflib.get_close_matches(name, known, 1, 0.5)
+        hint = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
+        raise BuildError(f"no FMU '{name}'{hint}")
+    spec = importlib.util.spec_from_file_location(own_file.stem, own_file)
+    if spec is None or spec.loader is None:
+        raise BuildError(f"'{own_file}' cannot be read as a Python module")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise BuildError(f"'{own_file}' fails when imported: {error!r}") from error
+    component = getattr(module, "COMPONENT", None)
+    if not isinstance(component, Component):
+        raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
+    return f"fmus.{own_file.stem}", component
+
+
+def _sources(module: str, own_file: Path | None) -> dict[str, str]:
+    """Source of a component's module and of all modules of ours that it and the face import.
+
+    Args:
+        module: full name of the component's module.
+        own_file: file behind that name, where it is not one of ours.
+
+    Returns:
+        Path inside the package -> source text.
+    """
+    found: dict[str, str] = {}
+    pending = [module, FACE]
+    while pending:
+        name = pending.pop()
+        relative = Path(*name.split(".")[1:])
+        if own_file is not None and name == module:
+            path, inside = own_file, f"{relative}.py"
+        elif (ROOT / relative).is_dir():
+            path, inside = ROOT / relative / "__init__.py", str(relative / "__init__.py")
+        elif (ROOT / relative).with_suffix(".py").is_file():
+            path, inside = (ROOT / relative).with_suffix(".py"), f"{relative}.py"
+        else:
+            continue  # a name inside a module, not a module
+        if inside in found:
+            continue
+        found[inside] = path.read_text()
+        package = name if inside.endswith("__init__.py") else name.rpartition(".")[0]
+        pending += [package, *_imports(found[inside], package)]
+    return found
+
+
+def _imports(source: str, package: str) -> list[str]:
+    """Full names of what a module imports from this package (modules, or names inside them)."""
+    names: list[str] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                base = importlib.util.resolve_name("." * node.level + base, package)
+            names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+    return [name for name in names if name == "fmus" or name.startswith("fmus.")]
+
+
+def _pack(component: Component, module: str, own_file: Path | None, work: Path) -> Path:
+    """Build one FMU in a scratch folder and return its path."""
+    from pythonfmu.builder import FmuBuilder
+
+    sources = _sources(module, own_file)
+    digest = hashlib.sha256()
+    for inside in sorted(sources):
+        digest.update(f"{inside}\0{sources[inside]}\0".encode())
+    code_hash = digest.hexdigest()
+    package = f"{component.name}_{code_hash[:16]}"
+    for inside, text in sources.items():
+        path = work / package / inside
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # A user's file imports fmus by name; inside the FMU the package is called otherwise.
+        path.write_text(re.sub(r"^(\s*(?:from|import)\s+)fmus\b", rf"\1{package}", text, flags=re.M))
+    script = work / f"{package}_fmu.py"
+    script.write_text(
+        SCRIPT.format(
+            name=component.name,
+            package=package,
+            module=module.partition(".")[2],
+            class_name=component.name.title().replace("_", ""),
+            code_hash=code_hash,
+            version=importlib.metadata.version("cybership"),
+        )
+    )
+    raw = FmuBuilder.build_FMU(script, dest=work / "raw", project_files=[work / package])
+    return _repeatable(Path(raw), work / f"{component.name}.fmu")
+
+
+def _repeatable(raw: Path, fmu: Path) -> Path:
+    """The same archive with sorted names and without dates."""
+    with zipfile.ZipFile(raw) as source, zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as target:
+        for name in sorted(source.namelist()):
+            info = zipfile.ZipInfo(name, ZIP_DATE)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            with source.open(name) as reader, target.open(info, "w") as writer:
+                shutil.copyfileobj(reader, writer)
+    return fmu
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Controllers: estimate and target in, requested force out."""

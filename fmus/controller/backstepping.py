@@ -1,0 +1,167 @@
+"""The backstepping law that every controller of the thesis shares, 4.1.1 and Table 4.2.
+
+Convention: omega = -Phi(nu) phi + R^T omega_n is the model error, a force on the hull; its estimate
+omega_hat is what the law compensates for. Every heading difference is wrapped.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import Range, vector, variables
+from ..hull import (
+    Inertia,
+    RotationalDamping,
+    TowedDamping,
+    Triple,
+    coriolis_force,
+    inertia_force,
+    rotational_damping_force,
+    towed_damping_force,
+)
+from ..ops import Number, cos, sin, wrap
+from ..signals import Estimate, Force, Target
+
+GAIN = Range(0.0, 1000.0)
+
+
+class Gains(NamedTuple):
+    """Feedback gains, Table 5.1: diagonals of K_p and K_d."""
+
+    K_p_x: Annotated[float, "rad/s", "position gain, along", GAIN] = 0.4
+    K_p_y: Annotated[float, "rad/s", "position gain, across", GAIN] = 1.0
+    K_p_psi: Annotated[float, "rad/s", "heading gain", GAIN] = 0.2
+    K_d_u: Annotated[float, "N.s/m", "velocity gain, surge", GAIN] = 1.0
+    K_d_v: Annotated[float, "N.s/m", "velocity gain, sway", GAIN] = 5.0
+    K_d_r: Annotated[float, "N.m.s/rad", "velocity gain, yaw", GAIN] = 1.0
+
+
+class Belief(NamedTuple):
+    """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
+
+    inertia: Inertia = Inertia()
+    towed: TowedDamping = TowedDamping()
+
+
+_COEFFICIENTS = variables(RotationalDamping)
+
+PhiStart = vector(
+    "PhiStart",
+    [
+        (f"phi_0_{k}", c.unit, f"estimate of {c.name} at the start", 0.0)
+        for k, c in enumerate(_COEFFICIENTS, 1)
+    ],
+)
+PhiHat = vector(
+    "PhiHat",
+    [
+        (f"phi_hat_{k}", c.unit, f"estimate of {c.name}", 0.0)
+        for k, c in enumerate(_COEFFICIENTS, 1)
+    ],
+)
+
+
+class Inputs(NamedTuple):
+    estimate: Estimate = Estimate()
+    target: Target = Target()
+
+
+class Errors(NamedTuple):
+    """z1 and z2 of (4.1)."""
+
+    z1_x: Annotated[float, "m", "position error along the ship"] = 0.0
+    z1_y: Annotated[float, "m", "position error across the ship"] = 0.0
+    z1_psi: Annotated[float, "rad", "heading error"] = 0.0
+    z2_u: Annotated[float, "m/s", "velocity error, surge"] = 0.0
+    z2_v: Annotated[float, "m/s", "velocity error, sway"] = 0.0
+    z2_r: Annotated[float, "rad/s", "velocity error, yaw"] = 0.0
+
+
+class Outputs(NamedTuple):
+    """What every controller shows."""
+
+    tau: Force = Force()
+    tau_lin_X: Annotated[float, "N", "linear part of the surge force, (5.1)"] = 0.0
+    tau_lin_Y: Annotated[float, "N", "linear part of the sway force"] = 0.0
+    tau_lin_N: Annotated[float, "N.m", "linear part of the yaw moment"] = 0.0
+    tau_nonlin_X: Annotated[float, "N", "nonlinear part of the surge force, (5.1)"] = 0.0
+    tau_nonlin_Y: Annotated[float, "N", "nonlinear part of the sway force"] = 0.0
+    tau_nonlin_N: Annotated[float, "N.m", "nonlinear part of the yaw moment"] = 0.0
+    errors: Errors = Errors()
+    omega_hat_X: Annotated[float, "N", "estimated model error in surge"] = 0.0
+    omega_hat_Y: Annotated[float, "N", "estimated model error in sway"] = 0.0
+    omega_hat_N: Annotated[float, "N.m", "estimated model error in yaw"] = 0.0
+    phi_hat: Any = PhiHat()
+
+
+def rotate_to_body(psi: Number, x: Number, y: Number) -> tuple[Any, Any]:
+    """R^T(psi) of an earth-fixed vector."""
+    c = cos(psi)
+    s = sin(psi)
+    return c * x + s * y, c * y - s * x
+
+
+def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
+    """z1, z2 and the derivative of the virtual control alpha, Table 4.2.
+
+    Args:
+        e: estimated pose [m, m, rad] and velocity [m/s, m/s, rad/s].
+        t: target with its derivatives.
+        k: feedback gains.
+
+    Returns:
+        The errors, and alpha_dot [m/s2, m/s2, rad/s2]; its last term is -K_p z1_dot (corrected).
+    """
+    u, v, r = e.u_hat, e.v_hat, e.r_hat
+    z1_x, z1_y = rotate_to_body(e.psi_hat, e.x_hat - t.x_t, e.y_hat - t.y_t)
+    z1_psi = wrap(e.psi_hat - t.psi_t)
+    td_x, td_y = rotate_to_body(e.psi_hat, t.x_t_dot, t.y_t_dot)
+    tdd_x, tdd_y = rotate_to_body(e.psi_hat, t.x_t_ddot, t.y_t_ddot)
+    # S^T(r) turns a body-fixed vector backwards at the yaw rate.
+    z1d_x = r * z1_y + u - td_x
+    z1d_y = -r * z1_x + v - td_y
+    z1d_psi = r - t.psi_t_dot
+    return (
+        Errors(
+            z1_x,
+            z1_y,
+            z1_psi,
+            u - td_x + k.K_p_x * z1_x,
+            v - td_y + k.K_p_y * z1_y,
+            r - t.psi_t_dot + k.K_p_psi * z1_psi,
+        ),
+        (
+            r * td_y + tdd_x - k.K_p_x * z1d_x,
+            -r * td_x + tdd_y - k.K_p_y * z1d_y,
+            t.psi_t_ddot - k.K_p_psi * z1d_psi,
+        ),
+    )
+
+
+def control(
+    e: Estimate, z: Errors, alpha_dot: Triple, k: Gains, b: Belief, phi_hat: Any, w: Triple
+) -> Outputs:
+    """The force of Table 4.2, split into its linear and nonlinear part, (5.1).
+
+    Args:
+        e: estimated state.
+        z, alpha_dot: from :func:`control_errors`.
+        k: feedback gains.
+        b: belief about the hull.
+        phi_hat: estimated rotational damping coefficients, (2.31).
+        w: body-fixed part R^T omega_n_hat of the estimated model error [N, N, N m].
+
+    Returns:
+        All outputs of a controller.
+    """
+    u, v, r = e.u_hat, e.v_hat, e.r_hat
+    MX, MY, MN = inertia_force(*alpha_dot, b.inertia)
+    CX, CY, CN = coriolis_force(u, v, r, b.inertia)
+    GX, GY, GN = towed_damping_force(u, v, b.towed)
+    PX, PY, PN = rotational_damping_force(v, r, phi_hat)
+    oX, oY, oN = PX + w[0], PY + w[1], PN + w[2]
+    lX = -z.z1_x - k.K_d_u * z.z2_u + MX
+    lY = -z.z1_y - k.K_d_v * z.z2_v + MY
+    lN = -z.z1_psi - k.K_d_r * z.z2_r + MN
+    nX, nY, nN = CX - GX - oX, CY - GY - oY, CN - GN - oN
+    return Outputs(
+        Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN, phi_hat
+    )

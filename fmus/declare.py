@@ -1,0 +1,226 @@
+"""How a component declares itself, and how its nested tuples map to a flat list of variables.
+
+A field of a Params, Inputs or Outputs NamedTuple reads ``name: Annotated[float, unit, description]
+= start``; behind the description may stand a :class:`Range` and, for a parameter that only counts
+at initialisation, :data:`FIXED`. A field may itself be such a NamedTuple, whose fields then join
+the flat list under their own names.
+"""
+
+import importlib
+import pkgutil
+from collections import namedtuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+
+class DeclarationError(Exception):
+    """A component's declaration is incomplete or contradicts itself."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The interval a variable must stay in; None leaves a side open."""
+
+    min: float | None = None
+    max: float | None = None
+
+
+POSITIVE = Range(min=0.0)
+FIXED = "fixed"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar of a component: what an FMI ScalarVariable shows."""
+
+    name: str
+    unit: str
+    description: str
+    start: float
+    range: Range
+    fixed: bool
+
+
+def vector(
+    typename: str, fields: Sequence[tuple[str, str, str, float]], extra: Sequence[Any] = ()
+) -> type[Any]:
+    """A NamedTuple class of scalars that are made rather than written out.
+
+    Args:
+        typename: name of the class.
+        fields: (name, unit, description, start) of each scalar.
+        extra: what stands behind the description of every field, such as a Range.
+
+    Returns:
+        The class, declared like a hand-written one.
+    """
+    made = namedtuple(typename, [f[0] for f in fields], defaults=[f[3] for f in fields])  # pyright: ignore
+    made.__annotations__ = {
+        name: Annotated[(float, unit, description, *extra)] for name, unit, description, _ in fields
+    }
+    return made
+
+
+def variables(cls: type[Any]) -> list[Variable]:
+    """The scalars of a declared NamedTuple class, nested ones included, in order.
+
+    Raises:
+        DeclarationError: a field without start value, unit or description.
+    """
+    found: list[Variable] = []
+    defaults = getattr(cls, "_field_defaults", {})
+    for name, hint in get_type_hints(cls, include_extras=True).items():
+        nested = _nested(cls, name, hint)
+        if nested is not None:
+            found += variables(nested)
+            continue
+        meta = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+        if len(meta) < 2 or not all(isinstance(text, str) for text in meta[:2]):
+            raise DeclarationError(f"{cls.__name__}.{name} needs a unit and a description")
+        if name not in defaults:
+            raise DeclarationError(f"{cls.__name__}.{name} needs a start value")
+        ranges = [extra for extra in meta[2:] if isinstance(extra, Range)]
+        found.append(
+            Variable(
+                name,
+                meta[0],
+                meta[1],
+                float(defaults[name]),
+                ranges[0] if ranges else Range(),
+                FIXED in meta[2:],
+            )
+        )
+    return found
+
+
+def _nested(cls: type[Any], name: str, hint: Any) -> type[Any] | None:
+    """The NamedTuple class behind a field, if it is one by its hint or by its start value."""
+    if isinstance(hint, type) and hasattr(hint, "_fields"):
+        return hint
+    start = getattr(cls, "_field_defaults", {}).get(name)
+    return type(start) if hasattr(start, "_fields") else None
+
+
+def _shape(cls: type[Any]) -> list[type[Any] | None]:
+    """For each field the NamedTuple class behind it, None for a scalar."""
+    return [_nested(cls, name, hint) for name, hint in get_type_hints(cls).items()]
+
+
+def width(cls: type[Any]) -> int:
+    """How many scalars a NamedTuple class holds, nested ones included."""
+    return sum(1 if nested is None else width(nested) for nested in _shape(cls))
+
+
+def packer(cls: type[Any]) -> Callable[[Sequence[Any]], Any]:
+    """A function that turns a flat sequence of scalars into an instance of the class."""
+    shape = _shape(cls)
+    if not any(shape):
+        return cls._make
+    parts: list[tuple[int, int, Callable[[Sequence[Any]], Any] | None]] = []
+    start = 0
+    for nested in shape:
+        size = 1 if nested is None else width(nested)
+        parts.append((start, start + size, None if nested is None else packer(nested)))
+        start += size
+
+    def pack(flat: Sequence[Any]) -> Any:
+        return cls._make([flat[a] if sub is None else sub(flat[a:b]) for a, b, sub in parts])
+
+    return pack
+
+
+def flatten(value: Any) -> list[Any]:
+    """The scalars of a nested tuple in order: the inverse of :func:`packer`."""
+    flat: list[Any] = []
+    for item in value:
+        if isinstance(item, tuple):
+            flat += flatten(item)
+        else:
+            flat.append(item)
+    return flat
+
+
+def rebuild(template: Any, flat: Sequence[Any]) -> Any:
+    """The flat scalars in the shape of a nested tuple, of whatever kinds its tuples are."""
+    scalars = iter(flat)
+
+    def like(part: Any) -> Any:
+        if not isinstance(part, tuple):
+            return next(scalars)
+        items = [like(item) for item in part]
+        return type(part)._make(items) if hasattr(part, "_make") else tuple(items)  # pyright: ignore
+
+    return like(template)
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A component's name, its four NamedTuple classes and its two pure functions.
+
+    Attributes:
+        name: name of the FMU.
+        description: one line for people.
+        params, state, inputs, outputs: NamedTuple classes.
+        init: ``init(inputs, params) -> state``.
+        step: ``step(state, inputs, params, h) -> (state, outputs)``; h [s] = 0 gives the outputs at
+            the present state and changes nothing.
+        sampled: True for a law that acts at its sampling instants, so that an output may use the
+            input of the same instant; False for a plant in continuous time, where the input acts
+            through the integral (and through direct feedthrough, found by tracing).
+        hold_nonfinite: True where an input that is NaN or infinite keeps its last finite value; False
+            for a component that makes its own sense of such a value.
+        max_step: a longer communication step [s] is divided into equal parts no longer than this.
+    """
+
+    name: str
+    description: str
+    params: type[Any]
+    state: type[Any]
+    inputs: type[Any]
+    outputs: type[Any]
+    init: Callable[[Any, Any], Any]
+    step: Callable[[Any, Any, Any, Any], tuple[Any, Any]]
+    sampled: bool = True
+    max_step: float | None = None
+    hold_nonfinite: bool = True
+
+    def advance(self, state: Any, inputs: Any, params: Any, h: float) -> tuple[Any, Any]:
+        """One communication step of h [s], in parts where it is longer than ``max_step``."""
+        if self.max_step is None or h <= self.max_step * (1.0 + 1e-9):
+            return self.step(state, inputs, params, h)
+        parts = -int(-h / self.max_step // 1.0)
+        outputs = None
+        for _ in range(parts):
+            state, outputs = self.step(state, inputs, params, h / parts)
+        return state, outputs
+
+    @cached_property
+    def variables(self) -> list[Variable]:
+        """All scalars in the order of their value references: parameters, inputs, outputs."""
+        found = [
+            *variables(self.params),
+            *variables(self.inputs),
+            *variables(self.outputs),
+        ]
+        names = [variable.name for variable in found]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise DeclarationError(f"{self.name} declares {', '.join(twice)} more than once")
+        return found
+
+
+def discover() -> Iterator[tuple[str, Component]]:
+    """Every (module name, component) below this package's folders, found by importing them."""
+    root = __package__ or "fmus"
+    here = importlib.import_module(root).__path__
+    for folder in pkgutil.iter_modules(here):
+        if not folder.ispkg:
+            continue
+        package = importlib.import_module(f"{root}.{folder.name}")
+        for info in pkgutil.iter_modules(package.__path__):
+            name = f"{root}.{folder.name}.{info.name}"
+            component = getattr(importlib.import_module(name), "COMPONENT", None)
+            if isinstance(component, Component):
+                yield name, component

@@ -1,0 +1,48 @@
+"""From a parametrised path eta_t = g(theta) to a target with exact derivatives, (4.38)."""
+
+from typing import Any, NamedTuple
+
+from ..ops import Number, atan2
+from ..signals import Target
+
+
+class PathPoint(NamedTuple):
+    """A point of a path and its first three derivatives by theta, north and east."""
+
+    x: Any
+    y: Any
+    x1: Any
+    y1: Any
+    x2: Any
+    y2: Any
+    x3: Any
+    y3: Any
+
+
+def target(p: PathPoint, theta_dot: Number, theta_ddot: Number) -> Target:
+    """Target pose [m, m, rad] along the tangent, with its derivatives in time.
+
+    Args:
+        p: the path at theta.
+        theta_dot: rate of the path parameter [1/s].
+        theta_ddot: its derivative [1/s2].
+
+    Returns:
+        eta_t and its first two derivatives; analytic in place of (4.43)-(4.44).
+    """
+    x, y, x1, y1, x2, y2, x3, y3 = p
+    square = x1 * x1 + y1 * y1
+    psi1 = (x1 * y2 - y1 * x2) / square
+    psi2 = ((x1 * y3 - y1 * x3) - 2.0 * psi1 * (x1 * x2 + y1 * y2)) / square
+    rate2 = theta_dot * theta_dot
+    return Target(
+        x,
+        y,
+        atan2(y1, x1),
+        x1 * theta_dot,
+        y1 * theta_dot,
+        psi1 * theta_dot,
+        x2 * rate2 + x1 * theta_ddot,
+        y2 * rate2 + y1 * theta_ddot,
+        psi2 * rate2 + psi1 * theta_ddot,
+    )

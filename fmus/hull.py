@@ -1,0 +1,155 @@
+"""Manoeuvring model of a hull in surge, sway and yaw: inertia, Coriolis and damping forces.
+
+Written with +, -, *, / and abs() only, so that every expression runs on floats, on numpy arrays and
+on traced symbols. The values are those of CyberShip Enterprise 1 (Table 2.1, corrected). The plant
+and a controller's belief about it are two separate sets of these parameters.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from .declare import POSITIVE
+from .ops import Number
+
+Triple = tuple[Any, Any, Any]
+
+
+class Inertia(NamedTuple):
+    """Rigid-body and added mass, (2.5), corrected: x_g = 0.0375 m, N_rdot = -1."""
+
+    m: Annotated[float, "kg", "mass", POSITIVE] = 14.79
+    I_z: Annotated[float, "kg.m2", "moment of inertia about the body z axis", POSITIVE] = 1.760
+    x_g: Annotated[float, "m", "centre of gravity, forward of the body origin"] = 0.0375
+    X_udot: Annotated[float, "kg", "added mass: surge force by surge acceleration"] = -2.0
+    Y_vdot: Annotated[float, "kg", "added mass: sway force by sway acceleration"] = -10.0
+    Y_rdot: Annotated[float, "kg.m", "added mass: sway force by yaw acceleration"] = 0.0
+    N_vdot: Annotated[float, "kg.m", "added mass: yaw moment by sway acceleration"] = 0.0
+    N_rdot: Annotated[float, "kg.m2", "added mass: yaw moment by yaw acceleration"] = -1.0
+
+
+class TowedDamping(NamedTuple):
+    """Damping coefficients found by towing: the part g(nu) that a controller knows, (2.29)."""
+
+    X_u: Annotated[float, "N.s/m", "surge damping, linear"] = -0.6555
+    X_absu_u: Annotated[float, "N.s2/m2", "surge damping, |u|u"] = 0.3545
+    X_uuu: Annotated[float, "N.s3/m3", "surge damping, cubic"] = -3.787
+    X_vv: Annotated[float, "N.s2/m2", "surge force by sway, v^2"] = -2.443
+    Y_v: Annotated[float, "N.s/m", "sway damping, linear"] = -1.33
+    Y_absv_v: Annotated[float, "N.s2/m2", "sway damping, |v|v"] = -2.776
+    Y_vvv: Annotated[float, "N.s3/m3", "sway damping, cubic"] = -64.91
+    N_v: Annotated[float, "N.s", "yaw moment by sway, linear"] = 0.0
+    N_absv_v: Annotated[float, "N.s2/m", "yaw moment by sway, |v|v"] = -0.2088
+
+
+class RotationalDamping(NamedTuple):
+    """Damping coefficients of the yaw rate, phi in the order of (2.30); from CyberShip II."""
+
+    Y_absr_v: Annotated[float, "N.s2/(m.rad)", "sway force, |r|v"] = -0.805
+    Y_r: Annotated[float, "N.s/rad", "sway force, r"] = -7.250
+    Y_absv_r: Annotated[float, "N.s2/(m.rad)", "sway force, |v|r"] = -0.845
+    Y_absr_r: Annotated[float, "N.s2/rad2", "sway force, |r|r"] = -3.450
+    N_absr_v: Annotated[float, "N.s2/rad", "yaw moment, |r|v"] = 0.130
+    N_r: Annotated[float, "N.m.s/rad", "yaw moment, r"] = -1.900
+    N_absv_r: Annotated[float, "N.s2/rad", "yaw moment, |v|r"] = 0.080
+    N_absr_r: Annotated[float, "N.m.s2/rad2", "yaw moment, |r|r"] = -0.750
+
+
+class ExtraDamping(NamedTuple):
+    """Terms that Table 2.1 does not have; zero unless somebody finds them."""
+
+    X_uu: Annotated[float, "N.s2/m2", "surge force, u^2: differs ahead and astern"] = 0.0
+    X_absu_r: Annotated[float, "N.s2/(m.rad)", "surge force, |u|r"] = 0.0
+    X_vr: Annotated[float, "N.s2/(m.rad)", "surge force, v r"] = 0.0
+    X_rr: Annotated[float, "N.s2/rad2", "surge force, r^2"] = 0.0
+    Y_ur: Annotated[float, "N.s2/(m.rad)", "sway force, u r"] = 0.0
+    Y_uv: Annotated[float, "N.s2/m2", "sway force, u v"] = 0.0
+    N_ur: Annotated[float, "N.s2/rad", "yaw moment, u r"] = 0.0
+    N_uv: Annotated[float, "N.s2/m", "yaw moment, u v"] = 0.0
+
+
+class Damping(NamedTuple):
+    """All damping coefficients."""
+
+    towed: TowedDamping = TowedDamping()
+    rotational: RotationalDamping = RotationalDamping()
+    extra: ExtraDamping = ExtraDamping()
+
+
+def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
+    """M = M_RB + M_A, (2.4)-(2.5), as three rows [kg, kg m, kg m2]."""
+    return (
+        (p.m - p.X_udot, 0.0, 0.0),
+        (0.0, p.m - p.Y_vdot, p.m * p.x_g - p.Y_rdot),
+        (0.0, p.m * p.x_g - p.N_vdot, p.I_z - p.N_rdot),
+    )
+
+
+def inertia_force(u_dot: Number, v_dot: Number, r_dot: Number, p: Inertia) -> Triple:
+    """M nu_dot [N, N, N m], (2.2)."""
+    (m11, _, _), (_, m22, m23), (_, m32, m33) = mass_matrix(p)
+    return m11 * u_dot, m22 * v_dot + m23 * r_dot, m32 * v_dot + m33 * r_dot
+
+
+def inverse_mass(p: Inertia) -> tuple[Any, Any, Any, Any, Any]:
+    """The five entries of the inverse of M that are not zero: 11, 22, 23, 32, 33."""
+    (m11, _, _), (_, m22, m23), (_, m32, m33) = mass_matrix(p)
+    det = m22 * m33 - m23 * m32
+    return 1.0 / m11, m33 / det, -m23 / det, -m32 / det, m22 / det
+
+
+def coriolis_force(u: Number, v: Number, r: Number, p: Inertia) -> Triple:
+    """C(nu) nu [N, N, N m], (2.6)-(2.7), corrected (Fossen 2011): skew-symmetric C."""
+    m, _, x_g, X_udot, Y_vdot, Y_rdot, _, _ = p
+    c13 = (Y_vdot - m) * v + (Y_rdot - m * x_g) * r
+    c23 = (m - X_udot) * u
+    return c13 * r, c23 * r, -c13 * u - c23 * v
+
+
+def towed_damping_force(u: Number, v: Number, c: TowedDamping) -> Triple:
+    """-g(nu) [N, N, N m]: damping force on the hull without yaw, (2.29), X_vv corrected."""
+    X_u, X_absu_u, X_uuu, X_vv, Y_v, Y_absv_v, Y_vvv, N_v, N_absv_v = c
+    uu = u * u
+    vv = v * v
+    av = abs(v)
+    return (
+        (X_u + X_absu_u * abs(u) + X_uuu * uu) * u + X_vv * vv,
+        (Y_v + Y_absv_v * av + Y_vvv * vv) * v,
+        (N_v + N_absv_v * av) * v,
+    )
+
+
+def rotational_regressors(v: Number, r: Number) -> tuple[Any, Any, Any, Any]:
+    """|r|v, r, |v|r, |r|r: minus the nonzero entries of a row of Phi(nu), (2.32)."""
+    ar = abs(r)
+    return ar * v, r, abs(v) * r, ar * r
+
+
+def rotational_damping_force(v: Number, r: Number, c: RotationalDamping) -> Triple:
+    """-Phi(nu) phi [N, N, N m]: damping force on the hull by yaw, (2.28) with (2.32)."""
+    Y_absr_v, Y_r, Y_absv_r, Y_absr_r, N_absr_v, N_r, N_absv_r, N_absr_r = c
+    arv, r1, avr, arr = rotational_regressors(v, r)
+    return (
+        0.0,
+        Y_absr_v * arv + Y_r * r1 + Y_absv_r * avr + Y_absr_r * arr,
+        N_absr_v * arv + N_r * r1 + N_absv_r * avr + N_absr_r * arr,
+    )
+
+
+def extra_damping_force(u: Number, v: Number, r: Number, c: ExtraDamping) -> Triple:
+    """Force on the hull [N, N, N m] by the terms that Table 2.1 lacks."""
+    X_uu, X_absu_r, X_vr, X_rr, Y_ur, Y_uv, N_ur, N_uv = c
+    ur = u * r
+    uv = u * v
+    return (
+        X_uu * u * u + (X_absu_r * abs(u) + X_vr * v + X_rr * r) * r,
+        Y_ur * ur + Y_uv * uv,
+        N_ur * ur + N_uv * uv,
+    )
+
+
+def damping_force(u: Number, v: Number, r: Number, c: Damping) -> Triple:
+    """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected."""
+    towed, rotational, extra = c
+    X1, Y1, N1 = towed_damping_force(u, v, towed)
+    _, Y2, N2 = rotational_damping_force(v, r, rotational)
+    X3, Y3, N3 = extra_damping_force(u, v, r, extra)
+    return X1 + X3, Y1 + Y2 + Y3, N1 + N2 + N3

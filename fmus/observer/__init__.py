@@ -1,0 +1,1 @@
+"""Observers: pose measurements in, estimates of pose, velocity and acceleration out."""

@@ -1,0 +1,134 @@
+"""Mathematics that runs unchanged on floats, on numpy arrays and on traced symbols.
+
+Components use these instead of ``math``, ``if`` and ``min``/``max``, so that one source serves the
+step of an FMU (floats), a batch of runs (arrays) and code generation (symbols). Numpy is imported
+only when an array turns up. On floats every function follows C: out of its domain it gives NaN or
+an infinity instead of raising.
+"""
+
+import math
+from typing import Any
+
+# Any: float, numpy array or symbol. The dispatch is by type, which Python's typing cannot express.
+Number = Any
+
+TWO_PI = 2.0 * math.pi
+_SCALARS = (float, int, bool)
+
+
+def _call(name: str, *args: Number) -> Number:
+    """Apply ``name`` to arguments of which at least one is not a float."""
+    for arg in args:
+        apply = getattr(arg, "apply_operation", None)
+        if apply is not None:
+            return apply(name, args)
+    import numpy
+
+    return getattr(numpy, _NUMPY_NAMES.get(name, name))(*args)
+
+
+_NUMPY_NAMES = {"atan2": "arctan2", "fmin": "minimum", "fmax": "maximum"}
+
+
+def sin(x: Number) -> Number:
+    if x.__class__ is float:
+        try:
+            return math.sin(x)
+        except ValueError:
+            return math.nan
+    return _call("sin", x)
+
+
+def cos(x: Number) -> Number:
+    if x.__class__ is float:
+        try:
+            return math.cos(x)
+        except ValueError:
+            return math.nan
+    return _call("cos", x)
+
+
+def exp(x: Number) -> Number:
+    if x.__class__ is float:
+        try:
+            return math.exp(x)
+        except OverflowError:
+            return math.inf
+    return _call("exp", x)
+
+
+def log(x: Number) -> Number:
+    if x.__class__ is float:
+        try:
+            return math.log(x)
+        except ValueError:
+            return -math.inf if x == 0.0 else math.nan
+    return _call("log", x)
+
+
+def sqrt(x: Number) -> Number:
+    if x.__class__ is float:
+        try:
+            return math.sqrt(x)
+        except ValueError:
+            return math.nan
+    return _call("sqrt", x)
+
+
+def floor(x: Number) -> Number:
+    """Largest whole number not above x, as a float (NaN stays NaN)."""
+    if x.__class__ is float:
+        return x // 1.0
+    return _call("floor", x)
+
+
+def atan2(y: Number, x: Number) -> Number:
+    if y.__class__ is float and x.__class__ is float:
+        return math.atan2(y, x)
+    return _call("atan2", y, x)
+
+
+def where(condition: Number, a: Number, b: Number) -> Number:
+    """``a`` where the condition holds, else ``b``. Both are evaluated: guard denominators."""
+    if condition.__class__ is bool:
+        return a if condition else b
+    return _call("where", condition, a, b)
+
+
+def fmin(a: Number, b: Number) -> Number:
+    if a.__class__ in _SCALARS and b.__class__ in _SCALARS:
+        return a if a < b else b
+    return _call("fmin", a, b)
+
+
+def fmax(a: Number, b: Number) -> Number:
+    if a.__class__ in _SCALARS and b.__class__ in _SCALARS:
+        return a if a > b else b
+    return _call("fmax", a, b)
+
+
+def clip(x: Number, low: Number, high: Number) -> Number:
+    """x limited to [low, high]."""
+    return fmax(low, fmin(x, high))
+
+
+def not_(condition: Number) -> Number:
+    """Negation of a condition (``~True`` is -2 on a Python bool)."""
+    if condition.__class__ is bool:
+        return not condition
+    return _call("logical_not", condition)
+
+
+def is_finite(x: Number) -> Number:
+    """True where x is neither NaN nor infinite."""
+    return x - x == 0.0
+
+
+def finite(x: Number, otherwise: Number) -> Number:
+    """x where it is finite, else ``otherwise``."""
+    return where(x - x == 0.0, x, otherwise)
+
+
+def wrap(angle: Number) -> Number:
+    """The angle [rad] brought to (-pi, pi]."""
+    return angle + TWO_PI * floor((math.pi - angle) / TWO_PI)

@@ -1,0 +1,154 @@
+"""The FMI face of a component: one class over pythonfmu that repairs what pythonfmu leaves out.
+
+It keeps the values in one flat list in the order of the value references, so that getting and setting
+costs no look-up, and holds nothing else but the component's state: resetting, rolling back and
+serialising follow from that.
+"""
+
+import json
+import uuid
+from itertools import pairwise
+from math import isfinite
+from typing import Any, ClassVar
+from xml.etree.ElementTree import Element
+
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+
+from .declare import Component, flatten, packer, rebuild, width
+
+
+class Slave(Fmi2Slave):
+    """A component as an FMI 2.0 co-simulation slave.
+
+    A subclass names the component and the hash of the code it was built from. Setting a value that is
+    out of place (unknown reference, an output, a parameter fixed at initialisation, NaN for a
+    parameter) is logged and changes nothing. A step that fails is logged with its cause, returns a
+    status and leaves the state as it was.
+    """
+
+    component: ClassVar[Component]
+    code_hash: ClassVar[str]
+    code_version: ClassVar[str]
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        c = self.component
+        self.modelName = c.name
+        self._names = [v.name for v in c.variables]
+        self._values = [v.start for v in c.variables]
+        self._fixed = {k for k, v in enumerate(c.variables) if v.fixed}
+        bounds = (0, width(c.params), width(c.params) + width(c.inputs), len(self._values))
+        self._slices = [slice(a, b) for a, b in pairwise(bounds)]
+        self._packers = [packer(c.params), packer(c.inputs)]
+        self._params: Any = None
+        self._state: Any = None
+        self._initialising = True
+        self._stale = True
+
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
+        """The model description; only needed while the FMU is built."""
+        from .describe import model_description
+
+        guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, self.code_hash)}}}"
+        return model_description(self.component, guid, self.code_version)
+
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
+        first_input, first_output = self._slices[1].start, self._slices[1].stop
+        hold = self.component.hold_nonfinite
+        for vr, value in zip(vrs, values, strict=True):
+            if first_input <= vr < first_output:
+                if hold and value - value != 0.0:
+                    self._warn(f"input {self._names[vr]} is {value}; it keeps its last value")
+                else:
+                    self._values[vr] = value
+            elif 0 <= vr < first_input:
+                self._set_parameter(vr, value)
+            else:
+                self._warn(f"value reference {vr} cannot be set")
+        if self._initialising:
+            self._stale = True
+
+    def _set_parameter(self, vr: int, value: float) -> None:
+        if not isfinite(value):
+            self._warn(f"parameter {self._names[vr]} cannot be {value}")
+        elif vr in self._fixed and not self._initialising:
+            self._warn(f"parameter {self._names[vr]} is fixed after initialisation")
+        else:
+            self._values[vr] = value
+            self._params = None
+
+    def get_real(self, vrs: list[int]) -> list[float]:
+        if self._stale:
+            self._initialise()
+        values = self._values
+        return [values[vr] for vr in vrs]
+
+    def _warn(self, message: str) -> None:
+        self.log(message, Fmi2Status.warning)
+
+    def _arguments(self) -> tuple[Any, Any]:
+        """Inputs and parameters as the component wants them."""
+        if self._params is None:
+            self._params = self._packers[0](self._values[self._slices[0]])
+        return self._packers[1](self._values[self._slices[1]]), self._params
+
+    def _initialise(self) -> None:
+        """State and outputs that follow from the present inputs and parameters."""
+        self._stale = False
+        inputs, params = self._arguments()
+        try:
+            self._state = self.component.init(inputs, params)
+            _, outputs = self.component.step(self._state, inputs, params, 0.0)
+            self._values[self._slices[2]] = flatten(outputs)
+        except Exception as error:
+            self.log(f"initialisation failed: {error!r}", Fmi2Status.error)
+
+    def exit_initialization_mode(self) -> None:
+        if self._stale or self._state is None:
+            self._initialise()
+        self._initialising = False
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        inputs, params = self._arguments()
+        try:
+            state, outputs = self.component.advance(self._state, inputs, params, step_size)
+            flat = flatten(outputs)
+        except Exception as error:
+            self.log(f"step at t = {current_time} s failed: {error!r}", Fmi2Status.error)
+            return False
+        # A finite sum of zero multiples means that every output is finite.
+        if sum([0.0 * value for value in flat]) != 0.0:
+            bad = [n for n, x in zip(self._names[self._slices[2]], flat, strict=True) if not isfinite(x)]
+            self.log(
+                f"step at t = {current_time} s failed: {', '.join(bad)} not finite", Fmi2Status.error
+            )
+            return False
+        self._state = state
+        self._values[self._slices[2]] = flat
+        return True
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        if self._stale:
+            self._initialise()
+        return {
+            "values": list(self._values),
+            "state": flatten(self._state),
+            "initialising": self._initialising,
+        }
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        self._values = list(state["values"])
+        self._params = None
+        inputs, params = self._arguments()
+        self._state = rebuild(self.component.init(inputs, params), state["state"])
+        self._initialising = state["initialising"]
+        self._stale = False
+
+    @staticmethod
+    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
+        return json.dumps(state).encode()
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        return json.loads(bytes(state).decode())

@@ -1,0 +1,1 @@
+"""Thrust allocation and the thrusters themselves."""

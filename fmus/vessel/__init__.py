@@ -1,0 +1,1 @@
+"""The plant: the hull of CyberShip Enterprise 1 and everything that acts on it."""

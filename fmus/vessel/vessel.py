@@ -1,0 +1,180 @@
+"""The hull of CyberShip Enterprise 1 in surge, sway and yaw, (2.1)-(2.9).
+
+Integrated by the classical fourth-order Runge-Kutta method with the force held over the step; a
+communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import FIXED, Component, flatten, packer, variables, vector
+from ..hull import (
+    Damping,
+    Inertia,
+    Triple,
+    coriolis_force,
+    damping_force,
+    inverse_mass,
+    rotational_damping_force,
+)
+from ..ops import Number, cos, finite, sin, wrap
+from ..signals import Force, Measurement, Velocity
+
+DampingChange = vector(
+    "DampingChange",
+    [
+        (f"delta_{c.name}", c.unit, f"addition to {c.name}: a model error", 0.0)
+        for c in variables(Damping)
+    ],
+)
+_as_damping = packer(Damping)
+
+
+class Start(NamedTuple):
+    """State at the start of the simulation."""
+
+    x_0: Annotated[float, "m", "initial north position", FIXED] = 5.0
+    y_0: Annotated[float, "m", "initial east position", FIXED] = 2.0
+    psi_0: Annotated[float, "rad", "initial heading", FIXED] = 0.0
+    u_0: Annotated[float, "m/s", "initial surge velocity", FIXED] = 0.0
+    v_0: Annotated[float, "m/s", "initial sway velocity", FIXED] = 0.0
+    r_0: Annotated[float, "rad/s", "initial yaw rate", FIXED] = 0.0
+
+
+class Params(NamedTuple):
+    inertia: Inertia = Inertia()
+    damping: Damping = Damping()
+    change: Any = DampingChange()
+    start: Start = Start()
+
+
+class State(NamedTuple):
+    """eta and nu; the heading is continuous over turns."""
+
+    x: float = 0.0
+    y: float = 0.0
+    psi: float = 0.0
+    u: float = 0.0
+    v: float = 0.0
+    r: float = 0.0
+
+
+class Pose(NamedTuple):
+    x: Annotated[float, "m", "north position"] = 0.0
+    y: Annotated[float, "m", "east position"] = 0.0
+    psi: Annotated[float, "rad", "heading, continuous over turns"] = 0.0
+
+
+class Outputs(NamedTuple):
+    pose: Pose = Pose()
+    velocity: Velocity = Velocity()
+    u_dot: Annotated[float, "m/s2", "surge acceleration"] = 0.0
+    v_dot: Annotated[float, "m/s2", "sway acceleration"] = 0.0
+    r_dot: Annotated[float, "rad/s2", "yaw acceleration"] = 0.0
+    measured: Measurement = Measurement()
+    omega_X: Annotated[float, "N", "all model error in surge"] = 0.0
+    omega_Y: Annotated[float, "N", "all model error in sway"] = 0.0
+    omega_N: Annotated[float, "N.m", "all model error in yaw"] = 0.0
+    omega_star_X: Annotated[float, "N", "what control model (2.27) lacks in surge"] = 0.0
+    omega_star_Y: Annotated[float, "N", "what control model (2.27) lacks in sway"] = 0.0
+    omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
+
+
+def total_damping(p: Params) -> Damping:
+    """The nominal damping coefficients plus their changes."""
+    return _as_damping([a + b for a, b in zip(flatten(p.damping), p.change, strict=True)])
+
+
+def kinematics(psi: Number, u: Number, v: Number) -> tuple[Any, Any]:
+    """North and east velocity [m/s] of a body-fixed velocity, (2.1)."""
+    c = cos(psi)
+    s = sin(psi)
+    return c * u - s * v, s * u + c * v
+
+
+class Hull(NamedTuple):
+    """What does not change during a step, computed once."""
+
+    inertia: Inertia
+    inverse: tuple[Any, Any, Any, Any, Any]
+    damping: Damping
+
+
+def hull(p: Params) -> Hull:
+    """The hull with the changes of its damping applied."""
+    return Hull(p.inertia, inverse_mass(p.inertia), total_damping(p))
+
+
+def motion(u: Number, v: Number, r: Number, tau: Force, b: Hull) -> Triple:
+    """nu_dot [m/s2, m/s2, rad/s2] of the hull under a force, (2.2), corrected: C(nu) nu."""
+    inertia, (i11, i22, i23, i32, i33), damping = b
+    CX, CY, CN = coriolis_force(u, v, r, inertia)
+    DX, DY, DN = damping_force(u, v, r, damping)
+    Y = tau[1] - CY + DY
+    N = tau[2] - CN + DN
+    return i11 * (tau[0] - CX + DX), i22 * Y + i23 * N, i32 * Y + i33 * N
+
+
+def integrate(s: State, tau: Force, b: Hull, h: Number) -> State:
+    """State after h [s] of constant force by one step of the classical Runge-Kutta method."""
+    x, y, psi, u, v, r = s
+    half = 0.5 * h
+    x1, y1 = kinematics(psi, u, v)
+    u1, v1, r1 = motion(u, v, r, tau, b)
+    ub, vb, rb = u + half * u1, v + half * v1, r + half * r1
+    x2, y2 = kinematics(psi + half * r, ub, vb)
+    u2, v2, r2 = motion(ub, vb, rb, tau, b)
+    uc, vc, rc = u + half * u2, v + half * v2, r + half * r2
+    x3, y3 = kinematics(psi + half * rb, uc, vc)
+    u3, v3, r3 = motion(uc, vc, rc, tau, b)
+    ud, vd, rd = u + h * u3, v + h * v3, r + h * r3
+    x4, y4 = kinematics(psi + h * rc, ud, vd)
+    u4, v4, r4 = motion(ud, vd, rd, tau, b)
+    sixth = h / 6.0
+    return State(
+        x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
+        y + sixth * (y1 + 2.0 * (y2 + y3) + y4),
+        psi + sixth * (r + 2.0 * (rb + rc) + rd),
+        u + sixth * (u1 + 2.0 * (u2 + u3) + u4),
+        v + sixth * (v1 + 2.0 * (v2 + v3) + v4),
+        r + sixth * (r1 + 2.0 * (r2 + r3) + r4),
+    )
+
+
+def init(i: Force, p: Params) -> State:
+    return State._make(p.start)
+
+
+def step(s: State, i: Force, p: Params, h: Number) -> tuple[State, Outputs]:
+    tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
+    b = hull(p)
+    s = integrate(s, tau, b, h)
+    x, y, psi, u, v, r = s
+    omega_X, omega_Y, omega_N = damping_force(u, v, r, _as_damping(p.change))
+    _, phi_Y, phi_N = rotational_damping_force(v, r, p.damping.rotational)
+    return s, Outputs(
+        Pose(x, y, psi),
+        Velocity(u, v, r),
+        *motion(u, v, r, tau, b),
+        Measurement(x, y, wrap(psi)),
+        omega_X,
+        omega_Y,
+        omega_N,
+        omega_X,
+        omega_Y + phi_Y,
+        omega_N + phi_N,
+    )
+
+
+COMPONENT = Component(
+    name="vessel",
+    description="Hull of CyberShip Enterprise 1 in surge, sway and yaw",
+    params=Params,
+    state=State,
+    inputs=Force,
+    outputs=Outputs,
+    init=init,
+    step=step,
+    sampled=False,
+    max_step=0.02,
+    hold_nonfinite=False,
+)
