@@ -1,0 +1,284 @@
+"""An FMI 2.0 co-simulation FMU: its description, and an instance of it that runs.
+
+FMPy reads the description, unpacks the archive and loads the library. The calls made once a step go to
+the library directly, with buffers that are laid out once.
+"""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy import fmi1, fmi2
+from fmpy.logging import addLoggerProxy
+from fmpy.model_description import ModelDescription, read_model_description
+
+from .errors import InputError, SimulationError
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by name, and where the FMU defines it its SI exponents, factor and offset."""
+
+    name: str
+    exponents: tuple[int, ...] | None
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Variable:
+    """What the master needs to know of an FMU's variable."""
+
+    name: str
+    type: str
+    reference: int
+    causality: str
+    variability: str
+    unit: Unit | None
+    description: str
+    min: float | None
+    max: float | None
+    start: str | None
+
+
+class Model:
+    """An FMU file, checked and described.
+
+    Args:
+        path: the ``.fmu`` file.
+
+    Raises:
+        InputError: not there, not an FMU, or not one for FMI 2.0 co-simulation.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise InputError(f"no such FMU: '{path}'")
+        try:
+            with zipfile.ZipFile(path) as archive:
+                if "modelDescription.xml" not in archive.namelist():
+                    raise InputError(f"'{path}' is not an FMU: it has no modelDescription.xml")
+            self.description: ModelDescription = read_model_description(str(path), validate=False)
+        except InputError:
+            raise
+        except zipfile.BadZipFile:
+            raise InputError(f"'{path}' is not an FMU: it is not a zip archive") from None
+        except Exception as error:
+            raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
+        if self.description.fmiVersion != "2.0":
+            raise InputError(
+                f"'{path}' is an FMU for FMI {self.description.fmiVersion}; this master runs FMI 2.0"
+            )
+        if self.description.coSimulation is None:
+            raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
+        self.name: str = self.description.modelName or path.stem
+        self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        self._folder: Path | None = None
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """All variables by name, in the order of the description."""
+        units = {
+            u.name: Unit(
+                str(u.name),
+                None
+                if (b := u.baseUnit) is None
+                # rad is no dimension of its own in SI: 1/s and rad/s go together.
+                else (b.kg, b.m, b.s, b.A, b.K, b.mol, b.cd),
+                1.0 if b is None else b.factor,
+                0.0 if b is None else b.offset,
+            )
+            for u in self.description.unitDefinitions
+        }
+        found: dict[str, Variable] = {}
+        for v in self.description.modelVariables:
+            declared = v.declaredType
+            unit = v.unit or (declared.unit if declared is not None else None)
+            low, high = v.min, v.max
+            if declared is not None:
+                low = declared.min if low is None else low
+                high = declared.max if high is None else high
+            found[v.name] = Variable(
+                v.name,
+                v.type,
+                int(v.valueReference),
+                v.causality or "local",
+                v.variability or "continuous",
+                None if not unit else units.get(unit, Unit(unit, None, 1.0, 0.0)),
+                v.description or "",
+                None if low is None else float(low),
+                None if high is None else float(high),
+                v.start,
+            )
+        return found
+
+    @cached_property
+    def feedthrough(self) -> dict[str, list[str]]:
+        """Input -> outputs that follow it at the same instant; without a list, all of them."""
+        inputs = [v.name for v in self.variables.values() if v.causality == "input"]
+        feeds: dict[str, list[str]] = {name: [] for name in inputs}
+        listed: dict[str, list[str]] = {}
+        for unknown in self.description.outputs:
+            if unknown.variable is None:
+                continue
+            known = unknown.dependencies
+            listed[unknown.variable.name] = inputs if known is None else [k.name for k in known]
+        for v in self.variables.values():
+            if v.causality == "output":
+                for name in listed.get(v.name, inputs):
+                    if name in feeds:
+                        feeds[name].append(v.name)
+        return feeds
+
+    def unpack(self) -> Path:
+        """Folder with the unpacked archive; made at the first call."""
+        if self._folder is None:
+            folder = Path(tempfile.mkdtemp(prefix="cosim_"))
+            try:
+                fmpy.extract(str(self.path), str(folder))
+            except Exception as error:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise InputError(f"'{self.path}' cannot be unpacked: {error}") from error
+            self._folder = folder
+        return self._folder
+
+    def close(self) -> None:
+        """Remove what was unpacked."""
+        if self._folder is not None:
+            folder = str(self._folder)
+            sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
+            shutil.rmtree(folder, ignore_errors=True)
+            self._folder = None
+
+
+class Instance:
+    """A running FMU.
+
+    Args:
+        name: instance name.
+        model: what to run.
+        on_message: receives (instance, status, text) of each message that the FMU logs.
+
+    Raises:
+        InputError: no binary for this platform, or instantiation refused.
+    """
+
+    def __init__(self, name: str, model: Model, on_message: Callable[[str, int, str], None]) -> None:
+        self.name = name
+        self.model = model
+        folder = model.unpack()
+        cs = model.description.coSimulation
+        assert cs is not None
+        here = os.getcwd()
+        try:
+            self._fmu = fmi2.FMU2Slave(
+                instanceName=name,
+                guid=model.description.guid,
+                modelIdentifier=cs.modelIdentifier,
+                unzipDirectory=str(folder),
+            )
+        except Exception as error:
+            os.chdir(here)
+            raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {error}") from error
+
+        def log(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+            text = message.decode(errors="replace") if message else ""
+            on_message(name, status, text)
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(fmpy.calloc)
+        callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(fmpy.free)
+        addLoggerProxy(ctypes.byref(callbacks))
+        self._callbacks = callbacks
+        try:
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=False)
+        except Exception as error:
+            raise InputError(f"'{model.path}' cannot be instantiated as '{name}': {error}") from error
+        self.component = self._fmu.component
+        # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others
+        # may work in threads of their own and must not find it held.
+        self._keep_lock = (folder / "resources" / "slavemodule.txt").is_file()
+
+    def function(self, name: str, *argument_types: Any) -> Callable[..., int]:
+        """An FMI function of the library as a fast callable that returns a status."""
+        kind = ctypes.PYFUNCTYPE if self._keep_lock else ctypes.CFUNCTYPE
+        try:
+            address = ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value
+        except AttributeError:
+            raise InputError(f"'{self.model.path}' does not export {name}") from None
+        assert address is not None
+        return kind(ctypes.c_int, *argument_types)(address)
+
+    def call(self, what: str, action: Callable[[], Any]) -> None:
+        """Run a step of the life cycle; an FMU that refuses it ends the run."""
+        try:
+            action()
+        except Exception as error:
+            raise SimulationError(f"{self.name} ({self.model.path.name}): {what} failed: {error}") from error
+
+    def set_value(self, variable: Variable, value: float | int | bool | str) -> None:
+        """Set one variable, outside the step loop."""
+
+        def action() -> None:
+            references = [variable.reference]
+            if variable.type == "Real":
+                self._fmu.setReal(references, [float(value)])
+            elif variable.type == "Boolean":
+                self._fmu.setBoolean(references, [bool(value)])
+            elif variable.type == "String":
+                self._fmu.setString(references, [str(value)])
+            else:
+                self._fmu.setInteger(references, [int(value)])
+
+        self.call(f"setting {variable.name} = {value}", action)
+
+    def get_value(self, variable: Variable) -> float:
+        """One numeric variable, outside the step loop."""
+        references = [variable.reference]
+        values: list[float] = []
+
+        def action() -> None:
+            if variable.type == "Real":
+                values.extend(self._fmu.getReal(references))
+            elif variable.type == "Boolean":
+                values.extend(self._fmu.getBoolean(references))
+            else:
+                values.extend(self._fmu.getInteger(references))
+
+        self.call(f"getting {variable.name}", action)
+        return float(values[0])
+
+    def set_up(self, stop: float) -> None:
+        """Announce the experiment."""
+        self.call(
+            "fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=0.0, stopTime=stop)
+        )
+
+    def enter_initialization(self) -> None:
+        self.call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
+
+    def exit_initialization(self) -> None:
+        self.call("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
+
+    def terminate(self) -> None:
+        """End the simulation; the instance can still be freed."""
+        self.call("fmi2Terminate", self._fmu.terminate)
+
+    def free(self) -> None:
+        """Free the instance and its library."""
+        self._fmu.freeInstance()

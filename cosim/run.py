@@ -1,0 +1,128 @@
+"""Run a scenario: ``python -m cosim.run SCENARIO [--out DIR]``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from . import metrics
+from .errors import InputError
+from .scenario import load_scenario
+from .simulation import Result, simulate
+
+BAD_INPUT, INTERRUPTED = 2, 130
+EXIT_CODES = {"done": 0, "failed": 3, "interrupted": INTERRUPTED}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+    def show(text: str) -> None:
+        if not options.quiet:
+            console.print(text, markup=False)
+
+    try:
+        scenario = load_scenario(options.scenario)
+        bar = (
+            nullcontext()
+            if options.quiet or not console.is_terminal
+            else Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TaskProgressColumn(),
+                TimeRemainingColumn(),
+                console=console,
+                transient=True,
+            )
+        )
+        with bar as shown:
+            task = shown.add_task(scenario.name, total=scenario.stop) if shown else None
+            result = simulate(
+                scenario,
+                options.out,
+                options.parameters,
+                options.realtime,
+                pictures=not options.no_plots,
+                show=show,
+                progress=(lambda t: shown.update(task, completed=t)) if shown and task is not None else None,
+            )
+    except InputError as error:
+        console.print(f"error: {error}", markup=False)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        console.print("interrupted")
+        return INTERRUPTED
+    _report(result, console, options.quiet)
+    return EXIT_CODES[result.status]
+
+
+def _report(result: Result, console: Console, quiet: bool) -> None:
+    if result.status == "failed":
+        kept = f"; {result.rows} rows are kept in '{result.folder}'" if result.rows else ""
+        console.print(f"error: {result.message}{kept}", markup=False)
+    elif result.status == "interrupted":
+        console.print(f"interrupted: {result.rows} rows are kept in '{result.folder}'", markup=False)
+    if quiet:
+        return
+    output = Console(highlight=False)
+    if result.metrics:
+        output.print(metrics.table(result.metrics))
+    if result.pace:
+        output.print(
+            f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} deadlines missed, "
+            f"at most {1e3 * result.pace['lateness_max']:.2f} ms late, "
+            f"jitter {1e3 * result.pace['jitter_rms']:.2f} ms RMS"
+        )
+    if result.status == "done":
+        output.print(f"{result.rows} rows in {result.folder}", soft_wrap=True)
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"needs a positive number, not '{text}'")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m cosim.run",
+        description="Run a co-simulation scenario: log.csv, log.json, metrics.json and pictures.",
+        epilog="examples:  python -m cosim.run scenarios/ellipse.json\n"
+        "           python -m cosim.run scenarios/ellipse.json --out /tmp/e --no-plots\n"
+        "           python -m cosim.run scenarios/ellipse.json --parameters model.ssv\n"
+        "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
+    parser.add_argument("--out", metavar="DIR", help="result folder (results/<name>)")
+    parser.add_argument(
+        "--parameters",
+        metavar="FILE.ssv",
+        action="append",
+        default=[],
+        help="SSP parameter set that beats the scenario's values; may be given several times",
+    )
+    parser.add_argument("--quiet", action="store_true", help="only errors")
+    parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
+    parser.add_argument(
+        "--realtime",
+        nargs="?",
+        type=_positive,
+        const=1.0,
+        metavar="FACTOR",
+        help="keep to the wall clock, FACTOR times as fast (1)",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,182 @@
+"""The scenario file: what it may hold, and messages for what it may not."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    PrivateAttr,
+    TypeAdapter,
+    ValidationError,
+)
+
+from . import faults
+from .errors import InputError, nearest
+
+AnyFault = Annotated[
+    Union[tuple(dict.fromkeys(faults.KINDS.values()))],  # noqa: UP007 - made from the registry
+    Field(discriminator="kind"),
+]
+Value = bool | int | float | str
+
+
+class Strict(BaseModel):
+    """Refuses keys that it does not know."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class FmuEntry(Strict):
+    """One instance: which FMU, how often it steps, with what parameters."""
+
+    path: str = Field(
+        min_length=1, description="the project's FMU by bare name, or a path relative to the scenario"
+    )
+    step: PositiveFloat | None = Field(None, description="own step [s], a multiple of the base step")
+    parameters: dict[str, Value] = Field(default_factory=dict, description="start values by name")
+
+
+class Event(Strict):
+    """A change during the run, with the keys of an OSP scenario file."""
+
+    time: Annotated[float, Field(ge=0.0)] = Field(description="when [s]")
+    model: str = Field(description="instance")
+    variable: str
+    action: Literal["override", "bias", "reset", "hold"] = Field(
+        description="give it a value, add to it, end all that, or keep the value it has"
+    )
+    value: bool | int | float | None = Field(None, description="for override and bias")
+
+
+class LogOptions(Strict):
+    """What is logged, and how often."""
+
+    signals: Literal["all"] | list[str] = Field(
+        "all", description="all inputs and outputs, or names as instance.variable, * as wildcard"
+    )
+    every: PositiveInt = Field(1, description="log every n-th base step")
+    format: Literal["csv", "parquet"] = "csv"
+
+
+class MetricsOptions(Strict):
+    """The part of the run that the metrics cover."""
+
+    start: float | None = Field(None, alias="from", ge=0.0, description="first time [s]")
+    stop: float | None = Field(None, alias="to", gt=0.0, description="last time [s]")
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class Scenario(Strict):
+    """A co-simulation: instances, connections, faults, events, log."""
+
+    name: str = Field(pattern=r"^[^/\\\x00]+$", description="also the name of the result folder")
+    description: str = ""
+    step: PositiveFloat = Field(description="base step [s]")
+    stop: PositiveFloat = Field(description="end of the simulation [s], a multiple of the base step")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="of all random faults")
+    algorithm: Literal["gauss_seidel", "jacobi"] = Field(
+        "gauss_seidel",
+        description="one after the other with the newest values, or all at once with those of before",
+    )
+    fmus: dict[str, FmuEntry] = Field(min_length=1, description="instances by name")
+    connections: list[tuple[str, str]] = Field(
+        default_factory=list,
+        description="[output, input] as instance.variable; a * on both sides connects all variables "
+        "whose names agree there",
+    )
+    faults: list[AnyFault] = Field(default_factory=list)
+    events: list[Event] = Field(default_factory=list)
+    log: LogOptions = Field(default_factory=LogOptions)
+    metrics: MetricsOptions = Field(default_factory=MetricsOptions)
+
+    _folder: Path = PrivateAttr(default_factory=Path.cwd)
+
+    @property
+    def folder(self) -> Path:
+        """What paths in the scenario are relative to."""
+        return self._folder
+
+
+def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
+    """A scenario from a JSON file or from the same content as a dict.
+
+    Args:
+        source: path of the file; a dict is read as if it lay in the working directory.
+
+    Raises:
+        InputError: missing file, no JSON, unknown key, wrong type or value; names the place.
+    """
+    if isinstance(source, dict):
+        return _validate(source, "scenario", Path.cwd())
+    path = Path(source)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
+        raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"'{path}' is not JSON: {error}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}") from None
+    return _validate(content, f"'{path}'", path.parent)
+
+
+def _validate(content: Any, name: str, folder: Path) -> Scenario:
+    try:
+        scenario = Scenario.model_validate(content)
+    except ValidationError as error:
+        raise InputError(_message(error, name)) from None
+    scenario._folder = folder.resolve()
+    return scenario
+
+
+def _message(error: ValidationError, name: str) -> str:
+    """The first thing that is wrong, in one line, with how many more there are."""
+    problems = error.errors()
+    first = problems[0]
+    place = ""
+    for part in first["loc"]:
+        if isinstance(part, int):
+            place += f"[{part}]"
+        elif part not in faults.KINDS and not str(part).startswith(("function-", "constrained-")):
+            place += f".{part}" if place else str(part)
+    text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        text = f"unknown key{nearest(str(first['loc'][-1]), _keys(first['loc']))}"
+    elif first["type"] == "union_tag_invalid":
+        wrong = first.get("ctx", {}).get("tag", "")
+        text = f"unknown kind '{wrong}'{nearest(str(wrong), faults.KINDS)}"
+    elif first["type"] == "union_tag_not_found":
+        text = "needs a 'kind'" + nearest("", faults.KINDS)
+    elif first["type"] == "missing":
+        text = "is missing"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"{name}: {place or 'the content'}: {text}{more}"
+
+
+def _keys(location: tuple[int | str, ...]) -> list[str]:
+    """The keys allowed where an unknown one stood."""
+    first = location[0] if len(location) > 1 else ""
+    classes: dict[Any, type[BaseModel]] = {
+        "fmus": FmuEntry,
+        "events": Event,
+        "log": LogOptions,
+        "metrics": MetricsOptions,
+        "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),
+    }
+    fields = classes.get(first, Scenario).model_fields
+    return [field.alias or name for name, field in fields.items()]
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of a scenario file, as published in docs/scenario.schema.json."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **TypeAdapter(Scenario).json_schema(by_alias=True),
+    }

@@ -1,0 +1,378 @@
+"""A scenario checked against its FMUs, and laid out for running. Nothing runs before this is done."""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path, PurePath
+
+from .errors import InputError, nearest
+from .fmu import NUMERIC, Model, Variable
+from .order import Link, execution_order
+from .scenario import Scenario, Value
+from .units import Conversion, conversion
+
+# What an input of one type accepts from an output of another.
+ACCEPTS = {
+    "Real": ("Real", "Integer", "Enumeration"),
+    "Integer": ("Integer", "Enumeration"),
+    "Enumeration": ("Enumeration", "Integer"),
+    "Boolean": ("Boolean",),
+}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A variable of an instance."""
+
+    instance: str
+    variable: Variable
+
+    @property
+    def name(self) -> str:
+        return f"{self.instance}.{self.variable.name}"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A checked connection, with the conversion of units that it needs."""
+
+    source: Signal
+    target: Signal
+    conversion: Conversion
+
+
+@dataclass
+class System:
+    """What the master runs.
+
+    Attributes:
+        scenario: as read.
+        models: FMU of each instance, by instance name.
+        order: instances in the order of stepping.
+        every: base steps in one step of each instance.
+        steps: number of base steps.
+        connections: all of them, groups resolved.
+        signals: what the value table holds, by name.
+        logged: names of the logged signals, in the order of the log's columns.
+        parameters: start values to set, by instance.
+        warnings: what is odd but no reason to refuse.
+    """
+
+    scenario: Scenario
+    models: dict[str, Model]
+    every: dict[str, int] = field(default_factory=dict)
+    steps: int = 0
+    order: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
+    signals: dict[str, Signal] = field(default_factory=dict)
+    logged: list[str] = field(default_factory=list)
+    parameters: dict[str, list[tuple[Variable, Value]]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def close(self) -> None:
+        """Remove what was unpacked."""
+        for model in set(self.models.values()):
+            model.close()
+
+    def find(self, name: str, where: str) -> Signal:
+        """The variable behind ``instance.variable``.
+
+        Raises:
+            InputError: no such instance or variable.
+        """
+        instance, _, variable = name.partition(".")
+        if instance not in self.models:
+            raise InputError(f"{where}: no instance '{instance}'{nearest(instance, self.models)}")
+        known = self.models[instance].variables
+        if variable not in known:
+            hint = nearest(variable, [f"{v}" for v in known])
+            raise InputError(f"{where}: '{instance}' has no variable '{variable}'{hint}")
+        return Signal(instance, known[variable])
+
+
+def prepare(
+    scenario: Scenario, overrides: Sequence[tuple[Path, dict[str, dict[str, float]]]] = ()
+) -> System:
+    """Read the FMUs of a scenario and check everything that can be checked without running.
+
+    Args:
+        scenario: what to run.
+        overrides: parameter sets (file, model name -> name -> value) that beat the scenario's own.
+
+    Raises:
+        InputError: the first thing that is wrong.
+    """
+    system = System(scenario, _read_models(scenario))
+    _count_steps(system)
+    _check_parameters(system, overrides)
+    _connect(system)
+    _check_faults(system)
+    _check_events(system)
+    _choose_signals(system)
+    links = [
+        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
+        for c in system.connections
+    ]
+    if scenario.algorithm == "gauss_seidel":
+        feedthrough = {name: model.feedthrough for name, model in system.models.items()}
+        system.order, late = execution_order(list(system.models), links, feedthrough)
+        system.warnings += late
+    else:
+        system.order = list(system.models)
+    return system
+
+
+def _read_models(scenario: Scenario) -> dict[str, Model]:
+    bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
+    # A bare name means the project's own FMU; only one that the project lacks may be a file beside.
+    beside = sorted(name for name in bare if (scenario.folder / name).is_file())
+    paths = _own_fmus(sorted(bare.difference(beside)))
+    for name in beside:
+        try:
+            paths |= _own_fmus([name])
+        except InputError:
+            paths[name] = scenario.folder / name
+    models: dict[Path, Model] = {}
+    found: dict[str, Model] = {}
+    for instance, entry in scenario.fmus.items():
+        path = paths.get(entry.path) or scenario.folder / entry.path
+        if path not in models:
+            models[path] = Model(path)
+        elif (cs := models[path].description.coSimulation) and cs.canBeInstantiatedOnlyOncePerProcess:
+            raise InputError(f"fmus.{instance}: '{path}' can be instantiated only once per process")
+        found[instance] = models[path]
+    return found
+
+
+def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
+    """Paths of the project's own FMUs, built if need be by a process of their own."""
+    if not names:
+        return {}
+    done = subprocess.run(
+        [sys.executable, "-m", "fmus.build", *names], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
+        raise InputError(reason[0].removeprefix("error: "))
+    return dict(zip(names, map(Path, done.stdout.splitlines()), strict=True))
+
+
+def whole(ratio: float) -> int | None:
+    """The whole number that a ratio of times is meant to be, if it is one."""
+    count = round(ratio)
+    return count if count > 0 and abs(ratio - count) < 1e-6 * max(1.0, ratio) else None
+
+
+def _count_steps(system: System) -> None:
+    scenario = system.scenario
+    steps = whole(scenario.stop / scenario.step)
+    if steps is None:
+        raise InputError(f"stop = {scenario.stop} s is not a multiple of step = {scenario.step} s")
+    system.steps = steps
+    for name, entry in scenario.fmus.items():
+        every = whole((entry.step or scenario.step) / scenario.step)
+        if every is None:
+            raise InputError(
+                f"fmus.{name}: step = {entry.step} s is not a multiple of the base step {scenario.step} s"
+            )
+        system.every[name] = every
+
+
+def _check_parameters(
+    system: System, overrides: Sequence[tuple[Path, dict[str, dict[str, float]]]]
+) -> None:
+    chosen: dict[str, dict[str, tuple[Value, str]]] = {}
+    for name, entry in system.scenario.fmus.items():
+        chosen[name] = {k: (v, f"fmus.{name}.parameters") for k, v in entry.parameters.items()}
+    for path, by_model in overrides:
+        for model_name, values in by_model.items():
+            targets = [n for n, model in system.models.items() if model.name == model_name]
+            if not targets:
+                system.warnings.append(f"'{path}' has values for '{model_name}', which does not run here")
+            for name in targets:
+                for parameter, value in values.items():
+                    old = chosen[name].get(parameter)
+                    if old is not None and old[0] != value:
+                        system.warnings.append(
+                            f"{name}.{parameter} = {value} from '{path}' beats {old[0]} from {old[1]}"
+                        )
+                    chosen[name][parameter] = (value, f"'{path}'")
+    for name, values in chosen.items():
+        known = system.models[name].variables
+        settable = {k: v for k, v in known.items() if v.causality in ("parameter", "input")}
+        system.parameters[name] = []
+        for parameter, (value, where) in values.items():
+            if parameter not in settable:
+                what = "cannot be set" if parameter in known else "does not exist"
+                raise InputError(
+                    f"{where}: {name}.{parameter} {what}{nearest(parameter, list(settable))}"
+                )
+            _check_value(settable[parameter], value, f"{where}: {name}.{parameter}")
+            system.parameters[name].append((settable[parameter], value))
+
+
+def _check_value(variable: Variable, value: Value | None, where: str) -> None:
+    if variable.type == "String":
+        fits = isinstance(value, str)
+    elif variable.type == "Boolean":
+        fits = isinstance(value, bool) or value in (0, 1)
+    elif variable.type == "Real":
+        fits = isinstance(value, (int, float)) and not isinstance(value, bool)
+    else:
+        fits = isinstance(value, int) and not isinstance(value, bool)
+    if not fits:
+        raise InputError(f"{where} = {value!r}: needs a value of type {variable.type}")
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if variable.min is not None and value < variable.min:
+            raise InputError(f"{where} = {value} is below its minimum {variable.min}")
+        if variable.max is not None and value > variable.max:
+            raise InputError(f"{where} = {value} is above its maximum {variable.max}")
+
+
+def _connect(system: System) -> None:
+    taken: dict[str, Signal] = {}
+    for k, (output, input_) in enumerate(system.scenario.connections):
+        where = f"connections[{k}] {output} -> {input_}"
+        for source, target in _resolve(system, output, input_, where):
+            ends = f"connections[{k}] {source.name} -> {target.name}"
+            if source.variable.causality != "output":
+                raise InputError(f"{ends}: {source.name} is {_kind(source)}, not an output")
+            if target.variable.causality != "input":
+                raise InputError(f"{ends}: {target.name} is {_kind(target)}, not an input")
+            if target.name in taken:
+                raise InputError(f"{ends}: {target.name} is already connected to {taken[target.name].name}")
+            if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
+                raise InputError(
+                    f"{ends}: {source.variable.type} cannot feed {target.variable.type}"
+                )
+            taken[target.name] = source
+            system.connections.append(
+                Connection(
+                    source,
+                    target,
+                    conversion(source.variable, target.variable, ends, system.warnings),
+                )
+            )
+    for name, model in system.models.items():
+        free = [
+            v.name
+            for v in model.variables.values()
+            if v.causality == "input"
+            and f"{name}.{v.name}" not in taken
+            and v.name not in system.scenario.fmus[name].parameters
+        ]
+        if free:
+            system.warnings.append(f"{name}: input {', '.join(free)} not connected; keeps its start value")
+
+
+def _kind(signal: Signal) -> str:
+    causality = signal.variable.causality
+    return f"an {causality}" if causality[0] in "aeiou" else f"a {causality}"
+
+
+def _resolve(system: System, output: str, input_: str, where: str) -> list[tuple[Signal, Signal]]:
+    """The pairs that a connection means: one, or with * on both sides all whose names agree there."""
+    if "*" not in output + input_:
+        return [(system.find(output, where), system.find(input_, where))]
+    if output.count("*") != 1 or input_.count("*") != 1:
+        raise InputError(f"{where}: a group needs exactly one * on each side")
+    head, tail = _around(output)
+    source = output.partition(".")[0]
+    target = input_.partition(".")[0]
+    for name in (source, target):
+        if name not in system.models:
+            raise InputError(f"{where}: no instance '{name}'{nearest(name, system.models)}")
+    pairs: list[tuple[Signal, Signal]] = []
+    for variable in system.models[source].variables.values():
+        name = f"{source}.{variable.name}"
+        if variable.causality != "output" or len(name) < len(head) + len(tail):
+            continue
+        if name.startswith(head) and name.endswith(tail):
+            middle = name[len(head) : len(name) - len(tail)]
+            partner = input_.replace("*", middle).partition(".")[2]
+            other = system.models[target].variables.get(partner)
+            if other is not None and other.causality == "input":
+                pairs.append((Signal(source, variable), Signal(target, other)))
+    if not pairs:
+        raise InputError(f"{where}: no output and input agree in the place of *")
+    return pairs
+
+
+def _around(pattern: str) -> tuple[str, str]:
+    head, _, tail = pattern.partition("*")
+    return head, tail
+
+
+def _check_faults(system: System) -> None:
+    connected = {c.target.name for c in system.connections}
+    for k, fault in enumerate(system.scenario.faults):
+        where = f"faults[{k}] ({fault.kind})"
+        found = [system.find(name, where) for name in fault.signals]
+        for signal in found:
+            if signal.variable.causality not in ("input", "output"):
+                raise InputError(f"{where}: {signal.name} is {_kind(signal)}, not an input or output")
+            if signal.variable.causality == "input" and signal.name not in connected:
+                raise InputError(f"{where}: {signal.name} is not connected, so nothing can go wrong there")
+            if signal.variable.type != "Real":
+                raise InputError(f"{where}: {signal.name} is of type {signal.variable.type}, not Real")
+        if len({(s.instance, s.variable.causality) for s in found}) > 1:
+            raise InputError(f"{where}: signals of one fault must be inputs, or outputs, of one instance")
+
+
+def _check_events(system: System) -> None:
+    for k, event in enumerate(system.scenario.events):
+        where = f"events[{k}]"
+        signal = system.find(f"{event.model}.{event.variable}", where)
+        v = signal.variable
+        if v.type == "String":
+            raise InputError(f"{where}: {signal.name} is of type String; events need a number")
+        if v.causality not in ("input", "output") and v.variability != "tunable":
+            raise InputError(f"{where}: {signal.name} is {_kind(signal)} that cannot change during a run")
+        if event.action in ("override", "bias"):
+            if event.value is None:
+                raise InputError(f"{where}: {event.action} needs a 'value'")
+            if event.action == "override":
+                _check_value(v, event.value, f"{where}: {signal.name}")
+        elif event.value is not None:
+            raise InputError(f"{where}: {event.action} takes no 'value'")
+        if event.action == "hold" and v.causality not in ("input", "output"):
+            raise InputError(f"{where}: {signal.name} is {_kind(signal)}, which holds its value anyway")
+        if event.time > system.scenario.stop:
+            system.warnings.append(f"{where}: t = {event.time} s is after the end; it has no effect")
+
+
+def _choose_signals(system: System) -> None:
+    """The value table holds what is connected, logged, or touched by a fault or an event."""
+    wanted = system.scenario.log.signals
+    available: dict[str, Signal] = {}
+    for name, model in system.models.items():
+        for v in model.variables.values():
+            if v.type in NUMERIC:
+                available[f"{name}.{v.name}"] = Signal(name, v)
+    io = [n for n, s in available.items() if s.variable.causality in ("input", "output")]
+    if wanted == "all":
+        system.logged = io
+    else:
+        for k, pattern in enumerate(wanted):
+            if "*" in pattern:
+                names = [n for n in io if fnmatchcase(n, pattern.replace("[", "[[]"))]
+                if not names:
+                    raise InputError(f"log.signals[{k}]: nothing matches '{pattern}'")
+            else:
+                names = [system.find(pattern, f"log.signals[{k}]").name]
+                if names[0] not in available:
+                    raise InputError(f"log.signals[{k}]: {names[0]} is of type String, not a number")
+            system.logged += [n for n in names if n not in system.logged]
+    needed = {*system.logged}
+    for c in system.connections:
+        needed |= {c.source.name, c.target.name}
+    for fault in system.scenario.faults:
+        needed |= set(fault.signals)
+    needed |= {
+        f"{e.model}.{e.variable}"
+        for e in system.scenario.events
+        if available[f"{e.model}.{e.variable}"].variable.causality in ("input", "output")
+    }
+    system.signals = {name: signal for name, signal in available.items() if name in needed}
