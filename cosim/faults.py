@@ -8,13 +8,21 @@ their ``stage``, as along a real measurement chain, whatever their order in the 
 
 import math
 from collections import deque
-from collections.abc import Callable, MutableSequence, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
-Values = MutableSequence[float]
+
+class Values(Protocol):
+    """The value table: a number at each slot."""
+
+    def __getitem__(self, slot: int, /) -> float: ...
+
+    def __setitem__(self, slot: int, value: float, /) -> None: ...
+
+
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]
 Span = tuple[Times, Times]
@@ -28,7 +36,7 @@ KINDS: dict[str, type["Fault"]] = {}
 class Fault(BaseModel):
     """What all faults have: the signals they act on together."""
 
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     stage: ClassVar[int]
 
     signals: list[str] = Field(min_length=1, description="inputs, as instance.variable")

@@ -229,7 +229,9 @@ class Instance:
         try:
             action()
         except Exception as error:
-            raise SimulationError(f"{self.name} ({self.model.path.name}): {what} failed: {error}") from error
+            raise SimulationError(
+                f"{self.name} ({self.model.path.name}): {what} failed: {error}"
+            ) from error
 
     def set_value(self, variable: Variable, value: float | int | bool | str) -> None:
         """Set one variable, outside the step loop."""
@@ -265,9 +267,7 @@ class Instance:
 
     def set_up(self, stop: float) -> None:
         """Announce the experiment."""
-        self.call(
-            "fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=0.0, stopTime=stop)
-        )
+        self.call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=0.0, stopTime=stop))
 
     def enter_initialization(self) -> None:
         self.call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)

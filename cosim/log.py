@@ -3,6 +3,7 @@
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -104,11 +105,12 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
         with open(path, encoding="utf-8") as file:
             names = _header(file.readline().rstrip("\n"))
             wanted = _wanted(names, columns, path)
+            places = [names.index(name) for name in wanted]
             # A run that was killed may leave part of a line at the end.
             lines = (line for line in file if line.endswith("\n"))
-            table = np.loadtxt(
-                lines, delimiter=",", usecols=[names.index(name) for name in wanted], ndmin=2
-            )
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # a log without rows is a log
+                table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
     except FileNotFoundError:
         raise InputError(f"no log in '{folder}': {CSV} is missing") from None
     except (OSError, ValueError, UnicodeDecodeError, StopIteration) as error:
@@ -122,8 +124,11 @@ def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.nda
         from pyarrow import parquet
     except ImportError:
         raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
-    wanted = _wanted(parquet.read_schema(path).names, columns, path)
-    table = parquet.read_table(path, columns=wanted)
+    try:
+        wanted = _wanted(parquet.read_schema(path).names, columns, path)
+        table = parquet.read_table(path, columns=wanted)
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as a log: {error}") from error
     return {name: table[name].to_numpy() for name in wanted}
 
 

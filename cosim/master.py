@@ -1,9 +1,11 @@
 """The master algorithm: who steps when, and how values travel in between.
 
-All values stand in one table of doubles. Each FMU reads its inputs from and writes its outputs to its
-own stretch of the table, so a step costs one vector get and one vector set for each FMU. A row of the log
-is the table.
+All values stand in one table of doubles. Each FMU reads its inputs from its own stretch of the table
+and writes its outputs there, so a step costs one vector get and one vector set for each FMU. A row of
+the log is the table.
 """
+
+from __future__ import annotations
 
 import ctypes
 import gc
@@ -77,10 +79,8 @@ class Table:
 
     def __init__(self, signals: dict[str, Signal], order: Sequence[str], settable: set[str]) -> None:
         def rank(signal: Signal) -> tuple[int, int, int]:
-            if signal.name in settable:
-                group = 0
-            else:
-                group = 1 if signal.variable.causality == "input" else 2
+            is_input = signal.variable.causality == "input"
+            group = 0 if signal.name in settable else 1 if is_input else 2
             return order.index(signal.instance), group, int(signal.variable.type != "Real")
 
         # sorted() is stable: within a stretch the order is that of the model description.
@@ -89,7 +89,7 @@ class Table:
         self._memory = (ctypes.c_double * max(1, len(self.signals)))()
         self.address = ctypes.addressof(self._memory)
         self.values = memoryview(self._memory).cast("B").cast("d")
-        self.row = np.frombuffer(self._memory, dtype=np.float64)
+        self.row = np.asarray(self.values)
 
 
 class Access:
@@ -171,7 +171,7 @@ class _Buffered:
 class Changes:
     """Events that act on the signals of one side of one instance: override, bias, hold."""
 
-    def __init__(self, values: memoryview) -> None:
+    def __init__(self, values: memoryview[float]) -> None:
         self._values = values
         self._fixed: dict[int, float] = {}
         self._added: dict[int, float] = {}
@@ -361,7 +361,9 @@ class Master:
             instance.enter_initialization()
             for signal in self.table.signals:
                 if signal.instance == instance.name and signal.variable.causality == "input":
-                    self.table.values[self.table.slots[signal.name]] = instance.get_value(signal.variable)
+                    self.table.values[self.table.slots[signal.name]] = instance.get_value(
+                        signal.variable
+                    )
         # Values settle in as many sweeps as there are FMUs in a chain; only then may faults act.
         for _ in self._steppers:
             before = self.table.row.copy()
@@ -444,7 +446,9 @@ class Master:
     def output_slots(self) -> list[int]:
         """Where the table holds outputs: values that must stay finite."""
         return [
-            self.table.slots[s.name] for stepper in self._steppers for s in stepper.got
+            self.table.slots[s.name]
+            for stepper in self._steppers
+            for s in stepper.got
             if s.variable.type == "Real"
         ]
 

@@ -70,7 +70,7 @@ METRICS = (
     Metric("ISE", "m2.s", "integral of e squared"),
     Metric("IAE", "m.s", "integral of |e|"),
     Metric("W", "J", "work: integral of the power P"),
-    Metric("I_tau_dot", "N", "wear: total change of the force, N and N.m alike"),
+    Metric("I_tau_dot", "N", "wear: total change of the commanded force"),
     Metric("IAEW", "m.s.J", "IAE times W"),
     Metric("IAEWWT", "m.s.J.N", "IAE times W times I_tau_dot"),
     Metric("IWWT", "J.N", "W times I_tau_dot"),
@@ -151,7 +151,9 @@ def _window(log: Log, start: float | None, stop: float | None) -> dict[str, np.n
 
 def _change(tau: Sequence[np.ndarray]) -> np.ndarray:
     """Euclidean norm of the change of a force from the sample before; 0 at the first."""
-    return np.linalg.norm(np.diff(np.stack(tau), axis=1, prepend=np.stack(tau)[:, :1]), axis=0)
+    change = np.zeros_like(tau[0])
+    change[1:] = np.sqrt(sum((np.diff(force) ** 2 for force in tau), np.zeros(change.size - 1)))
+    return change
 
 
 def tracking(log: Log) -> dict[str, np.ndarray]:
@@ -176,13 +178,13 @@ def tracking(log: Log) -> dict[str, np.ndarray]:
     tau = [part[name] for name in _commanded(log)]
     tau_dot = np.zeros_like(time)
     tau_dot[1:] = _change(tau)[1:] / np.diff(time)
-    power = sum(force * part[name] for force, name in zip(tau, VELOCITY, strict=True))
+    u, v, r = (part[name] for name in VELOCITY)
     return {
         "time": time,
         "e_pos": np.hypot(target[0] - x, target[1] - y),
         "cross_track": cross_track(x, y, target),
         "heading": wrap(psi - target[2]),
-        "P": np.abs(power),
+        "P": np.abs(tau[0] * u + tau[1] * v + tau[2] * r),
         "tau_dot": tau_dot,
     }
 
@@ -320,16 +322,27 @@ examples:
     return parser
 
 
+def _read(folder: Path) -> dict[str, np.ndarray]:
+    try:
+        return read_log(folder, [*POSE, *VELOCITY, *TARGET, *TAU_CMD])
+    except InputError:
+        # A column is not there, or nothing is: reading all tells which.
+        return read_log(folder)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 2 bad input."""
     options: Any = _parser().parse_args(arguments)
     try:
-        log = read_log(options.folder)
+        log = _read(options.folder)
         metrics = compute(log, options.start, options.stop)
         if options.out is not None:
             _write_csv(options.out, over_time(log, options.start, options.stop))
-    except (InputError, MetricsError, OSError) as error:
+    except (InputError, MetricsError) as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: '{options.out}' cannot be written: {error.strerror}", file=sys.stderr)
         return 2
     if options.json:
         print(json.dumps(metrics, indent=2))

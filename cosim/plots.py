@@ -47,8 +47,8 @@ HULL_WIDTH = 0.248  # m
 # Corners of the hull seen from above, forward and to starboard of its middle, in lengths and widths.
 HULL = ((0.5, 0.0), (0.22, 0.5), (-0.5, 0.42), (-0.5, -0.42), (0.22, -0.5))
 OUTLINES = 12  # ships drawn along a path
-SCALES = (1.0, 0.5, 0.25, 0.1, 0.05, 0.02, 0.01)  # of those ships
-OUTLINE_SHARE = 0.09  # longest ship, as a share of the picture
+SCALES = (1.0, 0.5, 0.25, 0.125, 0.05, 0.02, 0.01)  # of those ships
+OUTLINE_SHARE = 0.1  # longest ship, as a share of the picture
 STILL = 0.01  # m; a target that moves less is a point
 
 
@@ -78,7 +78,7 @@ def draw(runs: Mapping[str, Log], folder: Path) -> list[Path]:
     written = []
     for name, (choices, picture) in PICTURES.items():
         able = [
-            Run(label, part, _line(k))
+            Run(label.replace("$", r"\$"), part, _line(k))
             for k, (label, log) in enumerate(runs.items())
             if (part := _usable(log, choices)) is not None
         ]
@@ -207,10 +207,12 @@ def _save(figure: "Figure", file: Path) -> None:
         scratch.unlink(missing_ok=True)
 
 
-def _along(x: np.ndarray, y: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same path with points at equal distances of about ``step`` [m]."""
+def _along(
+    x: np.ndarray, y: np.ndarray, step: float, most: int = MAX_PATH
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same path with points at equal distances of about ``step`` [m], or ``most`` points."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    count = int(min(way[-1] / step, MAX_PATH)) + 2
+    count = int(min(way[-1] / step, most)) + 2
     at = np.linspace(0.0, way[-1], count)
     return np.interp(at, way, x), np.interp(at, way, y)
 
@@ -228,15 +230,17 @@ def once(paths: Sequence[tuple[np.ndarray, np.ndarray]], size: float) -> tuple[n
         North and east [m], with NaN between parts that are not connected.
     """
     step = size / 500.0
-    parts = [_along(x, y, step) for x, y in paths]
+    parts = [_along(x, y, step, 10 * MAX_PATH) for x, y in paths]
     x = np.concatenate([np.append(north, np.nan) for north, _ in parts])
     y = np.concatenate([np.append(east, np.nan) for _, east in parts])
     direction = np.concatenate([np.arctan2(np.gradient(e), np.gradient(n)) for n, e in parts])
     direction = np.insert(direction, np.cumsum([n.size for n, _ in parts]), np.nan)
     cell = 3.0 * step
-    place = np.stack([x // cell, y // cell, (direction % np.pi) // (np.pi / 6.0)])
-    _, first, which = np.unique(place, axis=1, return_index=True, return_inverse=True)
-    again = np.arange(x.size) - first[which.ravel()] > 12
+    column = (x - np.nanmin(x)) // cell
+    row = (y - np.nanmin(y)) // cell
+    place = (column * 2.0**16 + row) * 8.0 + (direction % np.pi) // (np.pi / 6.0)
+    _, first, which = np.unique(place, return_index=True, return_inverse=True)
+    again = np.arange(x.size) - first[which] > 12
     return np.where(again, np.nan, x), np.where(again, np.nan, y)
 
 
@@ -293,7 +297,7 @@ def trajectory(runs: Runs) -> "Figure":
     scale = next((s for s in SCALES if s * HULL_LENGTH < OUTLINE_SHARE * size), SCALES[-1])
     for run in runs:
         x, y = _along(run.log["vessel.x"], run.log["vessel.y"], size / 1000.0)
-        panel.plot(y, x, label=run.label, **{**run.line, "linewidth": 1.6})
+        panel.plot(y, x, label=run.label, **{**run.line, "linewidth": 1.8})
         ships = PolyCollection(
             list(outlines(run.log, scale * HULL_LENGTH)),
             facecolors=(run.line["color"], 0.15 / len(runs)),
@@ -328,7 +332,7 @@ def _target(panel: "Axes", logs: Sequence[Log], size: float) -> None:
     moving = [path for path in paths if max(np.ptp(path[0]), np.ptp(path[1])) > STILL]
     if moving:
         x, y = once(moving, size)
-        panel.plot(y, x, dashes=(5, 4), linewidth=1.0, **line)
+        panel.plot(y, x, dashes=(6, 6), linewidth=0.9, **line)
         line["label"] = None
     points = [(x[0], y[0]) for x, y in paths if max(np.ptp(x), np.ptp(y)) <= STILL]
     if points:

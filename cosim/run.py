@@ -49,7 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.realtime,
                 pictures=not options.no_plots,
                 show=show,
-                progress=(lambda t: shown.update(task, completed=t)) if shown and task is not None else None,
+                progress=(lambda t: shown.update(task, completed=t))
+                if shown and task is not None
+                else None,
             )
     except InputError as error:
         console.print(f"error: {error}", markup=False)

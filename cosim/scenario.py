@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import (
     BaseModel,
@@ -18,10 +18,13 @@ from pydantic import (
 from . import faults
 from .errors import InputError, nearest
 
-AnyFault = Annotated[
-    Union[tuple(dict.fromkeys(faults.KINDS.values()))],  # noqa: UP007 - made from the registry
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    AnyFault = faults.Fault
+else:
+    AnyFault = Annotated[
+        Union[tuple(faults.KINDS.values())],  # noqa: UP007 - made from the registry
+        Field(discriminator="kind"),
+    ]
 Value = bool | int | float | str
 
 
@@ -92,8 +95,8 @@ class Scenario(Strict):
     )
     faults: list[AnyFault] = Field(default_factory=list)
     events: list[Event] = Field(default_factory=list)
-    log: LogOptions = Field(default_factory=LogOptions)
-    metrics: MetricsOptions = Field(default_factory=MetricsOptions)
+    log: LogOptions = Field(default_factory=lambda: LogOptions.model_validate({}))
+    metrics: MetricsOptions = Field(default_factory=lambda: MetricsOptions.model_validate({}))
 
     _folder: Path = PrivateAttr(default_factory=Path.cwd)
 

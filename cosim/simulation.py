@@ -222,7 +222,13 @@ def _fresh_folder(folder: Path) -> Path:
     """The result folder, without what an earlier run left there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in (logs.CSV, logs.PARQUET, logs.SIDECAR, logs.METRICS, *(f"{p}.png" for p in plots.PICTURES)):
+        for name in (
+            logs.CSV,
+            logs.PARQUET,
+            logs.SIDECAR,
+            logs.METRICS,
+            *(f"{p}.png" for p in plots.PICTURES),
+        ):
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
@@ -333,9 +339,7 @@ def _describe(system: System) -> dict[str, Any]:
         "order": system.order,
         "scenario": resolved,
         "seed": system.scenario.seed,
-        "versions": {
-            name: importlib.metadata.version(name) for name in ("cybership", "fmpy", "numpy")
-        },
+        "versions": {name: importlib.metadata.version(name) for name in ("cybership", "fmpy", "numpy")},
         "warnings": system.warnings,
     }
 

@@ -21,6 +21,9 @@ ACCEPTS = {
     "Boolean": ("Boolean",),
 }
 
+# Parameter sets: file, and model name -> parameter -> value.
+Overrides = Sequence[tuple[Path, dict[str, dict[str, float]]]]
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -92,14 +95,12 @@ class System:
         return Signal(instance, known[variable])
 
 
-def prepare(
-    scenario: Scenario, overrides: Sequence[tuple[Path, dict[str, dict[str, float]]]] = ()
-) -> System:
+def prepare(scenario: Scenario, overrides: Overrides = ()) -> System:
     """Read the FMUs of a scenario and check everything that can be checked without running.
 
     Args:
         scenario: what to run.
-        overrides: parameter sets (file, model name -> name -> value) that beat the scenario's own.
+        overrides: parameter sets that beat the scenario's own.
 
     Raises:
         InputError: the first thing that is wrong.
@@ -175,14 +176,27 @@ def _count_steps(system: System) -> None:
         every = whole((entry.step or scenario.step) / scenario.step)
         if every is None:
             raise InputError(
-                f"fmus.{name}: step = {entry.step} s is not a multiple of the base step {scenario.step} s"
+                f"fmus.{name}: step = {entry.step} s is not a multiple of step = {scenario.step} s"
             )
         system.every[name] = every
 
 
-def _check_parameters(
-    system: System, overrides: Sequence[tuple[Path, dict[str, dict[str, float]]]]
-) -> None:
+def _check_parameters(system: System, overrides: Overrides) -> None:
+    for name, values in _merge_parameters(system, overrides).items():
+        known = system.models[name].variables
+        settable = {k: v for k, v in known.items() if v.causality in ("parameter", "input")}
+        system.parameters[name] = []
+        for parameter, (value, where) in values.items():
+            if parameter not in settable:
+                what = "cannot be set" if parameter in known else "does not exist"
+                hint = nearest(parameter, list(settable))
+                raise InputError(f"{where}: {name}.{parameter} {what}{hint}")
+            _check_value(settable[parameter], value, f"{where}: {name}.{parameter}")
+            system.parameters[name].append((settable[parameter], value))
+
+
+def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[str, tuple[Value, str]]]:
+    """Instance -> parameter -> value and where it comes from; parameter sets beat the scenario."""
     chosen: dict[str, dict[str, tuple[Value, str]]] = {}
     for name, entry in system.scenario.fmus.items():
         chosen[name] = {k: (v, f"fmus.{name}.parameters") for k, v in entry.parameters.items()}
@@ -190,7 +204,9 @@ def _check_parameters(
         for model_name, values in by_model.items():
             targets = [n for n, model in system.models.items() if model.name == model_name]
             if not targets:
-                system.warnings.append(f"'{path}' has values for '{model_name}', which does not run here")
+                system.warnings.append(
+                    f"'{path}' has values for '{model_name}', which does not run here"
+                )
             for name in targets:
                 for parameter, value in values.items():
                     old = chosen[name].get(parameter)
@@ -199,18 +215,7 @@ def _check_parameters(
                             f"{name}.{parameter} = {value} from '{path}' beats {old[0]} from {old[1]}"
                         )
                     chosen[name][parameter] = (value, f"'{path}'")
-    for name, values in chosen.items():
-        known = system.models[name].variables
-        settable = {k: v for k, v in known.items() if v.causality in ("parameter", "input")}
-        system.parameters[name] = []
-        for parameter, (value, where) in values.items():
-            if parameter not in settable:
-                what = "cannot be set" if parameter in known else "does not exist"
-                raise InputError(
-                    f"{where}: {name}.{parameter} {what}{nearest(parameter, list(settable))}"
-                )
-            _check_value(settable[parameter], value, f"{where}: {name}.{parameter}")
-            system.parameters[name].append((settable[parameter], value))
+    return chosen
 
 
 def _check_value(variable: Variable, value: Value | None, where: str) -> None:
@@ -242,11 +247,11 @@ def _connect(system: System) -> None:
             if target.variable.causality != "input":
                 raise InputError(f"{ends}: {target.name} is {_kind(target)}, not an input")
             if target.name in taken:
-                raise InputError(f"{ends}: {target.name} is already connected to {taken[target.name].name}")
-            if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
                 raise InputError(
-                    f"{ends}: {source.variable.type} cannot feed {target.variable.type}"
+                    f"{ends}: {target.name} is already connected to {taken[target.name].name}"
                 )
+            if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
+                raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
             taken[target.name] = source
             system.connections.append(
                 Connection(
@@ -264,7 +269,9 @@ def _connect(system: System) -> None:
             and v.name not in system.scenario.fmus[name].parameters
         ]
         if free:
-            system.warnings.append(f"{name}: input {', '.join(free)} not connected; keeps its start value")
+            system.warnings.append(
+                f"{name}: input {', '.join(free)} not connected; keeps its start value"
+            )
 
 
 def _kind(signal: Signal) -> str:
@@ -308,17 +315,21 @@ def _around(pattern: str) -> tuple[str, str]:
 def _check_faults(system: System) -> None:
     connected = {c.target.name for c in system.connections}
     for k, fault in enumerate(system.scenario.faults):
-        where = f"faults[{k}] ({fault.kind})"
+        where = f"faults[{k}] ({type(fault).__name__.lower()})"
         found = [system.find(name, where) for name in fault.signals]
         for signal in found:
             if signal.variable.causality not in ("input", "output"):
                 raise InputError(f"{where}: {signal.name} is {_kind(signal)}, not an input or output")
             if signal.variable.causality == "input" and signal.name not in connected:
-                raise InputError(f"{where}: {signal.name} is not connected, so nothing can go wrong there")
+                raise InputError(
+                    f"{where}: {signal.name} is not connected, so nothing can go wrong there"
+                )
             if signal.variable.type != "Real":
                 raise InputError(f"{where}: {signal.name} is of type {signal.variable.type}, not Real")
         if len({(s.instance, s.variable.causality) for s in found}) > 1:
-            raise InputError(f"{where}: signals of one fault must be inputs, or outputs, of one instance")
+            raise InputError(
+                f"{where}: signals of one fault must be inputs, or outputs, of one instance"
+            )
 
 
 def _check_events(system: System) -> None:
@@ -329,7 +340,9 @@ def _check_events(system: System) -> None:
         if v.type == "String":
             raise InputError(f"{where}: {signal.name} is of type String; events need a number")
         if v.causality not in ("input", "output") and v.variability != "tunable":
-            raise InputError(f"{where}: {signal.name} is {_kind(signal)} that cannot change during a run")
+            raise InputError(
+                f"{where}: {signal.name} is {_kind(signal)} that cannot change during a run"
+            )
         if event.action in ("override", "bias"):
             if event.value is None:
                 raise InputError(f"{where}: {event.action} needs a 'value'")
@@ -345,34 +358,37 @@ def _check_events(system: System) -> None:
 
 def _choose_signals(system: System) -> None:
     """The value table holds what is connected, logged, or touched by a fault or an event."""
+    available = {
+        f"{name}.{v.name}": Signal(name, v)
+        for name, model in system.models.items()
+        for v in model.variables.values()
+        if v.type in NUMERIC
+    }
+    flowing = [n for n, s in available.items() if s.variable.causality in ("input", "output")]
     wanted = system.scenario.log.signals
-    available: dict[str, Signal] = {}
-    for name, model in system.models.items():
-        for v in model.variables.values():
-            if v.type in NUMERIC:
-                available[f"{name}.{v.name}"] = Signal(name, v)
-    io = [n for n, s in available.items() if s.variable.causality in ("input", "output")]
     if wanted == "all":
-        system.logged = io
+        system.logged = flowing
     else:
         for k, pattern in enumerate(wanted):
-            if "*" in pattern:
-                names = [n for n in io if fnmatchcase(n, pattern.replace("[", "[[]"))]
-                if not names:
-                    raise InputError(f"log.signals[{k}]: nothing matches '{pattern}'")
-            else:
-                names = [system.find(pattern, f"log.signals[{k}]").name]
-                if names[0] not in available:
-                    raise InputError(f"log.signals[{k}]: {names[0]} is of type String, not a number")
-            system.logged += [n for n in names if n not in system.logged]
+            for name in _matching(system, pattern, flowing, f"log.signals[{k}]"):
+                if name not in available:
+                    raise InputError(f"log.signals[{k}]: {name} is of type String, not a number")
+                if name not in system.logged:
+                    system.logged.append(name)
     needed = {*system.logged}
     for c in system.connections:
         needed |= {c.source.name, c.target.name}
     for fault in system.scenario.faults:
         needed |= set(fault.signals)
-    needed |= {
-        f"{e.model}.{e.variable}"
-        for e in system.scenario.events
-        if available[f"{e.model}.{e.variable}"].variable.causality in ("input", "output")
-    }
+    needed |= {f"{e.model}.{e.variable}" for e in system.scenario.events}.intersection(flowing)
     system.signals = {name: signal for name, signal in available.items() if name in needed}
+
+
+def _matching(system: System, pattern: str, names: Sequence[str], where: str) -> list[str]:
+    """The one variable that a name means, or all inputs and outputs that a pattern with * means."""
+    if "*" not in pattern:
+        return [system.find(pattern, where).name]
+    found = [name for name in names if fnmatchcase(name, pattern.replace("[", "[[]"))]
+    if not found:
+        raise InputError(f"{where}: nothing matches '{pattern}'")
+    return found

@@ -56,7 +56,7 @@ def vector(
     Returns:
         The class, declared like a hand-written one.
     """
-    made = namedtuple(typename, [f[0] for f in fields], defaults=[f[3] for f in fields])  # pyright: ignore
+    made = namedtuple(typename, [f[0] for f in fields], defaults=[f[3] for f in fields])
     made.__annotations__ = {
         name: Annotated[(float, unit, description, *extra)] for name, unit, description, _ in fields
     }
@@ -135,7 +135,9 @@ def flatten(value: Any) -> list[Any]:
     """The scalars of a nested tuple in order: the inverse of :func:`packer`."""
     flat: list[Any] = []
     for item in value:
-        if isinstance(item, tuple):
+        if item.__class__ is float:  # the usual case, and the quickest to tell
+            flat.append(item)
+        elif isinstance(item, tuple):
             flat += flatten(item)
         else:
             flat.append(item)

@@ -78,8 +78,8 @@ def _variables(root: Element, component: Component) -> None:
             name=v.name,
             valueReference=str(reference),
             description=v.description,
-            **kind,
         )
+        scalar.attrib.update(kind)
         SubElement(scalar, "Real", _real(v, start=reference < parameters + inputs))
 
     structure = SubElement(root, "ModelStructure")

@@ -146,8 +146,11 @@ def extra_damping_force(u: Number, v: Number, r: Number, c: ExtraDamping) -> Tri
     )
 
 
-def damping_force(u: Number, v: Number, r: Number, c: Damping) -> Triple:
-    """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected."""
+def damping_force(u: Number, v: Number, r: Number, c: Any) -> Triple:
+    """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected.
+
+    The coefficients c are a Damping, or a tuple of three groups in the same order.
+    """
     towed, rotational, extra = c
     X1, Y1, N1 = towed_damping_force(u, v, towed)
     _, Y2, N2 = rotational_damping_force(v, r, rotational)

@@ -227,9 +227,7 @@ def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
         args = [of(a) for a in node.args]
         if all(not isinstance(a, frozenset) for a in args):
             known[id(node)] = OPERATIONS[node.operation](*args)
-        elif node.operation == "mul" and 0.0 in args:
-            known[id(node)] = 0.0
-        elif node.operation == "div" and args[0] == 0.0:
+        elif 0.0 in {"mul": args, "div": args[:1]}.get(node.operation, ()):
             known[id(node)] = 0.0
         elif node.operation == "where" and not isinstance(args[0], frozenset):
             known[id(node)] = args[1] if args[0] else args[2]

@@ -6,7 +6,7 @@ omega_hat is what the law compensates for. Every heading difference is wrapped.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Range, vector, variables
+from ..declare import Range, variables, vector
 from ..hull import (
     Inertia,
     RotationalDamping,
@@ -52,10 +52,7 @@ PhiStart = vector(
 )
 PhiHat = vector(
     "PhiHat",
-    [
-        (f"phi_hat_{k}", c.unit, f"estimate of {c.name}", 0.0)
-        for k, c in enumerate(_COEFFICIENTS, 1)
-    ],
+    [(f"phi_hat_{k}", c.unit, f"estimate of {c.name}", 0.0) for k, c in enumerate(_COEFFICIENTS, 1)],
 )
 
 
@@ -162,6 +159,4 @@ def control(
     lY = -z.z1_y - k.K_d_v * z.z2_v + MY
     lN = -z.z1_psi - k.K_d_r * z.z2_r + MN
     nX, nY, nN = CX - GX - oX, CY - GY - oY, CN - GN - oN
-    return Outputs(
-        Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN, phi_hat
-    )
+    return Outputs(Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN, phi_hat)

@@ -49,9 +49,7 @@ def approach(axis: Axis, error: Number, w: Number, h: Number) -> Axis:
     left = decay * (c0 + h * (c1 + h * c2))
     slope = decay * (c1 + 2.0 * h * c2)
     rate = slope - w * left
-    return Axis(
-        axis.value + (left - error), rate, 2.0 * decay * c2 - w * slope - w * rate
-    )
+    return Axis(axis.value + (left - error), rate, 2.0 * decay * c2 - w * slope - w * rate)
 
 
 def init(i: Inputs, p: Params) -> State:

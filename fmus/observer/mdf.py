@@ -3,14 +3,15 @@
 A measurement that is frozen (all three channels identical to the bit for a measurement period or
 longer) or lost (NaN, infinite, or exactly zero in all three channels) is replaced by the prediction
 (4.46): constant velocity. A pose that stays identical for longer than ``rest_time`` is taken to be
-true: the ship lies still; a pose that is lost for longer is predicted with fading velocity. The heading is made continuous over turns. The filter constants a and b
-belong to ``filter_period`` and are converted, so that another step size gives the same filter.
+true: the ship lies still; one that is lost for longer is predicted with fading velocity. The heading
+is made continuous over turns. The filter constants a and b belong to ``filter_period`` and are
+converted, so that another step size gives the same filter.
 """
 
 from typing import Annotated, NamedTuple
 
 from ..declare import Component, Range
-from ..ops import TWO_PI, Number, clip, cos, exp, floor, is_finite, log, not_, sin, where
+from ..ops import TWO_PI, Number, cos, exp, floor, is_finite, log, not_, sin, where
 from ..signals import Estimate, Force, Measurement
 
 FRACTION = Range(0.0, 0.999999)

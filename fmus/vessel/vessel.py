@@ -4,12 +4,16 @@ Integrated by the classical fourth-order Runge-Kutta method with the force held 
 communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero.
 """
 
+from operator import add
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, flatten, packer, variables, vector
+from ..declare import FIXED, Component, variables, vector
 from ..hull import (
     Damping,
+    ExtraDamping,
     Inertia,
+    RotationalDamping,
+    TowedDamping,
     Triple,
     coriolis_force,
     damping_force,
@@ -19,14 +23,29 @@ from ..hull import (
 from ..ops import Number, cos, finite, sin, wrap
 from ..signals import Force, Measurement, Velocity
 
-DampingChange = vector(
-    "DampingChange",
-    [
-        (f"delta_{c.name}", c.unit, f"addition to {c.name}: a model error", 0.0)
-        for c in variables(Damping)
-    ],
-)
-_as_damping = packer(Damping)
+
+def _changes(coefficients: type[Any]) -> type[Any]:
+    """Additions to a group of coefficients, as parameters ``delta_<coefficient>``."""
+    return vector(
+        f"{coefficients.__name__}Change",
+        [
+            (f"delta_{c.name}", c.unit, f"addition to {c.name}: a model error", 0.0)
+            for c in variables(coefficients)
+        ],
+    )
+
+
+TowedChange = _changes(TowedDamping)
+RotationalChange = _changes(RotationalDamping)
+ExtraChange = _changes(ExtraDamping)
+
+
+class DampingChange(NamedTuple):
+    """Additions to all damping coefficients, in the order of Damping."""
+
+    towed: Any = TowedChange()
+    rotational: Any = RotationalChange()
+    extra: Any = ExtraChange()
 
 
 class Start(NamedTuple):
@@ -43,7 +62,7 @@ class Start(NamedTuple):
 class Params(NamedTuple):
     inertia: Inertia = Inertia()
     damping: Damping = Damping()
-    change: Any = DampingChange()
+    change: DampingChange = DampingChange()
     start: Start = Start()
 
 
@@ -81,7 +100,12 @@ class Outputs(NamedTuple):
 
 def total_damping(p: Params) -> Damping:
     """The nominal damping coefficients plus their changes."""
-    return _as_damping([a + b for a, b in zip(flatten(p.damping), p.change, strict=True)])
+    nominal, change = p.damping, p.change
+    return Damping(
+        TowedDamping._make(map(add, nominal.towed, change.towed)),
+        RotationalDamping._make(map(add, nominal.rotational, change.rotational)),
+        ExtraDamping._make(map(add, nominal.extra, change.extra)),
+    )
 
 
 def kinematics(psi: Number, u: Number, v: Number) -> tuple[Any, Any]:
@@ -149,7 +173,7 @@ def step(s: State, i: Force, p: Params, h: Number) -> tuple[State, Outputs]:
     b = hull(p)
     s = integrate(s, tau, b, h)
     x, y, psi, u, v, r = s
-    omega_X, omega_Y, omega_N = damping_force(u, v, r, _as_damping(p.change))
+    omega_X, omega_Y, omega_N = damping_force(u, v, r, p.change)
     _, phi_Y, phi_N = rotational_damping_force(v, r, p.damping.rotational)
     return s, Outputs(
         Pose(x, y, psi),

@@ -1,0 +1,360 @@
+"""Metrics and pictures of a run."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cosim import metrics, plots
+from cosim.metrics import MetricsError, compute, main, over_time, tracking
+
+KEYS = [
+    "e_pos_rms",
+    "e_pos_max",
+    "cross_track_rms",
+    "heading_rms",
+    "ISE",
+    "IAE",
+    "W",
+    "I_tau_dot",
+    "IAEW",
+    "IAEWWT",
+    "IWWT",
+    "from",
+    "to",
+]
+
+
+def circle(n=2001, step=0.01):
+    """A ship exactly on a target that goes round a circle of 2 m at 0.1 m/s."""
+    time = np.arange(n) * step
+    angle = 0.05 * time
+    zero = np.zeros(n)
+    log = {name: zero.copy() for name in metrics.COLUMNS}
+    log["time"] = time
+    for prefix, suffix in (("vessel.", ""), ("guidance.", "_t")):
+        log[f"{prefix}x{suffix}"] = 2.0 * np.sin(angle)
+        log[f"{prefix}y{suffix}"] = -2.0 * np.cos(angle)
+        log[f"{prefix}psi{suffix}"] = angle.copy()
+    log["vessel.u"] = np.full(n, 0.1)
+    return log
+
+
+def shift(log, ahead, starboard):
+    """Move the ship in the frame of the target [m]."""
+    psi = log["guidance.psi_t"]
+    return {
+        **log,
+        "vessel.x": log["guidance.x_t"] + np.cos(psi) * ahead - np.sin(psi) * starboard,
+        "vessel.y": log["guidance.y_t"] + np.sin(psi) * ahead + np.cos(psi) * starboard,
+    }
+
+
+def wild(seed=0, n=500):
+    rng = np.random.default_rng(seed)
+    log = {name: rng.normal(size=n) for name in metrics.COLUMNS}
+    log["time"] = np.cumsum(rng.uniform(0.01, 0.1, n))
+    return log
+
+
+@pytest.fixture
+def folder(tmp_path):
+    def write(log):
+        np.savetxt(
+            tmp_path / "log.csv",
+            np.column_stack(list(log.values())),
+            delimiter=",",
+            header=",".join(log),
+            comments="",
+            fmt="%.17g",
+        )
+        return tmp_path
+
+    return write
+
+
+class TestCompute:
+    def test_keys_and_order(self):
+        result = compute(wild())
+        assert list(result) == KEYS == [metric.name for metric in metrics.METRICS]
+        assert all(type(value) is float for value in result.values())
+
+    def test_perfect_log_has_no_error(self):
+        result = compute(circle())
+        assert (result.pop("from"), result.pop("to")) == (0.0, 20.0)
+        assert set(result.values()) == {0.0}
+
+    @pytest.mark.parametrize("offset", [-0.3, 0.2])
+    def test_constant_offset(self, offset):
+        log = shift(circle(), 0.0, offset)
+        result = compute(log)
+        assert result["ISE"] == pytest.approx(offset**2 * 20.0)
+        assert result["IAE"] == pytest.approx(abs(offset) * 20.0)
+        for name in ("e_pos_rms", "e_pos_max", "cross_track_rms"):
+            assert result[name] == pytest.approx(abs(offset))
+
+    def test_work_and_wear(self):
+        log = circle()
+        log["thrusters.tau_cmd_X"] = np.linspace(-1.0, -2.0, log["time"].size)
+        result = compute(log)
+        assert result["W"] == pytest.approx(1.5 * 0.1 * 20.0)
+        assert result["I_tau_dot"] == pytest.approx(1.0)
+
+    def test_products(self):
+        result = compute(wild())
+        assert result["IAEW"] == pytest.approx(result["IAE"] * result["W"])
+        assert result["IAEWWT"] == pytest.approx(result["IAEW"] * result["I_tau_dot"])
+        assert result["IWWT"] == pytest.approx(result["W"] * result["I_tau_dot"])
+
+    @pytest.mark.parametrize("every", [1, 2, 10, 1000])
+    def test_wear_of_ramps_does_not_depend_on_the_step(self, every):
+        log = circle()
+        ramp = np.sqrt(np.linspace(0.0, 1.0, log["time"].size))
+        for name, height in zip(metrics.TAU_CMD, (1.0, -2.0, 2.0), strict=True):
+            log[name] = height * ramp
+        thinned = {name: values[::every] for name, values in log.items()}
+        assert compute(thinned)["I_tau_dot"] == pytest.approx(3.0)
+
+    def test_wear_does_not_depend_on_time(self):
+        log = wild()
+        slow = {**log, "time": 3.0 * log["time"]}
+        assert compute(slow)["I_tau_dot"] == compute(log)["I_tau_dot"]
+        assert compute(slow)["IAE"] == pytest.approx(3.0 * compute(log)["IAE"])
+
+    def test_force_after_clipping_comes_first(self):
+        log = wild()
+        for name in metrics.TAU:
+            log[name] = log[name] * 1e3
+        clipped = compute(log)
+        without = {name: values for name, values in log.items() if name not in metrics.TAU_CMD}
+        assert compute(without)["I_tau_dot"] > 100.0 * clipped["I_tau_dot"]
+
+    def test_window_holds_its_ends(self):
+        log = circle()
+        result = compute(log, 0.1 + 0.2, 12.0 - 1e-12)
+        assert (result["from"], result["to"]) == (log["time"][30], log["time"][1200])
+        assert compute(log, -5.0, 1e9) == compute(log)
+
+    def test_windows_add_up(self):
+        log = wild()
+        middle = float(log["time"][200])
+        first, second, whole = compute(log, stop=middle), compute(log, middle), compute(log)
+        for name in ("ISE", "IAE", "W", "I_tau_dot"):
+            assert first[name] + second[name] == pytest.approx(whole[name])
+
+    def test_what_is_outside_the_window_does_not_matter(self):
+        log = circle()
+        log["vessel.x"] = np.where(log["time"] > 10.0, np.nan, log["vessel.x"])
+        assert compute(log, stop=10.0)["ISE"] == 0.0
+        with pytest.raises(MetricsError, match=r"vessel\.x is not finite at 10\.01 s"):
+            compute(log)
+
+    def test_missing_columns_are_named(self):
+        log = circle()
+        del log["vessel.r"], log["guidance.psi_t"]
+        with pytest.raises(MetricsError, match=r"lacks vessel\.r, guidance\.psi_t$"):
+            compute(log)
+        with pytest.raises(MetricsError, match=r"lacks time, "):
+            compute({})
+
+    @pytest.mark.parametrize(("start", "stop"), [(30.0, None), (5.0, 5.001), (8.0, 3.0), (None, -1.0)])
+    def test_empty_window(self, start, stop):
+        with pytest.raises(MetricsError, match=r"fewer than two rows .* covers 0 s to 20 s"):
+            compute(circle(), start, stop)
+
+    def test_no_rows(self):
+        with pytest.raises(MetricsError, match="no rows"):
+            compute({name: np.empty(0) for name in metrics.COLUMNS})
+
+    def test_overflow_is_an_error_not_infinity(self):
+        log = shift(circle(), 0.0, 1e200)
+        with pytest.raises(MetricsError, match=r"grows without bound.*ISE"):
+            compute(log)
+
+    def test_time_must_increase(self):
+        log = circle()
+        log["time"][7] = log["time"][6]
+        with pytest.raises(MetricsError, match=r"does not increase after 0\.06 s"):
+            compute(log)
+
+
+class TestTracking:
+    def test_cross_track_is_positive_to_starboard(self):
+        north = {**circle(2), "guidance.psi_t": np.zeros(2)}
+        assert tracking(shift(north, 0.0, 0.1))["cross_track"] == pytest.approx(0.1)
+        assert tracking(shift(circle(), 0.0, -0.1))["cross_track"] == pytest.approx(-0.1)
+
+    def test_cross_track_ignores_what_is_along_the_track(self):
+        result = tracking(shift(circle(), 0.7, 0.1))
+        assert result["cross_track"] == pytest.approx(0.1)
+        assert result["e_pos"] == pytest.approx(np.hypot(0.7, 0.1))
+
+    @pytest.mark.parametrize("turns", [-3, 0, 1, 40])
+    def test_heading_error_is_wrapped(self, turns):
+        log = circle(3)
+        log["vessel.psi"] = np.array([np.pi - 0.1, -np.pi + 0.1, 0.2]) + 2.0 * np.pi * turns
+        log["guidance.psi_t"] = np.array([-np.pi + 0.1, np.pi - 0.1, 0.0])
+        assert tracking(log)["heading"] == pytest.approx([-0.2, 0.2, 0.2])
+
+    def test_wrap_keeps_pi_and_small_angles(self):
+        given = np.array([np.pi, -np.pi, np.nextafter(np.pi, 4.0), 1e-300, -1e-300, 3.0 * np.pi])
+        wrapped = metrics.wrap(given)
+        assert wrapped[:2].tolist() == [np.pi, np.pi]
+        assert wrapped[3:5].tolist() == given[3:5].tolist()
+        assert np.all((wrapped > -np.pi) & (wrapped <= np.pi))
+
+    def test_power_is_absolute(self):
+        log = wild()
+        result = tracking(log)
+        tau, nu = ([log[name] for name in names] for names in (metrics.TAU_CMD, metrics.VELOCITY))
+        assert result["P"] == pytest.approx(np.abs(np.sum(np.multiply(tau, nu), axis=0)))
+
+    def test_force_rate(self):
+        log = circle(4)
+        log["thrusters.tau_cmd_X"] = np.array([1.0, 1.03, 1.03, 1.03])
+        log["thrusters.tau_cmd_N"] = np.array([1.0, 0.96, 0.96, 0.97])
+        assert tracking(log)["tau_dot"] == pytest.approx([0.0, 5.0, 0.0, 1.0])
+
+
+class TestOverTime:
+    def test_last_is_what_compute_gives(self):
+        log = wild()
+        for start, stop in ((None, None), (5.0, None), (3.0, 9.0)):
+            result = compute(log, start, stop)
+            grown = over_time(log, start, stop)
+            assert grown["time"][-1] == result["to"]
+            for name in metrics.OVER_TIME:
+                assert grown[name][-1] == result[name]
+
+    def test_grows_from_zero(self):
+        grown = over_time(wild(), 4.0)
+        for name in metrics.OVER_TIME:
+            assert grown[name][0] == 0.0
+            assert np.all(np.diff(grown[name]) >= 0.0)
+
+
+def test_needed_keeps_order():
+    names = ["time", "vessel.u_dot", "controller.tau_X", "vessel.x", "observer.x_m"]
+    assert metrics.needed(names) == ["time", "controller.tau_X", "vessel.x"]
+
+
+def test_needed_is_enough():
+    log = wild()
+    names = metrics.needed([*log, "vessel.other"])
+    assert compute({name: log[name] for name in names}) == compute(log)
+
+
+class TestCommand:
+    def test_table(self, folder, capsys):
+        assert main([str(folder(shift(circle(), 0.0, 0.25)))]) == 0
+        out = capsys.readouterr().out
+        assert all(metric.name in out for metric in metrics.METRICS)
+        assert "1.25 " in out  # ISE
+
+    def test_json(self, folder, capsys):
+        log = wild()
+        assert main([str(folder(log)), "--json", "--from", "2", "--to", "6"]) == 0
+        assert json.loads(capsys.readouterr().out) == compute(log, 2.0, 6.0)
+
+    def test_out(self, folder, tmp_path, capsys):
+        log = wild()
+        file = tmp_path / "grown.csv"
+        assert main([str(folder(log)), "--out", str(file)]) == 0
+        table = np.genfromtxt(file, delimiter=",", names=True)
+        assert table.dtype.names == ("time", *metrics.OVER_TIME)
+        assert table["IAEWWT"] == pytest.approx(over_time(log)["IAEWWT"])
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["grown.csv", "log.csv"]
+
+    def test_log_without_thrusters(self, folder, capsys):
+        log = {name: values for name, values in wild().items() if name not in metrics.TAU_CMD}
+        assert main([str(folder(log)), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out) == compute(log)
+
+    @pytest.mark.parametrize(
+        ("change", "arguments", "message"),
+        [
+            ({}, ["--from", "99"], "fewer than two rows"),
+            ({"vessel.x": None}, [], "the log lacks vessel.x"),
+            ({}, ["--out", "/nowhere/grown.csv"], "'/nowhere/grown.csv' cannot be written"),
+        ],
+    )
+    def test_bad_input(self, folder, capsys, change, arguments, message):
+        log = {name: values for name, values in circle().items() if name not in change}
+        assert main([str(folder(log)), *arguments]) == 2
+        out, err = capsys.readouterr()
+        assert message in err
+        assert err.startswith("error: ")
+        assert err.count("\n") == 1
+        assert out == ""
+
+    def test_no_folder(self, tmp_path, capsys):
+        assert main([str(tmp_path / "nothing")]) == 2
+        err = capsys.readouterr().err
+        assert err.startswith("error: ")
+        assert "nothing" in err
+        assert err.count("\n") == 1
+
+
+class TestPlots:
+    ALL = ("trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png")
+
+    def names(self, files):
+        return tuple(file.name for file in files)
+
+    def test_all_pictures(self, tmp_path):
+        files = plots.draw({"a": wild(1, 5000), "b": wild(2)}, tmp_path / "new")
+        assert self.names(files) == self.ALL
+        assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
+        assert {path.name for path in (tmp_path / "new").iterdir()} == set(self.ALL)
+
+    def test_pictures_without_their_columns_are_left_out(self, tmp_path):
+        log = {name: values for name, values in wild().items() if not name.startswith("controller.")}
+        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL[:3]
+        pose = {name: log[name] for name in ("time", *metrics.POSE)}
+        assert self.names(plots.draw({"a": pose}, tmp_path)) == self.ALL[:1]
+        assert plots.draw({"a": {"time": log["time"]}}, tmp_path) == []
+        assert plots.draw({}, tmp_path) == []
+
+    def test_a_run_that_blew_up_is_drawn_as_far_as_it_goes(self, tmp_path):
+        log = wild()
+        for name in metrics.COLUMNS[1:]:
+            log[name][300:] = 1e300
+            log[name][400:] = np.nan
+        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL
+
+    def test_a_ship_at_rest(self, tmp_path):
+        log = {name: np.zeros(100) for name in metrics.COLUMNS}
+        log["time"] = np.arange(100) * 0.1
+        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL
+
+    def test_thin_keeps_peaks_and_order(self):
+        time = np.arange(123457) * 0.01
+        values = np.sin(time)
+        values[[0, 4321, 99999, -1]] = [7.0, 5.0, -5.0, 9.0]
+        t, v = plots.thin(time, values)
+        assert t.size <= plots.MAX_POINTS
+        assert np.all(np.diff(t) >= 0.0)
+        assert {7.0, 5.0, -5.0, 9.0} <= set(v)
+
+    def test_laps_of_a_target_are_drawn_once(self):
+        angle = np.linspace(0.0, 2.0 * np.pi, 3000)
+        lap = (np.sin(angle), np.cos(angle))
+        laps = (np.sin(5.3 * angle), np.cos(5.3 * angle))
+
+        def length(path):
+            steps = np.hypot(np.diff(path[0]), np.diff(path[1]))
+            return np.nansum(steps)
+
+        assert length(plots.once([lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
+        assert length(plots.once([laps, lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
+
+    def test_a_crossing_stays_whole(self):
+        angle = np.linspace(0.1, 2.0 * np.pi + 0.1, 3000)
+        x, _ = plots.once([(np.sin(2.0 * angle), np.sin(angle))], 2.0)
+        assert np.count_nonzero(np.isnan(x[5:-20])) <= 3
+
+    def test_hull_points_where_the_ship_heads(self):
+        log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
+        (east,) = plots.outlines({**log, "vessel.psi": np.full(2, np.pi / 2.0)}, 1.0)
+        assert east[0] == pytest.approx([0.5, 0.0])
+        assert east[1, 1] < 0.0  # starboard of a ship to the east is south
