@@ -206,7 +206,7 @@ class Instance:
         addLoggerProxy(ctypes.byref(callbacks))
         self._callbacks = callbacks
         try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=False)
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception as error:
             raise InputError(f"'{model.path}' cannot be instantiated as '{name}': {error}") from error
         self.component = self._fmu.component

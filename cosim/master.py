@@ -41,31 +41,32 @@ class Message:
 
 
 class Messages:
-    """Collects what FMUs log; keeps the first ones and the newest, counts all."""
+    """Collects the warnings and errors that FMUs log: the first ones, and the last of each."""
 
     KEEP = 200
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self.count = 0
         self.kept: list[Message] = []
-        self.latest: dict[str, Message] = {}
+        self._last: dict[str, Message] = {}
         self._show = show
 
     def add(self, instance: str, status: int, text: str) -> None:
+        if status == 0:  # mere information
+            return
         self.count += 1
         message = Message(instance, status, text)
-        self.latest[instance] = message
+        self._last[instance] = message
         if self.count <= self.KEEP:
             self.kept.append(message)
-            if status > 0:
-                self._show(f"{instance}: {text}")
+            self._show(f"{instance}: {text}")
         elif self.count == self.KEEP + 1:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")
 
     def why(self, instance: str) -> str:
-        """The last thing an instance said, to explain why it stopped."""
-        message = self.latest.get(instance)
-        return f": {message.text}" if message is not None and message.status > 0 else ""
+        """The last thing an instance complained about, to explain why it stopped."""
+        message = self._last.get(instance)
+        return f": {message.text}" if message is not None else ""
 
 
 class Table:

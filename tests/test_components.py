@@ -1,0 +1,232 @@
+"""Rules that every component keeps, checked for each that declares itself."""
+
+import inspect
+import math
+import random
+import subprocess
+import sys
+
+import ccode
+import numpy as np
+import pytest
+from conftest import COMPONENTS
+
+from fmus.declare import Component, DeclarationError, flatten, packer, rebuild, variables
+from fmus.trace import (
+    TraceError,
+    evaluate,
+    initial_dependencies,
+    output_dependencies,
+    trace_init,
+    trace_step,
+    used_variables,
+    variable,
+)
+from fmus.units import base_exponents
+
+every_component = pytest.mark.parametrize("name", COMPONENTS)
+
+
+def arguments(component, rng, spread=0.5):
+    """Random inputs around zero, parameters within their ranges, and a state after a few such steps."""
+    inputs = [rng.uniform(-spread, spread) for _ in variables(component.inputs)]
+    params = flatten(component.params())
+    packed = packer(component.params)(params)
+    state = component.init(packer(component.inputs)(inputs), packed)
+    for _ in range(5):
+        shaken = packer(component.inputs)([x + rng.gauss(0, 0.1) for x in inputs])
+        state, _ = component.step(state, shaken, packed, 0.01)
+    return params, inputs, state
+
+
+def values_of(params, inputs, state, h):
+    named = {f"params[{k}]": x for k, x in enumerate(params)}
+    named |= {f"inputs[{k}]": x for k, x in enumerate(inputs)}
+    named |= {f"state[{k}]": x for k, x in enumerate(flatten(state))}
+    return named | {"h": h}
+
+
+def directly(component, params, inputs, state, h):
+    new, outputs = component.step(
+        state, packer(component.inputs)(inputs), packer(component.params)(params), h
+    )
+    return flatten(new) + flatten(outputs)
+
+
+@every_component
+def test_traced_component_computes_what_the_plain_one_does(name):
+    """Also proves the style rules: what cannot be traced raises TraceError."""
+    component = COMPONENTS[name]
+    trace = trace_step(component)
+    rng = random.Random(name)
+    for _ in range(20):
+        params, inputs, state = arguments(component, rng)
+        got = evaluate(trace.state + trace.outputs, values_of(params, inputs, state, 0.01))
+        assert got == directly(component, params, inputs, state, 0.01)
+
+
+@every_component
+def test_traced_initial_state_is_the_plain_one(name):
+    component = COMPONENTS[name]
+    trace = trace_init(component)
+    params, inputs, _ = arguments(component, random.Random(1))
+    state = component.init(packer(component.inputs)(inputs), packer(component.params)(params))
+    assert evaluate(trace.state, values_of(params, inputs, (), 0.0)) == flatten(state)
+
+
+@every_component
+@pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+def test_same_source_in_c_computes_the_same(name, tmp_path):
+    component = COMPONENTS[name]
+    trace = trace_step(component)
+    run = ccode.compiled(trace.state + trace.outputs, tmp_path)
+    rng = random.Random(name)
+    for _ in range(50):
+        params, inputs, state = arguments(component, rng)
+        expected = directly(component, params, inputs, state, 0.01)
+        assert run(params, inputs, flatten(state), 0.01) == pytest.approx(expected, rel=1e-14, abs=1e-16)
+
+
+@every_component
+def test_batch_of_arrays_gives_what_single_runs_give(name):
+    component = COMPONENTS[name]
+    rng = random.Random(name)
+    single = [arguments(component, rng) for _ in range(7)]
+    template = single[0][2]
+    states = rebuild(template, list(np.array([flatten(s) for _, _, s in single]).T))
+    inputs = packer(component.inputs)(list(np.array([i for _, i, _ in single]).T))
+    state, outputs = component.step(states, inputs, component.params(), 0.01)
+    together = [np.broadcast_to(x, 7) for x in flatten(state) + flatten(outputs)]
+    for k, (params, one_inputs, one_state) in enumerate(single):
+        alone = directly(component, params, one_inputs, one_state, 0.01)
+        assert [x[k] for x in together] == pytest.approx(alone, rel=1e-12, abs=1e-14)
+
+
+@every_component
+def test_no_step_changes_nothing(name):
+    """A step of h = 0 gives the outputs of the present state and keeps it."""
+    component = COMPONENTS[name]
+    params, inputs, _ = arguments(component, random.Random(2))
+    p, i = packer(component.params)(params), packer(component.inputs)(inputs)
+    state = component.init(i, p)
+    again, first = component.step(state, i, p, 0.0)
+    assert again == state
+    assert component.step(again, i, p, 0.0)[1] == first
+
+
+@every_component
+def test_everything_is_declared(name):
+    component = COMPONENTS[name]
+    for v in component.variables:
+        assert v.description, v.name
+        base_exponents(v.unit)
+        assert math.isfinite(v.start)
+        assert v.range.min is None or v.range.min <= v.start
+        assert v.range.max is None or v.start <= v.range.max
+    assert component.description
+    assert inspect.getmodule(component.step).__doc__
+
+
+@every_component
+def test_dependencies_hold_against_perturbation(name):
+    """An input moves an output within one step if and only if it is declared to."""
+    component = COMPONENTS[name]
+    declared = output_dependencies(component)
+    rng = random.Random(name)
+    # A plant's state answers through the integral, which a vanishing step takes away.
+    h = 0.01 if component.sampled else 1e-13
+    seen = [set() for _ in declared]
+    for _ in range(30):
+        params, inputs, state = arguments(component, rng)
+        outputs = directly(component, params, inputs, state, h)[-len(declared) :]
+        for k in range(len(inputs)):
+            moved = [x + (0.3 if j == k else 0.0) for j, x in enumerate(inputs)]
+            changed = directly(component, params, moved, state, h)[-len(declared) :]
+            for j, (a, b) in enumerate(zip(outputs, changed, strict=True)):
+                if abs(a - b) > 1e-11:
+                    seen[j].add(f"inputs[{k}]")
+    for found, told in zip(seen, declared, strict=True):
+        assert found <= told
+
+
+@every_component
+def test_initial_dependencies_hold_against_perturbation(name):
+    component = COMPONENTS[name]
+    declared = initial_dependencies(component)
+    rng = random.Random(name)
+
+    def outputs(params, inputs):
+        p, i = packer(component.params)(params), packer(component.inputs)(inputs)
+        return flatten(component.step(component.init(i, p), i, p, 0.0)[1])
+
+    params = flatten(component.params())
+    inputs = [rng.uniform(-0.5, 0.5) for _ in variables(component.inputs)]
+    before = outputs(params, inputs)
+    for group, values in (("params", params), ("inputs", inputs)):
+        for k, value in enumerate(values):
+            values[k] = value + 0.07
+            after = outputs(params, inputs)
+            values[k] = value
+            for a, b, told in zip(before, after, declared, strict=True):
+                assert a == b or f"{group}[{k}]" in told
+
+
+def test_steps_need_only_the_standard_library():
+    code = (
+        "import sys; from fmus.declare import discover\n"
+        "for _, c in discover():\n"
+        "    i, p = c.inputs(), c.params()\n"
+        "    c.step(c.init(i, p), i, p, 0.01)\n"
+        "print(sorted({'numpy', 'scipy', 'pythonfmu'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "misuse",
+    [
+        lambda x: 1.0 if x > 0.0 else 2.0,
+        lambda x: math.sin(x),
+        lambda x: float(x),
+        lambda x: x**2,
+        lambda x: x % 1.0,
+        lambda x: min(x, 1.0),
+        lambda x: np.sin(x),
+        lambda x: range(x),
+    ],
+)
+def test_what_would_not_run_elsewhere_raises(misuse):
+    with pytest.raises((TraceError, TypeError)):
+        misuse(variable("x"))
+
+
+def test_zero_factor_cuts_a_dependency():
+    x, y = variable("x"), variable("y")
+    assert used_variables([x * 0.0 + y, x * y, 3.0]) == [{"y"}, {"x", "y"}, frozenset()]
+
+
+def test_declaring_a_name_twice_is_refused():
+    c = COMPONENTS["vessel"]
+    twice = Component("twice", "", c.params, c.state, c.outputs, c.outputs, c.init, c.step)
+    with pytest.raises(DeclarationError, match="more than once"):
+        _ = twice.variables
+
+
+@pytest.mark.parametrize(
+    ("unit", "exponents"),
+    [
+        ("1", {}),
+        ("N", {"kg": 1, "m": 1, "s": -2}),
+        ("N.m.s2/rad2", {"kg": 1, "m": 2, "rad": -2}),
+        ("N.s2/(m.rad)", {"kg": 1, "rad": -1}),
+        ("rad/s2", {"s": -2, "rad": 1}),
+    ],
+)
+def test_units_are_taken_apart(unit, exponents):
+    assert base_exponents(unit) == exponents
+
+
+def test_unknown_unit_is_refused():
+    with pytest.raises(ValueError, match="furlong"):
+        base_exponents("furlong/s")

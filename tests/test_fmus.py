@@ -1,0 +1,451 @@
+"""The FMUs as other tools see them: valid, repeatable, resettable, and equal to their plain Python."""
+
+import math
+import os
+import random
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import COMPONENTS, ROOT
+from fmpy import fmi2
+from fmpy.model_description import read_model_description
+from fmpy.validation import validate_fmu
+
+from fmus import build as builder
+from fmus.build import BuildError, build
+from fmus.declare import flatten, packer, width
+
+every_fmu = pytest.mark.parametrize("name", COMPONENTS)
+
+
+class Opened:
+    """An FMU instance with variables by name, for tests."""
+
+    def __init__(self, path, folder, name="instance"):
+        self.messages = []
+        self.folder = folder / f"{path.stem}_{name}"
+        fmpy.extract(str(path), str(self.folder))
+        d = read_model_description(str(path))
+        self.references = {v.name: v.valueReference for v in d.modelVariables}
+        self.outputs = [v.name for v in d.modelVariables if v.causality == "output"]
+        self.inputs = [v.name for v in d.modelVariables if v.causality == "input"]
+        self.fmu = fmi2.FMU2Slave(
+            instanceName=name,
+            guid=d.guid,
+            modelIdentifier=d.coSimulation.modelIdentifier,
+            unzipDirectory=str(self.folder),
+        )
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(
+            lambda env, instance, status, category, text: self.messages.append((status, text.decode()))
+        )
+        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
+
+    def initialise(self, **values):
+        self.fmu.setupExperiment(startTime=0.0)
+        self.set(**values)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        return self
+
+    def set(self, **values):
+        self.fmu.setReal([self.references[k] for k in values], list(values.values()))
+
+    def get(self, *names):
+        return self.fmu.getReal([self.references[n] for n in names or self.outputs])
+
+    def step(self, t, h=0.01):
+        return self.fmu.doStep(t, h)
+
+    def close(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+@pytest.fixture
+def opened(tmp_path, fmus):
+    """A function that opens an FMU by name or path; closed after the test."""
+    instances = []
+
+    def make(fmu, name="instance"):
+        instances.append(Opened(fmus.get(fmu, fmu), tmp_path, name))
+        return instances[-1]
+
+    yield make
+    for instance in instances:
+        instance.close()
+
+
+def shake(fmu, rng):
+    """Random inputs of a size that every component meets."""
+    fmu.set(**{name: rng.uniform(-0.5, 0.5) for name in fmu.inputs}) if fmu.inputs else None
+
+
+def play(fmu, rng, steps, start=0, h=0.01):
+    """Outputs after each of some steps with random inputs."""
+    rows = []
+    for k in range(start, start + steps):
+        shake(fmu, rng)
+        fmu.step(k * h, h)
+        rows.append(fmu.get())
+    return rows
+
+
+@every_fmu
+def test_fmpy_finds_nothing_wrong(name, fmus):
+    assert validate_fmu(str(fmus[name])) == []
+
+
+@every_fmu
+def test_every_variable_has_unit_and_description(name, fmus):
+    d = read_model_description(str(fmus[name]))
+    units = {u.name: u.baseUnit for u in d.unitDefinitions}
+    for v in d.modelVariables:
+        assert v.description
+        assert units[v.unit] is not None
+    outputs = [v.name for v in d.modelVariables if v.causality == "output"]
+    assert [u.variable.name for u in d.outputs] == outputs
+    assert [u.variable.name for u in d.initialUnknowns] == outputs
+    assert all(u.dependencies is not None for u in d.outputs)
+    assert d.coSimulation.canGetAndSetFMUstate
+    assert d.coSimulation.canSerializeFMUstate
+    assert d.coSimulation.canHandleVariableCommunicationStepSize
+
+
+@every_fmu
+def test_fmu_alone_agrees_with_its_plain_python(name, fmus):
+    component = COMPONENTS[name]
+    rng = random.Random(name)
+    n, h = 300, 0.01
+    names = [v.name for v in component.variables]
+    first, last = width(component.params), width(component.params) + width(component.inputs)
+    inputs = names[first:last]
+    rows = [[rng.uniform(-0.5, 0.5) for _ in inputs] for _ in range(n + 1)]
+    signal = np.array(
+        [(k * h, *row) for k, row in enumerate(rows)],
+        dtype=[("time", float), *((i, float) for i in inputs)],
+    )
+    result = fmpy.simulate_fmu(
+        str(fmus[name]),
+        stop_time=n * h,
+        output_interval=h,
+        input=signal if inputs else None,
+        output=names[last:],
+        start_values=dict(zip(inputs, rows[0], strict=True)),
+    )
+    pack, params = packer(component.inputs), component.params()
+    state = component.init(pack(rows[0]), params)
+    expected = [flatten(component.step(state, pack(rows[0]), params, 0.0)[1])]
+    for row in rows[:n]:
+        state, outputs = component.step(state, pack(row), params, h)
+        expected.append(flatten(outputs))
+    got = np.array([list(row)[1:] for row in result.tolist()])
+    assert got.shape == np.shape(expected)
+    # FMPy's communication steps differ from h in the last bits.
+    assert np.allclose(got, expected, rtol=1e-9, atol=1e-11)
+
+
+@every_fmu
+def test_reset_starts_over(name, opened):
+    fmu = opened(name).initialise()
+    rows = play(fmu, random.Random(0), 20)
+    fmu.fmu.reset()
+    fmu.initialise()
+    assert play(fmu, random.Random(0), 20) == rows
+
+
+@every_fmu
+def test_roll_back_replays_bit_for_bit(name, opened):
+    fmu = opened(name).initialise()
+    play(fmu, random.Random(0), 30)
+    state = fmu.fmu.getFMUstate()
+    rows = play(fmu, random.Random(1), 30, 30)
+    saved = fmu.fmu.serializeFMUstate(state)
+    play(fmu, random.Random(2), 10, 60)
+    fmu.fmu.setFMUstate(state)
+    assert play(fmu, random.Random(1), 30, 30) == rows
+    fmu.fmu.freeFMUstate(state)
+    again = fmu.fmu.deSerializeFMUstate(saved)
+    fmu.fmu.setFMUstate(again)
+    assert play(fmu, random.Random(1), 30, 30) == rows
+    fmu.fmu.freeFMUstate(again)
+
+
+@every_fmu
+def test_serialised_state_goes_into_another_instance(name, opened):
+    one, other = opened(name, "one").initialise(), opened(name, "other").initialise()
+    play(one, random.Random(0), 30)
+    state = one.fmu.getFMUstate()
+    saved = one.fmu.serializeFMUstate(state)
+    one.fmu.freeFMUstate(state)
+    restored = other.fmu.deSerializeFMUstate(saved)
+    other.fmu.setFMUstate(restored)
+    other.fmu.freeFMUstate(restored)
+    assert play(other, random.Random(1), 20, 30) == play(one, random.Random(1), 20, 30)
+
+
+@every_fmu
+def test_two_instances_do_not_meet(name, opened):
+    alone = play(opened(name, "alone").initialise(), random.Random(0), 20)
+    one, other = opened(name, "one").initialise(), opened(name, "other").initialise()
+    rng, noise = random.Random(0), random.Random(5)
+    rows = []
+    for k in range(20):
+        rows += play(one, rng, 1, k)
+        play(other, noise, 1, k)
+    assert rows == alone
+
+
+@every_fmu
+def test_step_size_may_change(name, opened):
+    fmu = opened(name).initialise()
+    t = 0.0
+    for h in (0.01, 0.003, 0.1, 0.0, 0.02):
+        shake(fmu, random.Random(3))
+        fmu.step(t, h)
+        t += h
+        assert all(map(math.isfinite, fmu.get()))
+    assert fmu.messages == []
+
+
+@every_fmu
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_bad_input_does_not_poison_the_state(name, bad, opened):
+    fmu = opened(name).initialise()
+    play(fmu, random.Random(0), 20)
+    for input_ in fmu.inputs:
+        for k in range(3):
+            fmu.set(**{input_: bad})
+            fmu.step(0.2 + 0.01 * k)
+            assert all(map(math.isfinite, fmu.get())), input_
+        play(fmu, random.Random(1), 2)
+    rows = play(fmu, random.Random(2), 20)
+    assert all(math.isfinite(x) and abs(x) < 100.0 for row in rows for x in row)
+
+
+def test_initial_outputs_follow_inputs_and_parameters(opened):
+    thrusters = opened("thrusters").initialise(tau_X=0.5, F_vsp=2.0)
+    assert thrusters.get("u_vsp_x", "tau_cmd_X") == pytest.approx([0.25, 0.5])
+    vessel = opened("vessel").initialise(x_0=1.0, tau_X=1.679)
+    assert vessel.get("x", "u_dot") == pytest.approx([1.0, 0.1])
+
+
+def test_parameters_are_tunable_and_initial_values_are_not(opened):
+    vessel = opened("vessel").initialise(u_0=0.1)
+    vessel.step(0.0)
+    vessel.set(delta_X_u=-4.0)
+    vessel.step(0.01)
+    assert vessel.get("omega_X")[0] == pytest.approx(-0.4, rel=0.01)
+    vessel.set(x_0=99.0)
+    assert "x_0 is fixed" in vessel.messages[-1][1]
+    assert vessel.get("x_0") == [5.0]
+
+
+def test_what_cannot_be_set_is_told_and_changes_nothing(opened):
+    vessel = opened("vessel").initialise()
+    before = vessel.get()
+    vessel.set(x=3.0)
+    vessel.set(X_u=math.nan)
+    assert vessel.get() == before
+    assert vessel.get("X_u") == [-0.6555]
+    assert [status for status, _ in vessel.messages] == [1, 1]
+
+
+def test_failing_step_is_told_with_its_cause_and_keeps_the_state(opened):
+    vessel = opened("vessel").initialise()
+    vessel.step(0.0)
+    before = vessel.get()
+    vessel.set(tau_X=1e300)
+    with pytest.raises(Exception, match="discard"):
+        vessel.step(0.01)
+    status, text = vessel.messages[-1]
+    assert status == 3
+    assert "not finite" in text or "OverflowError" in text
+    assert vessel.get() == before
+    vessel.set(tau_X=0.0)
+    vessel.step(0.01)
+
+
+def test_controller_holds_its_last_good_input(opened):
+    controller = opened("controller_bs").initialise(x_hat=0.3)
+    controller.step(0.0)
+    before = controller.get("tau_X")
+    controller.set(x_hat=math.nan)
+    controller.step(0.01)
+    assert controller.get("tau_X") == before
+    assert "x_hat is nan" in controller.messages[-1][1]
+
+
+def test_builds_are_byte_identical(fmus, tmp_path, monkeypatch):
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "another"))
+    for path in build([], tmp_path / "again"):
+        assert path.read_bytes() == fmus[path.stem].read_bytes()
+
+
+def run_build(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "fmus.build", *map(str, arguments)],
+        capture_output=True, text=True, cwd=ROOT, check=False, **options,
+    )  # fmt: skip
+
+
+def test_command_line_builds_what_is_asked_for(tmp_path):
+    done = run_build("vessel", "thrusters.fmu", "--out", tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.split() == [str(tmp_path / "vessel.fmu"), str(tmp_path / "thrusters.fmu")]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["thrusters.fmu", "vessel.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["vesel"], "did you mean 'vessel'"),
+        (["nothing.py"], "no such component file"),
+        (["--out", __file__], "is a file"),
+    ],
+)
+def test_command_line_refuses_with_one_line(arguments, message):
+    done = run_build(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_list_names_every_fmu():
+    listed = run_build("--list").stdout
+    assert all(name in listed for name in COMPONENTS)
+
+
+OWN = '''"""A controller from outside the project."""
+
+from typing import Annotated, NamedTuple
+
+from fmus.controller.backstepping import Inputs
+from fmus.declare import Component
+from fmus.signals import Force
+
+
+class Params(NamedTuple):
+    k: Annotated[float, "N/m", "gain"] = {gain}
+
+
+class State(NamedTuple):
+    pass
+
+
+def init(i, p):
+    return State()
+
+
+def step(s, i, p, h):
+    e = i.target.x_t - i.estimate.x_hat
+    return s, Force(p.k * e, 0.0, 0.0)
+
+
+COMPONENT = Component(
+    "controller_mine", "Pulls towards the target", Params, State, Inputs, Force, init, step
+)
+'''
+
+
+def test_one_file_of_a_user_makes_an_fmu(tmp_path, opened):
+    own = tmp_path / "mine.py"
+    own.write_text(OWN.format(gain=2.0))
+    (path,) = build([str(own)], tmp_path)
+    assert path.name == "controller_mine.fmu"
+    assert validate_fmu(str(path)) == []
+    fmu = opened(path).initialise(x_t=1.5)
+    fmu.step(0.0)
+    assert fmu.get("tau_X") == [3.0]
+
+
+def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
+    instances = []
+    for gain in (2.0, 5.0):
+        own = tmp_path / str(gain) / "mine.py"
+        own.parent.mkdir()
+        own.write_text(OWN.format(gain=gain))
+        (path,) = build([str(own)], own.parent)
+        instances.append(opened(path, f"gain_{gain:.0f}").initialise(x_t=1.0))
+    for fmu in instances:
+        fmu.step(0.0)
+    assert [fmu.get("tau_X") for fmu in instances] == [[2.0], [5.0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("x = 1\n", "declares no COMPONENT"), ("import nowhere\n", "fails when imported")],
+)
+def test_a_users_file_that_is_no_component_is_refused(tmp_path, text, message):
+    own = tmp_path / "mine.py"
+    own.write_text(text)
+    with pytest.raises(BuildError, match=message):
+        build([str(own)], tmp_path)
+
+
+def test_fmu_runs_from_its_own_archive_alone(fmus, tmp_path):
+    """In a process that cannot import the project, and after the first FMU's folder is gone."""
+    code = (
+        "import fmpy, sys, importlib.util\n"
+        "assert importlib.util.find_spec('cosim') is None, 'the project is importable'\n"
+        "for path in sys.argv[1:]:\n"
+        "    print(len(fmpy.simulate_fmu(path, stop_time=0.1, output_interval=0.01)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", f"import sys; sys.path += {_without_project()!r}\n{code}",
+         *map(str, fmus.values())],
+        capture_output=True, text=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": ""}, check=False,
+    )  # fmt: skip
+    assert done.stdout.split() == ["11"] * len(fmus), done.stderr
+
+
+def _without_project():
+    """The import path without this project, however it is installed."""
+    return [p for p in sys.path if "site-packages" in p and not (ROOT / "cosim").is_relative_to(p)]
+
+
+def test_source_change_gives_another_package_name(fmus):
+    inside = zipfile.ZipFile(fmus["vessel"]).namelist()
+    packages = {
+        n.split("/")[1] for n in inside if n.startswith("resources/vessel_") and n.count("/") > 1
+    }
+    assert len(packages) == 1
+    (package,) = packages
+    assert len(package.removeprefix("vessel_")) == 16
+
+
+def test_builds_at_the_same_time_do_not_disturb_each_other(tmp_path):
+    env = {**os.environ, "CYBERSHIP_CACHE": str(tmp_path)}
+    runs = [
+        subprocess.Popen([sys.executable, "-m", "fmus.build"], stdout=subprocess.PIPE, text=True,
+                         cwd=ROOT, env=env)
+        for _ in range(4)
+    ]  # fmt: skip
+    outputs = [run.communicate()[0] for run in runs]
+    assert all(run.returncode == 0 for run in runs)
+    assert len(set(outputs)) == 1
+    for path in outputs[0].split():
+        assert validate_fmu(path) == []
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    (first,) = build(["vessel"])
+    stamp = first.stat().st_mtime_ns
+    assert build(["vessel.fmu"]) == [first]
+    assert first.stat().st_mtime_ns == stamp
+    copy = tmp_path / "source"
+    shutil.copytree(ROOT / "fmus", copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "hull.py").write_text((copy / "hull.py").read_text() + "\n# changed\n")
+    monkeypatch.setattr(builder, "ROOT", copy)
+    (second,) = build(["vessel"])
+    assert second != first
+    assert second.read_bytes() != first.read_bytes()
