@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import fmpy
 from fmpy import fmi1, fmi2
@@ -72,6 +73,11 @@ class Model:
             with zipfile.ZipFile(path) as archive:
                 if "modelDescription.xml" not in archive.namelist():
                     raise InputError(f"'{path}' is not an FMU: it has no modelDescription.xml")
+                with archive.open("modelDescription.xml") as xml:
+                    _, root = next(ElementTree.iterparse(xml, ["start"]))
+            version = root.get("fmiVersion")
+            if version != "2.0":
+                raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
             self.description: ModelDescription = read_model_description(str(path), validate=False)
         except InputError:
             raise
@@ -79,10 +85,6 @@ class Model:
             raise InputError(f"'{path}' is not an FMU: it is not a zip archive") from None
         except Exception as error:
             raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
-        if self.description.fmiVersion != "2.0":
-            raise InputError(
-                f"'{path}' is an FMU for FMI {self.description.fmiVersion}; this master runs FMI 2.0"
-            )
         if self.description.coSimulation is None:
             raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
         self.name: str = self.description.modelName or path.stem

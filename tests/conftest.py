@@ -2,6 +2,8 @@
 
 import json
 import os
+import textwrap
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -32,3 +34,57 @@ def ellipse():
     content["stop"] = 2.0
     content["metrics"] = {}
     return content
+
+
+@pytest.fixture
+def plain_fmu(tmp_path):
+    """A function that makes an FMU with plain pythonfmu, as somebody else would.
+
+    Arguments: a unique name, the body of ``__init__``, the body of ``do_step``, and edits of the model
+    description as (old, new) pairs.
+    """
+    from pythonfmu.builder import FmuBuilder
+
+    def make(name, init, step="return True", edits=()):
+        script = tmp_path / f"{name}.py"
+        script.write_text(
+            "import math, os, time\n"
+            "from pythonfmu import *\n\n"
+            f"class {name}(Fmi2Slave):\n"
+            "    def __init__(self, **kwargs):\n"
+            "        super().__init__(**kwargs)\n"
+            f"{indent(init, 8)}\n"
+            "    def do_step(self, t, h):\n"
+            f"{indent(step, 8)}\n"
+        )
+        fmu = FmuBuilder.build_FMU(script, dest=tmp_path)
+        if edits:
+            _edit(fmu, edits)
+        return fmu
+
+    return make
+
+
+def indent(text, spaces):
+    return textwrap.indent(textwrap.dedent(text), " " * spaces)
+
+
+def _edit(fmu, edits):
+    with zipfile.ZipFile(fmu) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    xml = content["modelDescription.xml"].decode()
+    for old, new in edits:
+        assert old in xml, old
+        xml = xml.replace(old, new)
+    content["modelDescription.xml"] = xml.encode()
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+
+
+GAIN = """
+self.x = 0.0
+self.y = 0.0
+self.register_variable(Real("x", causality=Fmi2Causality.input))
+self.register_variable(Real("y", causality=Fmi2Causality.output))
+"""

@@ -1,0 +1,283 @@
+"""Every wrong scenario ends in one message that names the place and the nearest right name."""
+
+import json
+
+import pytest
+from conftest import GAIN, ROOT
+
+import cosim
+from cosim.errors import InputError
+from cosim.scenario import json_schema, load_scenario
+from cosim.system import prepare
+
+
+def refused(content):
+    """The message with which a scenario is refused, which must be one line."""
+    with pytest.raises(InputError) as error:
+        prepare(load_scenario(content))
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_published_schema_is_that_of_the_code():
+    published = json.loads((ROOT / "docs" / "scenario.schema.json").read_text())
+    assert published == json_schema()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "scenarios").glob("*.json")), ids=lambda p: p.stem)
+def test_shipped_scenario_is_valid_and_named_like_its_file(path):
+    scenario = load_scenario(path)
+    assert scenario.name == path.stem
+    assert scenario.description
+    assert prepare(scenario).warnings == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"stopp": 1.0}, "stopp: unknown key; did you mean 'stop'?"),
+        ({"step": 0.0}, "step: Input should be greater than 0"),
+        ({"step": "fast"}, "step: "),
+        ({"stop": 2.005}, "stop = 2.005 s is not a multiple of step = 0.01 s"),
+        ({"stop": float("inf")}, "stop: "),
+        ({"seed": -1}, "seed: "),
+        ({"algorithm": "newton"}, "'gauss_seidel' or 'jacobi'"),
+        ({"name": "a/b"}, "name: "),
+        ({"fmus": {}}, "fmus: "),
+        ({"connections": [["vessel.x_m"]]}, "connections[0]"),
+        ({"log": {"every": 0}}, "log.every: "),
+        ({"log": {"evry": 1}}, "log.evry: unknown key; did you mean 'every'?"),
+        ({"log": {"signals": ["vessel.xx"]}}, "log.signals[0]: 'vessel' has no variable 'xx'"),
+        ({"log": {"signals": ["vesel.*"]}}, "log.signals[0]: nothing matches 'vesel.*'"),
+        ({"metrics": {"form": 1.0}}, "metrics.form: unknown key; did you mean 'from'?"),
+        (
+            {"events": [{"time": 1.0, "model": "vesel", "variable": "X_u", "action": "reset"}]},
+            "events[0]: no instance 'vesel'; did you mean 'vessel'?",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "X_w", "action": "reset"}]},
+            "events[0]: 'vessel' has no variable 'X_w'; did you mean",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "x_0", "action": "override", "value": 1.0}]},
+            "vessel.x_0 is a parameter that cannot change during a run",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "override"}]},
+            "override needs a 'value'",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "reset", "value": 1}]},
+            "reset takes no 'value'",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "hold"}]},
+            "holds its value anyway",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "m", "action": "override", "value": -1}]},
+            "vessel.m = -1 is below its minimum 0.0",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "overide", "value": 1}]},
+            "events[0].action: ",
+        ),
+        (
+            {"faults": [{"kind": "bias", "signals": ["vessel.X_u"], "value": 1.0}]},
+            "vessel.X_u is a parameter, not an input or output",
+        ),
+        (
+            {"faults": [{"kind": "bias", "signals": ["observer.x_m", "controller.x_t"], "value": 1.0}]},
+            "of one instance",
+        ),
+        (
+            {"faults": [{"kind": "bias", "signals": ["observer.x_mm"], "value": 1.0}]},
+            "faults[0] (bias): 'observer' has no variable 'x_mm'; did you mean 'x_m'?",
+        ),
+    ],
+)  # fmt: skip
+def test_wrong_content_is_refused(ellipse, change, message):
+    assert message in refused(ellipse | change)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"path": "vesel.fmu"}, "no FMU 'vesel'; did you mean 'vessel'?"),
+        ({"path": "nowhere/vessel.fmu"}, "no such FMU: "),
+        ({"path": "vessel.fmu", "stepp": 0.01}, "fmus.vessel.stepp: unknown key; did you mean 'step'?"),
+        ({"path": "vessel.fmu", "step": 0.015}, "fmus.vessel: step = 0.015 s is not a multiple"),
+        (
+            {"path": "vessel.fmu", "parameters": {"X_uu_": 1.0}},
+            "vessel.X_uu_ does not exist; did you mean",
+        ),
+        ({"path": "vessel.fmu", "parameters": {"x": 1.0}}, "vessel.x cannot be set"),
+        ({"path": "vessel.fmu", "parameters": {"m": -1.0}}, "vessel.m = -1.0 is below its minimum 0.0"),
+        ({"path": "vessel.fmu", "parameters": {"m": "heavy"}}, "needs a value of type Real"),
+        ({"path": "vessel.fmu", "parameters": {"m": True}}, "needs a value of type Real"),
+        ({}, "fmus.vessel.path: is missing"),
+    ],
+)
+def test_wrong_fmu_entry_is_refused(ellipse, entry, message):
+    ellipse["fmus"]["vessel"] = entry
+    assert message in refused(ellipse)
+
+
+@pytest.mark.parametrize(
+    ("connection", "message"),
+    [
+        (
+            ["vesel.x", "observer.x_m"],
+            "connections[0] vesel.x -> observer.x_m: no instance 'vesel'; did you",
+        ),
+        (["vessel.x_mm", "observer.x_m"], "'vessel' has no variable 'x_mm'; did you mean 'x_m'?"),
+        (["vessel.x", "observer.xm"], "'observer' has no variable 'xm'; did you mean 'x_m'?"),
+        (["vessel.X_u", "observer.x_m"], "vessel.X_u is a parameter, not an output"),
+        (["vessel.x", "observer.x_hat"], "observer.x_hat is an output, not an input"),
+        (["vessel.x", "observer.y_m"], "observer.y_m is already connected to vessel.x"),
+        (
+            ["vessel.u", "observer.x_m"],
+            "vessel.u -> observer.x_m: unit 'm/s' cannot be converted to 'm'",
+        ),
+        (["vessel.*", "observer.x_m"], "exactly one * on each side"),
+        (["vessel.*", "vesel.*"], "no instance 'vesel'"),
+        (["vessel.*", "guidance.*"], "no output and input agree"),
+        (["vessel", "observer.x_m"], "'vessel' has no variable ''"),
+    ],
+)
+def test_wrong_connection_is_refused_with_both_ends(ellipse, connection, message):
+    ellipse["connections"] = [
+        connection,
+        *([["vessel.y", "observer.y_m"]] if "already" in message else []),
+    ]
+    text = refused(ellipse)
+    assert "connections[" in text
+    assert message in text
+
+
+def test_unconnected_input_is_a_warning(ellipse):
+    ellipse["connections"].pop(0)
+    ellipse["faults"] = []
+    (warning,) = prepare(load_scenario(ellipse)).warnings
+    assert warning == "observer: input x_m, y_m, psi_m not connected; keeps its start value"
+
+
+def test_input_given_a_start_value_is_meant_to_stay_free(ellipse):
+    ellipse["connections"].pop(0)
+    ellipse["faults"] = []
+    ellipse["fmus"]["observer"]["parameters"] = {"x_m": 5.0, "y_m": 2.0, "psi_m": 0.1}
+    assert prepare(load_scenario(ellipse)).warnings == []
+
+
+def test_fault_on_an_unconnected_input_is_refused(ellipse):
+    ellipse["connections"].pop(0)
+    assert "observer.x_m is not connected" in refused(ellipse)
+
+
+def test_group_connects_all_that_agree(ellipse):
+    system = prepare(load_scenario(ellipse))
+    pairs = {c.target.name: c.source.name for c in system.connections}
+    assert pairs["observer.tau_N"] == "thrusters.tau_cmd_N"
+    assert pairs["vessel.tau_X"] == "thrusters.tau_act_X"
+    assert pairs["controller.psi_t_ddot"] == "guidance.psi_t_ddot"
+    assert pairs["controller.frozen"] == "observer.frozen"
+    assert len(pairs) == 3 + 3 + 10 + 9 + 3 + 3 + 3
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("no.json", None, "no such scenario"),
+        ("bad.json", "{", "is not JSON"),
+        ("list.json", "[]", "the content: "),
+        ("latin.json", b"\xff\xfe{}", "cannot be read"),
+    ],
+)
+def test_unreadable_file_is_refused(tmp_path, name, content, message):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert message in refused(path)
+
+
+def test_missing_scenario_suggests_the_nearest_file(tmp_path):
+    (tmp_path / "ellipse.json").write_text("{}")
+    assert "did you mean 'ellipse.json'?" in refused(tmp_path / "elipse.json")
+
+
+def one_fmu(path, **entry):
+    return {"name": "one", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": str(path), **entry}}}
+
+
+def test_what_is_no_fmu_is_refused(tmp_path, plain_fmu):
+    text = tmp_path / "text.fmu"
+    text.write_text("not a zip")
+    assert "not a zip archive" in refused(one_fmu(text))
+    empty = tmp_path / "empty.fmu"
+    empty.write_bytes(b"PK\x05\x06" + bytes(18))
+    assert "no modelDescription.xml" in refused(one_fmu(empty))
+    fmi3 = plain_fmu("Fmi3", GAIN, edits=[('fmiVersion="2.0"', 'fmiVersion="3.0"')])
+    assert "3.0" in refused(one_fmu(fmi3))
+    garbage = plain_fmu("Garbage", GAIN, edits=[("</fmiModelDescription>", "")])
+    assert "cannot be read as an FMU" in refused(one_fmu(garbage))
+
+
+def test_model_exchange_only_is_refused(plain_fmu):
+    me = plain_fmu("OnlyMe", GAIN, edits=[("<CoSimulation", "<ModelExchange"),
+                                          (' canHandleVariableCommunicationStepSize="true"', ""),
+                                          (' canInterpolateInputs="false"', "")])  # fmt: skip
+    assert "model exchange only" in refused(one_fmu(me))
+
+
+def test_types_are_checked(plain_fmu):
+    whole = """
+        self.n = 0
+        self.flag = False
+        self.text = "a"
+        self.register_variable(Integer("n", causality=Fmi2Causality.input))
+        self.register_variable(Boolean("flag", causality=Fmi2Causality.input))
+        self.register_variable(String("text", causality=Fmi2Causality.parameter,
+                                      variability=Fmi2Variability.fixed))
+    """
+    a, b = plain_fmu("RealOut", GAIN), plain_fmu("WholeIn", whole)
+    content = {
+        "name": "types", "step": 0.1, "stop": 1.0,
+        "fmus": {"a": {"path": str(a)}, "b": {"path": str(b)}},
+        "connections": [["a.y", "b.n"]],
+    }  # fmt: skip
+    assert "Real cannot feed Integer" in refused(content)
+    content["connections"] = [["a.y", "b.flag"]]
+    assert "Real cannot feed Boolean" in refused(content)
+    content["connections"] = []
+    content["fmus"]["b"]["parameters"] = {"text": 3}
+    assert "needs a value of type String" in refused(content)
+    content["fmus"]["b"]["parameters"] = {"n": 1.5}
+    assert "needs a value of type Integer" in refused(content)
+
+
+def test_once_per_process_is_respected(plain_fmu):
+    once = plain_fmu(
+        "Once", GAIN,
+        edits=[('canBeInstantiatedOnlyOncePerProcess="false"', 'canBeInstantiatedOnlyOncePerProcess="true"')],
+    )  # fmt: skip
+    content = one_fmu(once)
+    content["fmus"]["b"] = {"path": str(once)}
+    assert "only once per process" in refused(content)
+
+
+def test_own_name_wins_over_a_file_beside_and_other_files_are_found(ellipse, tmp_path, plain_fmu):
+    other = plain_fmu("Other", GAIN)
+    (tmp_path / "vessel.fmu").write_bytes(other.read_bytes())
+    ellipse["fmus"]["extra"] = {"path": "Other.fmu"}
+    path = tmp_path / "scenario.json"
+    path.write_text(json.dumps(ellipse))
+    system = prepare(load_scenario(path))
+    assert system.models["vessel"].name == "vessel"
+    assert system.models["extra"].name == "Other"
+
+
+def test_public_names_are_there():
+    for name in cosim.__all__:
+        assert getattr(cosim, name) is not None
+    with pytest.raises(AttributeError):
+        _ = cosim.nothing
