@@ -6,6 +6,7 @@ the library directly, with buffers that are laid out once.
 
 import ctypes
 import hashlib
+import itertools
 import os
 import shutil
 import sys
@@ -19,14 +20,40 @@ from typing import Any
 from xml.etree import ElementTree
 
 import fmpy
-from fmpy import fmi1, fmi2
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .errors import InputError, SimulationError
 
+WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
+
+# FMPy's logger proxy knows one logger for the whole process: ours finds the instance by its number.
+_environments = itertools.count(1)
+_listeners: dict[int, Callable[[int, str], None]] = {}
+
+
+def _log(environment: int | None, _: bytes, status: int, category: bytes, message: bytes) -> None:
+    listener = _listeners.get(environment or 0)
+    if listener is not None:
+        listener(status, message.decode(errors="replace") if message else "")
+
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+
+
+def _callbacks(environment: int) -> fmi2.fmi2CallbackFunctions:
+    """Callbacks for an instance; messages come back with its number."""
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = _LOGGER
+    callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+    callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+    callbacks.componentEnvironment = environment
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
 
 
 @dataclass(frozen=True)
@@ -197,21 +224,15 @@ class Instance:
             os.chdir(here)
             raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {error}") from error
 
-        def log(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-            text = message.decode(errors="replace") if message else ""
-            on_message(name, status, text)
-
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
-        callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(fmpy.calloc)
-        callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(fmpy.free)
-        addLoggerProxy(ctypes.byref(callbacks))
-        self._callbacks = callbacks
+        self._environment = next(_environments)
+        _listeners[self._environment] = lambda status, text: on_message(name, status, text)
+        callbacks = _callbacks(self._environment)
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception as error:
             raise InputError(f"'{model.path}' cannot be instantiated as '{name}': {error}") from error
         self.component = self._fmu.component
+        self.worst_status = 0
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others
         # may work in threads of their own and must not find it held.
         self._keep_lock = (folder / "resources" / "slavemodule.txt").is_file()
@@ -231,6 +252,8 @@ class Instance:
         try:
             action()
         except Exception as error:
+            status = error.status if isinstance(error, FMICallException) else ERROR
+            self.worst_status = max(self.worst_status, status)
             raise SimulationError(
                 f"{self.name} ({self.model.path.name}): {what} failed: {error}"
             ) from error
@@ -278,9 +301,18 @@ class Instance:
         self.call("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
 
     def terminate(self) -> None:
-        """End the simulation; the instance can still be freed."""
-        self.call("fmi2Terminate", self._fmu.terminate)
+        """End the simulation, unless an error already has."""
+        if self.worst_status < ERROR:
+            self.call("fmi2Terminate", self._fmu.terminate)
 
     def free(self) -> None:
-        """Free the instance and its library."""
-        self._fmu.freeInstance()
+        """Free the instance and its library; after a fatal error nothing of it may be called."""
+        if self.worst_status < FATAL:
+            self._fmu.fmi2FreeInstance(self.component)
+        _listeners.pop(self._environment, None)
+        # The first pythonfmu library in a process cannot be unloaded. Left alone it would do this when
+        # the process ends, after its own memory is gone, and now and then abort the process.
+        finalize = getattr(self._fmu.dll, "finalizePythonInterpreter", None)
+        if self._keep_lock and finalize is not None:
+            finalize()
+        self._fmu.freeLibrary()

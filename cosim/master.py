@@ -17,7 +17,7 @@ import numpy as np
 
 from .errors import SimulationError
 from .faults import EARLY, Effect
-from .fmu import STATUS, Instance, Variable
+from .fmu import DISCARD, STATUS, Instance, Variable
 from .scenario import Event
 from .system import Connection, Signal, System
 
@@ -28,7 +28,6 @@ _SETTERS = {
 }
 _ACCESS = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
 _STEP = (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
-DISCARD = 2
 
 
 @dataclass
@@ -55,11 +54,11 @@ class Messages:
         if status == 0:  # mere information
             return
         self.count += 1
-        message = Message(instance, status, text)
+        message = Message(instance, status, " ".join(text.split()))
         self._last[instance] = message
         if self.count <= self.KEEP:
             self.kept.append(message)
-            self._show(f"{instance}: {text}")
+            self._show(f"{instance}: {message.text}")
         elif self.count == self.KEEP + 1:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")
 
@@ -251,6 +250,7 @@ class Stepper:
         status = self._do_step(self.instance.component, t, self.step_size, 1)
         if status >= DISCARD:
             name = self.instance.name
+            self.instance.worst_status = status
             raise SimulationError(
                 f"{name}: the step from t = {t} s returned {STATUS[status]}{self._messages.why(name)}"
             )

@@ -1,5 +1,6 @@
 """Parameter sets of the SSP standard (``.ssv``): values for FMUs, by model name."""
 
+import math
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -36,7 +37,10 @@ def read_parameters(path: Path) -> dict[str, dict[str, float]]:
             raise InputError(f"'{path}': '{name}' is not of the form model.parameter")
         value = next((child.get("value") for child in entry), None)
         try:
-            found.setdefault(model, {})[parameter] = float(value or "")
+            number = float(value or "")
         except ValueError:
-            raise InputError(f"'{path}': {name} has no number as its value") from None
+            number = math.nan
+        if not math.isfinite(number):
+            raise InputError(f"'{path}': {name} has no number as its value")
+        found.setdefault(model, {})[parameter] = number
     return found

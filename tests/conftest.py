@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from cosim.fmu import Instance, Model
 from fmus.build import build
 from fmus.declare import discover
 
@@ -19,6 +20,14 @@ COMPONENTS = {component.name: component for _, component in discover()}
 def _private_cache(tmp_path_factory):
     """FMUs built by the tests do not touch the user's cache."""
     os.environ["CYBERSHIP_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _first_library(_private_cache):
+    """The first pythonfmu library of a process is one that the master puts to rest (see Instance.free)."""
+    model = Model(build(["vessel"])[0])
+    Instance("first", model, print).free()
+    model.close()
 
 
 @pytest.fixture(scope="session")
@@ -49,7 +58,8 @@ def plain_fmu(tmp_path):
         script = tmp_path / f"{name}.py"
         script.write_text(
             "import math, os, time\n"
-            "from pythonfmu import *\n\n"
+            "from pythonfmu import *\n"
+            "from pythonfmu.enums import Fmi2Status\n\n"
             f"class {name}(Fmi2Slave):\n"
             "    def __init__(self, **kwargs):\n"
             "        super().__init__(**kwargs)\n"

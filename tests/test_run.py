@@ -1,0 +1,294 @@
+"""The command: exit codes, files, interruption, and nothing half-written."""
+
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from conftest import GAIN, ROOT
+
+import cosim
+
+PICTURES = {"trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png"}
+
+
+def command(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "cosim.run", *map(str, arguments)],
+        capture_output=True, text=True, cwd=options.pop("cwd", ROOT), check=False, **options,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def scenario(ellipse, tmp_path):
+    """A function that writes a varied scenario and returns its path."""
+
+    def write(**changes):
+        path = tmp_path / "scenario.json"
+        path.write_text(json.dumps(ellipse | changes))
+        return path
+
+    return write
+
+
+def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
+    done = command(scenario(), "--out", tmp_path / "out")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert "e_pos_rms" in done.stdout
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "log.csv", "log.json", "metrics.json", *PICTURES,
+    }  # fmt: skip
+    assert (tmp_path / "out" / "log.csv").read_text().startswith("time,vessel.")
+    keys = "e_pos_rms e_pos_max cross_track_rms heading_rms ISE IAE W I_tau_dot IAEW IAEWWT IWWT from to"
+    assert list(json.loads((tmp_path / "out" / "metrics.json").read_text())) == keys.split()
+
+
+def test_quiet_without_plots_says_and_draws_nothing(scenario, tmp_path):
+    done = command(scenario(), "--out", tmp_path / "out", "--quiet", "--no-plots")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert not PICTURES & {p.name for p in (tmp_path / "out").iterdir()}
+
+
+def test_default_folder_is_results_and_the_name(scenario, tmp_path):
+    done = command(scenario(name="mine"), "--no-plots", cwd=tmp_path)
+    assert done.returncode == 0
+    assert (tmp_path / "results" / "mine" / "log.csv").is_file()
+
+
+def test_folder_holds_nothing_of_an_earlier_run(scenario, tmp_path):
+    out = tmp_path / "out"
+    command(scenario(), "--out", out)
+    (out / "notes.txt").write_text("mine")
+    command(scenario(log={"signals": ["vessel.x"]}), "--out", out)
+    assert {p.name for p in out.iterdir()} == {"log.csv", "log.json", "notes.txt"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "message"),
+    [
+        ({"stopp": 1.0}, [], "did you mean 'stop'"),
+        ({}, ["--parameters", "nowhere.ssv"], "no such parameter set"),
+        ({}, ["--realtime", "-1"], "positive number"),
+        ({}, ["--outt", "x"], "unrecognized"),
+        ({"log": {"signals": ["vessel.x_n"]}}, [], "did you mean 'x_m'"),
+    ],
+)
+def test_bad_input_is_one_message_exit_2_and_no_file(scenario, tmp_path, changes, arguments, message):
+    out = tmp_path / "out"
+    done = command(scenario(**changes), "--out", out, *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
+def test_out_that_cannot_be_a_folder_is_refused(scenario, tmp_path):
+    (tmp_path / "file").write_text("")
+    done = command(scenario(), "--out", tmp_path / "file")
+    assert done.returncode == 2
+    assert "cannot write to" in done.stderr
+
+
+def test_warning_goes_to_stderr(scenario, ellipse):
+    connections = [c for c in ellipse["connections"] if c[1] != "thrusters.*"]
+    done = command(scenario(connections=connections, stop=0.1), "--no-plots", "--out", "/dev/null/x")
+    assert "warning: thrusters: input u, v, r not connected" in done.stderr
+
+
+def test_failed_simulation_is_exit_3_with_the_log_kept(scenario, tmp_path):
+    events = [
+        {"time": 1.0, "model": "vessel", "variable": "tau_X", "action": "override", "value": 1e300}
+    ]
+    done = command(scenario(events=events), "--out", tmp_path / "out")
+    assert done.returncode == 3
+    assert "vessel: the step from t = 1.0 s returned discard" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(cosim.read_log(tmp_path / "out")["time"]) == 101
+    assert (tmp_path / "out" / "metrics.json").is_file()
+
+
+def start(path, out, *arguments):
+    """A run in the background, returned once its log has some rows."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim.run", str(path), "--out", str(out), "--no-plots", *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT,
+    )  # fmt: skip
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline:
+        if (out / "log.csv").is_file() and (out / "log.csv").stat().st_size > 10000:
+            return process
+        time.sleep(0.02)
+    process.kill()
+    raise AssertionError(process.communicate())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_keeps_its_log_and_says_so(scenario, tmp_path, number):
+    out = tmp_path / "out"
+    process = start(scenario(stop=10000.0), out)
+    time.sleep(0.3)
+    process.send_signal(number)
+    _, stderr = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "interrupted: " in stderr
+    assert "Traceback" not in stderr
+    log = cosim.read_log(out)
+    sidecar = json.loads((out / "log.json").read_text())
+    assert sidecar["status"] == "interrupted"
+    assert sidecar["rows"] == len(log["time"]) > 100
+
+
+def test_killed_run_leaves_a_log_readable_up_to_the_last_second(scenario, tmp_path):
+    out = tmp_path / "out"
+    process = start(scenario(stop=10000.0), out, "--realtime", "20")
+    begun = time.monotonic()
+    first = cosim.read_log(out)["time"][-1]
+    time.sleep(2.0)
+    process.kill()
+    process.communicate()
+    elapsed = time.monotonic() - begun
+    log = cosim.read_log(out)
+    assert np.allclose(np.diff(log["time"]), 0.01)
+    # At 20 simulated seconds a second, one second of wall time is 20 s of log.
+    assert log["time"][-1] - first > 20.0 * (elapsed - 1.0)
+    assert json.loads((out / "log.json").read_text())["status"] == "running"
+
+
+def test_log_cut_in_the_middle_of_a_line_is_read_up_to_it(scenario, tmp_path):
+    command(scenario(), "--out", tmp_path / "out", "--no-plots")
+    whole = cosim.read_log(tmp_path / "out")
+    data = (tmp_path / "out" / "log.csv").read_bytes()
+    (tmp_path / "out" / "log.csv").write_bytes(data[:-37])
+    cut = cosim.read_log(tmp_path / "out")
+    assert all((cut[n] == whole[n][:-1]).all() for n in whole)
+
+
+def test_real_time_is_kept(scenario, tmp_path):
+    begun = time.monotonic()
+    done = command(scenario(stop=3.0), "--out", tmp_path / "out", "--no-plots", "--realtime", "2")
+    assert time.monotonic() - begun >= 1.5
+    assert "deadlines missed" in done.stdout
+    pace = json.loads((tmp_path / "out" / "log.json").read_text())["realtime"]
+    assert pace["factor"] == 2.0
+
+
+def test_parquet_holds_what_csv_holds(scenario, tmp_path):
+    pytest.importorskip("pyarrow")
+    command(scenario(), "--out", tmp_path / "csv", "--no-plots")
+    done = command(scenario(log={"format": "parquet"}), "--out", tmp_path / "parquet", "--no-plots")
+    assert done.returncode == 0
+    assert not (tmp_path / "parquet" / "log.csv").exists()
+    a, b = cosim.read_log(tmp_path / "csv"), cosim.read_log(tmp_path / "parquet")
+    assert list(a) == list(b)
+    assert all(np.array_equal(a[n], b[n], equal_nan=True) for n in a)
+    assert list(cosim.read_log(tmp_path / "parquet", ["vessel.x"])) == ["time", "vessel.x"]
+
+
+SSV = """<?xml version="1.0" encoding="UTF-8"?>
+<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+                  version="1.0" name="learned">
+  <ssv:Parameters>{}</ssv:Parameters>
+</ssv:ParameterSet>
+"""
+
+
+def parameter(name, value):
+    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter>'
+
+
+def test_parameter_set_beats_the_scenario_with_a_notice(scenario, ellipse, tmp_path):
+    ellipse["fmus"]["vessel"]["parameters"]["delta_X_u"] = -1.0
+    learned = tmp_path / "model.ssv"
+    learned.write_text(SSV.format(parameter("vessel.delta_X_u", -4.0) + parameter("other.x", 1.0)))
+    done = command(scenario(), "--out", tmp_path / "out", "--no-plots", "--parameters", learned)
+    assert done.returncode == 0
+    assert "vessel.delta_X_u = -4.0" in done.stderr
+    assert "beats -1.0" in done.stderr
+    assert "has values for 'other', which does not run here" in done.stderr
+    log = cosim.read_log(tmp_path / "out")
+    assert log["vessel.omega_X"] == pytest.approx(-4.0 * log["vessel.u"])
+
+
+def test_empty_parameter_set_is_valid(scenario, tmp_path):
+    (tmp_path / "empty.ssv").write_text(SSV.format(""))
+    done = command(
+        scenario(), "--out", tmp_path / "o", "--no-plots", "--parameters", tmp_path / "empty.ssv"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<a/>", "is not an SSP 1.0 parameter set"),
+        ("<a", "cannot be read as a parameter set"),
+        (SSV.format(parameter("delta_X_u", 1.0)), "is not of the form model.parameter"),
+        (SSV.format(parameter("vessel.delta_X_u", "much")), "has no number"),
+        (SSV.format(parameter("vessel.delta_X_uu_", 1.0)), "does not exist; did you mean"),
+        (SSV.format(parameter("vessel.m", -1.0)), "is below its minimum"),
+        (SSV.format(parameter("vessel.delta_X_u", "nan")), "has no number"),
+    ],
+)
+def test_wrong_parameter_set_is_refused(scenario, tmp_path, text, message):
+    (tmp_path / "wrong.ssv").write_text(text)
+    done = command(scenario(), "--out", tmp_path / "out", "--parameters", tmp_path / "wrong.ssv")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_unpacked_fmus_are_removed(scenario, tmp_path):
+    env = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
+    (tmp_path / "tmp").mkdir()
+    assert command(scenario(), "--out", tmp_path / "out", "--no-plots", env=env).returncode == 0
+    assert list((tmp_path / "tmp").iterdir()) == []
+
+
+def test_missing_binary_is_one_message(tmp_path, plain_fmu):
+    import zipfile
+
+    fmu = plain_fmu("NoBinary", GAIN)
+    with zipfile.ZipFile(fmu) as archive:
+        content = {n: archive.read(n) for n in archive.namelist() if not n.startswith("binaries")}
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(name, data)
+    path = tmp_path / "s.json"
+    path.write_text(
+        json.dumps({"name": "s", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": "NoBinary.fmu"}}})
+    )
+    done = command(path, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "cannot be loaded" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_without_permission_is_refused(scenario, tmp_path):
+    (tmp_path / "closed").mkdir(mode=stat.S_IRUSR | stat.S_IXUSR)
+    done = command(scenario(), "--out", tmp_path / "closed" / "out")
+    assert done.returncode == 2
+
+
+@pytest.mark.parametrize("module", ["cosim.run", "cosim.metrics", "fmus.build"])
+def test_help_has_examples(module):
+    done = subprocess.run(
+        [sys.executable, "-m", module, "--help"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0
+    assert "example" in done.stdout
+    assert done.stderr == ""
+
+
+def test_master_never_imports_the_physics():
+    code = "import sys, cosim.run, cosim.plots; print([m for m in sys.modules if m.split('.')[0] == 'fmus'])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout.strip() == "[]"

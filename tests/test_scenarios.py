@@ -1,0 +1,67 @@
+"""The shipped scenarios do what their descriptions and the thesis say."""
+
+import json
+import statistics
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+import cosim
+from conftest import ROOT
+
+SCENARIOS = ROOT / "scenarios"
+
+
+def position_error(controller, seed):
+    """RMS of the true position error after the first 20 s of scenarios/ellipse.json [m]."""
+    content = json.loads((SCENARIOS / "ellipse.json").read_text())
+    content["seed"] = seed
+    content["fmus"]["controller"]["path"] = controller
+    with TemporaryDirectory() as folder:
+        cosim.simulate(cosim.load_scenario(content), folder)
+        log = cosim.read_log(folder, ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"])
+    e = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
+    return float(np.sqrt(np.mean(e[log["time"] >= 20.0] ** 2)))
+
+
+@pytest.mark.slow
+def test_adaptation_pays_on_the_ellipse():
+    """Ten seeds: at most 0.10 m without adaptation, at least 15 % less with it."""
+    seeds = range(10)
+    with ProcessPoolExecutor(2) as pool:
+        plain = list(pool.map(position_error, ["controller_bs.fmu"] * 10, seeds))
+        adaptive = list(pool.map(position_error, ["controller_abs.fmu"] * 10, seeds))
+    assert statistics.median(plain) <= 0.10
+    assert statistics.median(adaptive) <= 0.85 * statistics.median(plain)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.json")), ids=lambda p: p.stem)
+def test_shipped_scenario_runs_through(path, tmp_path):
+    result = cosim.simulate(cosim.load_scenario(path), tmp_path, pictures=True)
+    assert result.status == "done"
+    assert result.warnings == []
+    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind.
+    assert result.metrics["e_pos_max"] < 0.5
+    assert len(list(tmp_path.glob("*.png"))) == 5
+    assert not list(Path(tmp_path).glob("*.part"))
+
+
+@pytest.mark.slow
+def test_fault_of_the_experiments_leaves_the_ship_behind(tmp_path):
+    """Four times too fast with derivatives four times too small: the error is along the path."""
+    result = cosim.simulate(cosim.load_scenario(SCENARIOS / "guidance_fault.json"), tmp_path)
+    assert result.metrics["e_pos_rms"] > 5.0 * result.metrics["cross_track_rms"]
+    assert result.metrics["e_pos_rms"] > 0.2
+
+
+@pytest.mark.slow
+def test_hidden_drag_is_felt_when_it_is_switched_on(tmp_path):
+    cosim.simulate(cosim.load_scenario(SCENARIOS / "hidden_drag.json"), tmp_path)
+    log = cosim.read_log(tmp_path, ["vessel.omega_X", "vessel.u"])
+    on = log["time"] > 50.001
+    assert (log["vessel.omega_X"][~on] == 0.0).all()
+    assert log["vessel.omega_X"][on] == pytest.approx(-4.0 * log["vessel.u"][on])
