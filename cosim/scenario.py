@@ -183,3 +183,7 @@ def json_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **TypeAdapter(Scenario).json_schema(by_alias=True),
     }
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=2))

@@ -449,3 +449,15 @@ def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
     (second,) = build(["vessel"])
     assert second != first
     assert second.read_bytes() != first.read_bytes()
+
+
+def test_example_of_the_contributing_guide_works(tmp_path, opened):
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    code = text.split("```python\n")[1].split("```")[0]
+    own = tmp_path / "mine.py"
+    own.write_text(code.replace("from ..", "from fmus.").replace("from .back", "from fmus.controller.back"))
+    (path,) = build([str(own)], tmp_path)
+    assert validate_fmu(str(path)) == []
+    fmu = opened(path).initialise(x_t=1.5)
+    fmu.step(0.0)
+    assert fmu.get("tau_X") == [1.5]

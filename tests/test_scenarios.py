@@ -2,40 +2,36 @@
 
 import json
 import statistics
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-
-import cosim
 from conftest import ROOT
 
+import cosim
+from benchmarks.ellipse import CONTROLLERS, over_seeds
+
 SCENARIOS = ROOT / "scenarios"
-
-
-def position_error(controller, seed):
-    """RMS of the true position error after the first 20 s of scenarios/ellipse.json [m]."""
-    content = json.loads((SCENARIOS / "ellipse.json").read_text())
-    content["seed"] = seed
-    content["fmus"]["controller"]["path"] = controller
-    with TemporaryDirectory() as folder:
-        cosim.simulate(cosim.load_scenario(content), folder)
-        log = cosim.read_log(folder, ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"])
-    e = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
-    return float(np.sqrt(np.mean(e[log["time"] >= 20.0] ** 2)))
 
 
 @pytest.mark.slow
 def test_adaptation_pays_on_the_ellipse():
     """Ten seeds: at most 0.10 m without adaptation, at least 15 % less with it."""
-    seeds = range(10)
-    with ProcessPoolExecutor(2) as pool:
-        plain = list(pool.map(position_error, ["controller_bs.fmu"] * 10, seeds))
-        adaptive = list(pool.map(position_error, ["controller_abs.fmu"] * 10, seeds))
-    assert statistics.median(plain) <= 0.10
-    assert statistics.median(adaptive) <= 0.85 * statistics.median(plain)
+    errors = over_seeds(range(10))
+    plain, adaptive = (statistics.median(errors[c]) for c in CONTROLLERS)
+    assert plain <= 0.10
+    assert adaptive <= 0.85 * plain
+
+
+def test_error_of_the_benchmark_is_that_of_the_log(tmp_path):
+    """e_pos_rms of scenarios/ellipse.json covers t >= 20 s and the true state."""
+    content = json.loads((SCENARIOS / "ellipse.json").read_text()) | {"stop": 30.0}
+    result = cosim.simulate(cosim.load_scenario(content), tmp_path)
+    log = cosim.read_log(tmp_path, ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"])
+    e = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
+    rms = np.sqrt(np.mean(e[log["time"] >= 20.0] ** 2))
+    assert result.metrics["e_pos_rms"] == pytest.approx(rms)
+    assert result.metrics["from"] == 20.0
 
 
 @pytest.mark.slow

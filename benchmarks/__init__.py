@@ -1,0 +1,1 @@
+"""Measurements of this project, each a script that anyone can run."""
