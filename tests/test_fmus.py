@@ -455,7 +455,9 @@ def test_example_of_the_contributing_guide_works(tmp_path, opened):
     text = (ROOT / "CONTRIBUTING.md").read_text()
     code = text.split("```python\n")[1].split("```")[0]
     own = tmp_path / "mine.py"
-    own.write_text(code.replace("from ..", "from fmus.").replace("from .back", "from fmus.controller.back"))
+    own.write_text(
+        code.replace("from ..", "from fmus.").replace("from .back", "from fmus.controller.back")
+    )
     (path,) = build([str(own)], tmp_path)
     assert validate_fmu(str(path)) == []
     fmu = opened(path).initialise(x_t=1.5)
