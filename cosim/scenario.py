@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -26,6 +27,18 @@ else:
         Field(discriminator="kind"),
     ]
 Value = bool | int | float | str
+
+
+def _folder_name(name: str) -> str:
+    if name in (".", "..") or any(c in name for c in "/\\\x00"):
+        raise ValueError("cannot be the name of a folder")
+    return name
+
+
+def _instance_name(name: str) -> str:
+    if not name.strip() or any(c in name for c in '.*,"\n'):
+        raise ValueError(f"'{name}' cannot be an instance: no dot, *, comma or quote in its name")
+    return name
 
 
 class Strict(BaseModel):
@@ -78,7 +91,9 @@ class MetricsOptions(Strict):
 class Scenario(Strict):
     """A co-simulation: instances, connections, faults, events, log."""
 
-    name: str = Field(pattern=r"^[^/\\\x00]+$", description="also the name of the result folder")
+    name: Annotated[str, AfterValidator(_folder_name)] = Field(
+        min_length=1, description="also the name of the result folder"
+    )
     description: str = ""
     step: PositiveFloat = Field(description="base step [s]")
     stop: PositiveFloat = Field(description="end of the simulation [s], a multiple of the base step")
@@ -87,7 +102,9 @@ class Scenario(Strict):
         "gauss_seidel",
         description="one after the other with the newest values, or all at once with those of before",
     )
-    fmus: dict[str, FmuEntry] = Field(min_length=1, description="instances by name")
+    fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
+        min_length=1, description="instances by name"
+    )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,
         description="[output, input] as instance.variable; a * on both sides connects all variables "
@@ -119,15 +136,26 @@ def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
         return _validate(source, "scenario", Path.cwd())
     path = Path(source)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_once)
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
         raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from None
     except json.JSONDecodeError as error:
         raise InputError(f"'{path}' is not JSON: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"'{path}' cannot be read: {error}") from None
     return _validate(content, f"'{path}'", path.parent)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; a key that stands there twice would silently win over the first."""
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the key '{name}' stands twice in one object")
+    return dict(pairs)
 
 
 def _validate(content: Any, name: str, folder: Path) -> Scenario:
