@@ -444,14 +444,9 @@ class Master:
             yield k
 
     @property
-    def output_slots(self) -> list[int]:
-        """Where the table holds outputs: values that must stay finite."""
-        return [
-            self.table.slots[s.name]
-            for stepper in self._steppers
-            for s in stepper.got
-            if s.variable.type == "Real"
-        ]
+    def outputs(self) -> list[str]:
+        """Names of the signals that come from FMUs: values that must stay finite."""
+        return [s.name for stepper in self._steppers for s in stepper.got if s.variable.type == "Real"]
 
     def close(self) -> None:
         """Terminate and free what was instantiated."""

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from .errors import InputError
-from .log import read_log
+from .log import SIDECAR, read_log
 
 Log = Mapping[str, np.ndarray]
 
@@ -38,6 +38,9 @@ TAU_LIN = _columns("controller.tau_lin_")
 TAU_NONLIN = _columns("controller.tau_nonlin_")
 OMEGA = _columns("vessel.omega_star_")
 OMEGA_HAT = _columns("controller.omega_hat_")
+
+# All that metrics are made from; the commanded force is the first of the two that is there.
+INPUTS = (*POSE, *VELOCITY, *TARGET, *TAU_CMD, *TAU)
 
 # All that metrics and plots read.
 COLUMNS = (
@@ -315,8 +318,12 @@ examples:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folder", metavar="DIR", type=Path, help="results of a run: holds log.csv")
-    parser.add_argument("--from", dest="start", metavar="T", type=float, help="first time used [s]")
-    parser.add_argument("--to", dest="stop", metavar="T", type=float, help="last time used [s]")
+    parser.add_argument(
+        "--from", dest="start", metavar="T", type=float, help="first time used [s] (as in the scenario)"
+    )
+    parser.add_argument(
+        "--to", dest="stop", metavar="T", type=float, help="last time used [s] (as in the scenario)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
     parser.add_argument("--out", metavar="FILE.csv", type=Path, help="write the metrics over time")
     return parser
@@ -330,14 +337,26 @@ def _read(folder: Path) -> dict[str, np.ndarray]:
         return read_log(folder)
 
 
+def _window_of_run(folder: Path) -> tuple[float | None, float | None]:
+    """First and last time [s] that the run's own metrics.json covers, as its scenario has it."""
+    try:
+        chosen = json.loads((folder / SIDECAR).read_text())["scenario"]["metrics"]
+        return chosen["from"], chosen["to"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None, None
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 2 bad input."""
     options: Any = _parser().parse_args(arguments)
     try:
         log = _read(options.folder)
-        metrics = compute(log, options.start, options.stop)
+        start, stop = _window_of_run(options.folder)
+        start = start if options.start is None else options.start
+        stop = stop if options.stop is None else options.stop
+        metrics = compute(log, start, stop)
         if options.out is not None:
-            _write_csv(options.out, over_time(log, options.start, options.stop))
+            _write_csv(options.out, over_time(log, start, stop))
     except (InputError, MetricsError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

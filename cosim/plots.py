@@ -1,16 +1,22 @@
-"""Pictures of one run, or of several runs laid over each other, as in 5.1.
+"""Pictures of one run, or of several laid over each other: ``python -m cosim.plots DIR... --out DIR``.
+
+The five of the thesis, 5.1.
 
 Matplotlib is imported only when a picture is drawn, and without pyplot: nothing here needs a display
 or leaves global state behind.
 """
 
+import argparse
 import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .errors import InputError
+from .log import read_log
 from .metrics import (
     AXES,
     OMEGA,
@@ -23,6 +29,7 @@ from .metrics import (
     TAU_NONLIN,
     VELOCITY,
     Log,
+    MetricsError,
     cross_track,
     over_time,
     wrap,
@@ -49,6 +56,7 @@ HULL = ((0.5, 0.0), (0.22, 0.5), (-0.5, 0.42), (-0.5, -0.42), (0.22, -0.5))
 OUTLINES = 12  # ships drawn along a path
 SCALES = (1.0, 0.5, 0.25, 0.125, 0.05, 0.02, 0.01)  # of those ships
 OUTLINE_SHARE = 0.1  # longest ship, as a share of the picture
+LETTERS_PER_INCH = 12  # of a legend
 STILL = 0.01  # m; a target that moves less is a point
 
 
@@ -63,18 +71,26 @@ class Run(NamedTuple):
 Runs = Sequence[Run]
 
 
-def draw(runs: Mapping[str, Log], folder: Path) -> list[Path]:
+def draw(
+    runs: Mapping[str, Log],
+    folder: str | Path,
+    start: float | None = None,
+    stop: float | None = None,
+) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
 
     Args:
         runs: label -> log; several logs are laid over each other.
         folder: where the PNG files go, made when missing.
+        start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
 
     Returns:
         The files written, among trajectory.png, errors.png, metrics.png, forces.png and
         model_error.png.
     """
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    window = {"start": start, "stop": stop}
     written = []
     for name, (choices, picture) in PICTURES.items():
         able = [
@@ -82,10 +98,15 @@ def draw(runs: Mapping[str, Log], folder: Path) -> list[Path]:
             for k, (label, log) in enumerate(runs.items())
             if (part := _usable(log, choices)) is not None
         ]
-        if able:
-            file = folder / f"{name}.png"
-            _save(picture(able), file)
-            written.append(file)
+        if not able:
+            continue
+        file = folder / f"{name}.png"
+        try:
+            figure = picture(able, **window) if picture is metrics else picture(able)
+        except MetricsError:  # nothing happened in the window
+            continue
+        _save(figure, file)
+        written.append(file)
     return written
 
 
@@ -162,11 +183,14 @@ def _grid(panel: "Axes") -> None:
 
 
 def _legend(figure: "Figure", panel: "Axes", entries: int) -> None:
-    """A legend above the panels, for all of them."""
+    """A legend above the panels, for all of them, in as many columns as its labels leave room for."""
+    handles, labels = panel.get_legend_handles_labels()
+    widest = max(map(len, labels), default=0) + 6
     figure.legend(
-        *panel.get_legend_handles_labels(),
+        handles,
+        labels,
         loc="outside upper center",
-        ncols=min(entries, 6),
+        ncols=max(1, min(entries, int(figure.get_figwidth() * LETTERS_PER_INCH / widest))),
         columnspacing=1.5,
         frameon=False,
     )
@@ -359,19 +383,19 @@ GROWING = (
     ("ISE", "ISE [m² s]"),
     ("IAE", "IAE [m s]"),
     ("W", "W [J]"),
-    ("I_tau_dot", r"$I_{\dot\tau}$ [N, N m]"),
+    ("I_tau_dot", r"$I_{\dot\tau}$ [N]"),
     ("IAEW", "IAEW [m s J]"),
     ("IAEWWT", "IAEWWT [m s J N]"),
 )
 
 
-def metrics(runs: Runs) -> "Figure":
-    """The metrics as they grow over time."""
+def metrics(runs: Runs, start: float | None = None, stop: float | None = None) -> "Figure":
+    """The metrics as they grow over time, from ``start`` to ``stop`` [s]."""
     figure, panels = _panels(3, 2, 6.5)
     for run in runs:
-        grown = over_time(run.log)
+        grown = over_time(run.log, start, stop)
         for panel, (name, _) in zip(panels.flat, GROWING, strict=True):
-            _plot(panel, run, grown[name])
+            _plot(panel, run._replace(log=grown), grown[name])
     for panel, (_, label) in zip(panels.flat, GROWING, strict=True):
         panel.set_ylabel(label)
         panel.set_ylim(bottom=0.0)
@@ -388,7 +412,7 @@ def forces(runs: Runs) -> "Figure":
     ):
         for run in runs:
             _plot(panel, run, _norm(run.log, names))
-        panel.set_ylabel(f"{title} ‖τ‖ [N, N m]")
+        panel.set_ylabel(f"{title} ‖τ‖ [N]")
         panel.set_ylim(bottom=0.0)
     return _finish(figure, panels, runs)
 
@@ -405,8 +429,12 @@ def model_error(runs: Runs) -> "Figure":
             _plot(panel, run, run.log[estimate], linestyle="-", linewidth=1.8)
     for panel, axis in zip(panels[:, 0], AXES, strict=True):
         panel.set_ylabel(f"ω in {axis} [{'N m' if axis == 'N' else 'N'}]")
-    for line, label in zip(panels[0, 0].lines, ("model error ω", "estimate ω̂"), strict=True):
-        line.set_label(label)
+    # The estimates have the colours of their runs; the legend says which line is which.
+    true, estimate = panels[0, 0].lines
+    true.set_label("model error ω")
+    estimate.set_label(None if len(runs) > 1 else "estimate ω̂")
+    if len(runs) > 1:
+        panels[0, 0].plot([], [], color="0.5", linewidth=1.8, label="estimate ω̂")
     _legend(figure, panels[0, 0], 2)
     return _finish(figure, panels, (), least=1e-4)
 
@@ -422,3 +450,30 @@ PICTURES: dict[str, tuple[Sequence[Sequence[str]], Callable[[Runs], "Figure"]]] 
     "forces": (((*TAU_LIN, *TAU_NONLIN, *TAU),), forces),
     "model_error": (((*OMEGA, *OMEGA_HAT),), model_error),
 }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0 done, 2 bad input."""
+    parser = argparse.ArgumentParser(
+        prog="python -m cosim.plots",
+        description="Draw the pictures of finished runs, laid over each other.",
+        epilog="example: python -m cosim.plots results/ellipse results/ellipse_bs --out results/both",
+    )
+    parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="results of a run")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="where the PNGs go (.)")
+    options = parser.parse_args(arguments)
+    try:
+        runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
+        for path in draw(runs, options.out):
+            print(path)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: cannot write to '{options.out}': {error.strerror}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -4,9 +4,17 @@ import argparse
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
+from functools import partial
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 
 from . import metrics
 from .errors import InputError
@@ -41,7 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             )
         )
         with bar as shown:
-            task = shown.add_task(scenario.name, total=scenario.stop) if shown else None
+            progress = _no_progress
+            if shown is not None:
+                task = shown.add_task(scenario.name, total=scenario.stop)
+                progress = partial(_advance, shown, task)
             result = simulate(
                 scenario,
                 options.out,
@@ -49,9 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.realtime,
                 pictures=not options.no_plots,
                 show=show,
-                progress=(lambda t: shown.update(task, completed=t))
-                if shown and task is not None
-                else None,
+                progress=progress,
             )
     except InputError as error:
         console.print(f"error: {error}", markup=False)
@@ -61,6 +70,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     _report(result, console, options.quiet)
     return EXIT_CODES[result.status]
+
+
+def _no_progress(t: float) -> None:
+    """Where there is no terminal."""
+
+
+def _advance(bar: Progress, task: TaskID, t: float) -> None:
+    bar.update(task, completed=t)
 
 
 def _report(result: Result, console: Console, quiet: bool) -> None:
@@ -76,7 +93,7 @@ def _report(result: Result, console: Console, quiet: bool) -> None:
         output.print(metrics.table(result.metrics))
     if result.pace:
         output.print(
-            f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} deadlines missed, "
+            f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} missed deadlines, "
             f"at most {1e3 * result.pace['lateness_max']:.2f} ms late, "
             f"jitter {1e3 * result.pace['jitter_rms']:.2f} ms RMS"
         )
@@ -90,7 +107,9 @@ def _positive(text: str) -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"needs a positive number, not '{text}'")
+        raise argparse.ArgumentTypeError(
+            f"needs a positive number, not '{text}' (a scenario comes before it)"
+        )
     return value
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from . import log as logs
 from . import metrics, plots
 from .errors import InputError, SimulationError
-from .master import Master, quiet_collector
+from .master import Master, Table, quiet_collector
 from .scenario import Scenario
 from .ssv import read_parameters
 from .system import System, prepare
@@ -76,64 +76,61 @@ class Pace:
 
 
 class Recorder:
-    """Collects rows in blocks and writes them out; keeps the columns that metrics and pictures use."""
+    """Takes the table after every step: writes the logged part of it in blocks, and keeps what metrics
+    and pictures are made from, whether logged or not."""
 
     def __init__(self, system: System, master: Master, folder: Path) -> None:
         self.columns = ["time", *system.logged]
-        self._writer = logs.LogWriter(folder / logs.CSV, self.columns)
-        self._slots = np.array([master.table.slots[name] for name in system.logged], dtype=np.intp)
-        self._whole = np.array_equal(self._slots, np.arange(len(master.table.row)))
-        self._row = master.table.row
-        self._outputs = np.array(master.output_slots, dtype=np.intp)
-        self._names = [s.name for s in master.table.signals]
-        self._block = np.empty((BLOCK, len(self.columns)))
-        self._check = np.empty((BLOCK, len(self._outputs)))
-        self._times = np.empty(BLOCK)
-        self._logged = 0
-        self._checked = 0
-        self._kept_columns = [self.columns.index(name) for name in metrics.needed(self.columns)]
-        self._kept: list[np.ndarray] = []
         self.rows = 0
+        table = master.table
+        self._every = system.scenario.log.every
+        self._writer = logs.LogWriter(folder / logs.CSV, self.columns)
+        self._row = table.row
+        self._taken = np.empty((BLOCK, len(table.row)))
+        self._times: list[float] = []
+        self._steps = 0
+        self._names = [s.name for s in table.signals]
+        self._logged = self._slots(table, system.logged)
+        self._outputs = self._slots(table, master.outputs)
+        self._kept_names = metrics.needed(self._names)
+        self._kept_slots = self._slots(table, self._kept_names)
+        self._kept: list[np.ndarray] = []
 
-    def check(self, t: float) -> None:
-        """Remember the outputs of this step for the check that they are finite."""
-        self._row.take(self._outputs, out=self._check[self._checked])
-        self._times[self._checked] = t
-        self._checked += 1
+    @staticmethod
+    def _slots(table: Table, names: Sequence[str]) -> np.ndarray:
+        return np.array([table.slots[name] for name in names], dtype=np.intp)
 
-    def record(self, t: float) -> None:
-        """Take the present row of the table into the log."""
-        row = self._block[self._logged]
-        row[0] = t
-        if self._whole:
-            row[1:] = self._row
-        else:
-            self._row.take(self._slots, out=row[1:])
-        self._logged += 1
-
-    @property
-    def full(self) -> bool:
-        return self._checked == BLOCK
+    def take(self, t: float) -> bool:
+        """Remember the table as it is at t; returns whether it is time to flush."""
+        times = self._times
+        self._taken[len(times)] = self._row
+        times.append(t)
+        return len(times) == BLOCK
 
     def flush(self) -> None:
-        """Write what has been collected.
+        """Write what has been taken.
 
         Raises:
             SimulationError: an output is not finite; the rows up to there are written.
         """
-        block = self._block[: self._logged]
-        wrong = ~np.isfinite(self._check[: self._checked])
+        count = len(self._times)
+        wrong = ~np.isfinite(self._taken[:count, self._outputs])
         message = ""
         if wrong.any():
             k = int(np.argmax(wrong.any(axis=1)))
-            t = self._times[k]
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
-            message = f"{name} is not finite at t = {t:g} s"
-            block = block[block[:, 0] <= t]
-        self._writer.write(np.ascontiguousarray(block))
-        self._kept.append(block[:, self._kept_columns].copy())
+            message = f"{name} is not finite at t = {self._times[k]:g} s"
+            count = k + 1
+        times, taken = np.array(self._times[:count]), self._taken[:count]
+        first = -self._steps % self._every
+        block = np.empty((len(times[first :: self._every]), len(self.columns)))
+        block[:, 0] = times[first :: self._every]
+        block[:, 1:] = taken[first :: self._every, self._logged]
+        self._writer.write(block)
+        self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
         self.rows += len(block)
-        self._logged = self._checked = 0
+        self._steps += count
+        self._times.clear()
         if message:
             raise SimulationError(message)
 
@@ -141,9 +138,9 @@ class Recorder:
         self._writer.close()
 
     def kept(self) -> dict[str, np.ndarray]:
-        """The columns that metrics and pictures use."""
-        table = np.concatenate(self._kept) if self._kept else np.empty((0, len(self._kept_columns)))
-        return {self.columns[c]: table[:, k] for k, c in enumerate(self._kept_columns)}
+        """The columns that metrics and pictures are made from, at every step."""
+        table = np.concatenate(self._kept) if self._kept else np.empty((0, 1 + len(self._kept_names)))
+        return {name: table[:, k] for k, name in enumerate(["time", *self._kept_names])}
 
 
 @contextmanager
@@ -176,8 +173,8 @@ def simulate(
     parameters: Sequence[str | Path] = (),
     realtime: float | None = None,
     pictures: bool = False,
-    show: Callable[[str], None] = lambda text: None,
-    progress: Callable[[float], None] | None = None,
+    show: Callable[[str], None] = lambda _: None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
@@ -208,18 +205,21 @@ def simulate(
         except SimulationError as error:
             return Result("failed", Path(), message=str(error), warnings=system.warnings)
         try:
-            folder = _fresh_folder(Path(out) if out is not None else Path("results") / scenario.name)
-            result, columns = _record(system, master, folder, realtime, progress)
+            folder = Path(out) if out is not None else Path("results") / scenario.name
+            if (folder / logs.SIDECAR).exists():
+                show(f"note: replaces the earlier run in '{folder}'")
+            _clear(folder)
+            result, recorder = _record(system, master, folder, realtime, progress)
         finally:
             master.close()
     finally:
         system.close()
-    _finish(system, result, columns, pictures, show)
+    _finish(system, result, recorder, pictures, show)
     return result
 
 
-def _fresh_folder(folder: Path) -> Path:
-    """The result folder, without what an earlier run left there."""
+def _clear(folder: Path) -> None:
+    """Make the result folder, without what an earlier run left there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in (
@@ -232,7 +232,6 @@ def _fresh_folder(folder: Path) -> Path:
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
-    return folder
 
 
 def _record(
@@ -240,9 +239,9 @@ def _record(
     master: Master,
     folder: Path,
     realtime: float | None,
-    progress: Callable[[float], None] | None,
-) -> tuple[Result, dict[str, np.ndarray]]:
-    """The run itself; returns how it ended and the columns kept for metrics and pictures."""
+    progress: Callable[[float], None],
+) -> tuple[Result, Recorder]:
+    """The run itself; returns how it ended, and what was recorded."""
     result = Result("running", folder, warnings=system.warnings)
     sidecar = _describe(system)
     logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
@@ -269,7 +268,7 @@ def _record(
         if result.message:
             sidecar["message"] = result.message
         logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
-    return result, recorder.kept()
+    return result, recorder
 
 
 def _loop(
@@ -278,37 +277,31 @@ def _loop(
     recorder: Recorder,
     pace: Pace | None,
     interrupted: Callable[[], bool],
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None],
 ) -> bool:
     """Step, record, and look up now and then; returns whether the user stopped it."""
-    every = system.scenario.log.every
-    recorder.check(0.0)
-    recorder.record(0.0)
-    look = 1
-    glance = time.perf_counter()
+    recorder.take(0.0)
+    look, interval = 1, 1
+    glance = flushed = time.perf_counter()
     for k in master.run():
         t = master.time(k)
-        recorder.check(t)
-        if k % every == 0:
-            recorder.record(t)
+        full = recorder.take(t)
         if pace is not None:
             pace.wait(t)
-        if k >= look or recorder.full:
+        if k >= look or full:
             now = time.perf_counter()
-            # The next look comes after about a fifth of a second, at most one block later.
-            per_step = max(now - glance, 1e-6) / max(1, k - look + 1)
-            if now - glance > ATTENTION or recorder.full:
+            if full or now - flushed > ATTENTION:
                 recorder.flush()
-                glance = now
-                if progress is not None:
-                    progress(t)
+                progress(t)
+                flushed = now
             if interrupted():
                 recorder.flush()
                 return True
-            look = k + max(1, min(BLOCK // 8, int(0.02 / per_step)))
+            # Quick steps need no look at the clock after each of them.
+            interval = min(2 * interval, BLOCK // 8) if now - glance < 0.1 * ATTENTION else 1
+            glance, look = now, k + interval
     recorder.flush()
-    if progress is not None:
-        progress(system.scenario.stop)
+    progress(system.scenario.stop)
     return False
 
 
@@ -347,18 +340,22 @@ def _describe(system: System) -> dict[str, Any]:
 def _finish(
     system: System,
     result: Result,
-    columns: dict[str, np.ndarray],
+    recorder: Recorder,
     pictures: bool,
     show: Callable[[str], None],
 ) -> None:
     """Metrics, pictures and the log's final format."""
-    options = system.scenario.metrics
+    window = system.scenario.metrics
+    columns = recorder.kept()
     try:
-        result.metrics = metrics.compute(columns, options.start, options.stop)
+        result.metrics = metrics.compute(columns, window.start, window.stop)
         logs.write_json(result.folder / logs.METRICS, result.metrics)
     except metrics.MetricsError as error:
         show(f"note: no metrics: {error}")
     if pictures and result.status != "interrupted":
-        plots.draw({system.scenario.name: columns}, result.folder)
+        drawn = plots.draw({system.scenario.name: columns}, result.folder, window.start, window.stop)
+        missing = plots.PICTURES.keys() - {path.stem for path in drawn}
+        if missing:
+            show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
     if system.scenario.log.format == "parquet" and result.status == "done":
         logs.to_parquet(result.folder)

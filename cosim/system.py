@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
 
+from . import metrics
 from .errors import InputError, nearest
 from .fmu import NUMERIC, Model, Variable
 from .order import Link, execution_order
@@ -105,7 +106,9 @@ def prepare(scenario: Scenario, overrides: Overrides = ()) -> System:
     Raises:
         InputError: the first thing that is wrong.
     """
-    system = System(scenario, _read_models(scenario))
+    warnings: list[str] = []
+    system = System(scenario, _read_models(scenario, warnings), warnings=warnings)
+    _check_window(scenario)
     _count_steps(system)
     _check_parameters(system, overrides)
     _connect(system)
@@ -125,7 +128,7 @@ def prepare(scenario: Scenario, overrides: Overrides = ()) -> System:
     return system
 
 
-def _read_models(scenario: Scenario) -> dict[str, Model]:
+def _read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
     # A bare name means the project's own FMU; only one that the project lacks may be a file beside.
     beside = sorted(name for name in bare if (scenario.folder / name).is_file())
@@ -133,6 +136,7 @@ def _read_models(scenario: Scenario) -> dict[str, Model]:
     for name in beside:
         try:
             paths |= _own_fmus([name])
+            warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name
     models: dict[Path, Model] = {}
@@ -164,6 +168,14 @@ def whole(ratio: float) -> int | None:
     """The whole number that a ratio of times is meant to be, if it is one."""
     count = round(ratio)
     return count if count > 0 and abs(ratio - count) < 1e-6 * max(1.0, ratio) else None
+
+
+def _check_window(scenario: Scenario) -> None:
+    start, stop = scenario.metrics.start or 0.0, scenario.metrics.stop or scenario.stop
+    if not start < min(stop, scenario.stop):
+        raise InputError(
+            f"metrics: there is no time from {start} to {stop} s in a run of {scenario.stop} s"
+        )
 
 
 def _count_steps(system: System) -> None:
@@ -204,8 +216,11 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
         for model_name, values in by_model.items():
             targets = [n for n, model in system.models.items() if model.name == model_name]
             if not targets:
+                hint = ""
+                if model_name in system.models:
+                    hint = f"; the model of that instance is called '{system.models[model_name].name}'"
                 system.warnings.append(
-                    f"'{path}' has values for '{model_name}', which does not run here"
+                    f"'{path}' has values for a model '{model_name}', which does not run here{hint}"
                 )
             for name in targets:
                 for parameter, value in values.items():
@@ -376,6 +391,7 @@ def _choose_signals(system: System) -> None:
                 if name not in system.logged:
                     system.logged.append(name)
     needed = {*system.logged}
+    needed |= set(metrics.INPUTS).intersection(available)
     for c in system.connections:
         needed |= {c.source.name, c.target.name}
     for fault in system.scenario.faults:

@@ -17,6 +17,7 @@ import re
 import shutil
 import sys
 import tempfile
+import traceback
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +25,8 @@ from pathlib import Path
 from filelock import FileLock
 from platformdirs import user_cache_path
 
-from .declare import Component, DeclarationError, discover
+from .declare import Component, DeclarationError, Range, discover, variables
+from .trace import output_dependencies, trace_init
 
 ROOT = Path(__file__).parent
 FACE = "fmus.slave"
@@ -58,17 +60,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Build the project's FMUs, or an FMU from a component file of your own.",
         epilog="examples:  python -m fmus.build\n"
         "           python -m fmus.build vessel controller_abs --out fmu\n"
-        "           python -m fmus.build my_controller.py --out fmu",
+        "           python -m fmus.build my_controller.py --out fmu\n"
+        "           python -m fmus.build --list vessel",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
-    parser.add_argument("--list", action="store_true", help="list the FMUs and stop")
+    parser.add_argument(
+        "--list", action="store_true", help="list the FMUs, or the variables of those named"
+    )
     options = parser.parse_args(arguments)
     try:
         if options.list:
-            for _, component in discover():
-                print(f"{component.name:24} {component.description}")
+            _print_list(options.names)
             return 0
         for path in build(options.names, options.out):
             print(path)
@@ -76,6 +80,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def _print_list(names: Sequence[str]) -> None:
+    """Print the FMUs there are, or every variable of those that are named."""
+    if not names:
+        for _, component in discover():
+            print(f"{component.name:24} {component.description}")
+    for name in names:
+        _, component = _load(*_which(name))
+        print(f"{component.name}: {component.description}")
+        kinds = [
+            ("parameter", component.params),
+            ("input", component.inputs),
+            ("output", component.outputs),
+        ]
+        for kind, group in kinds:
+            for v in variables(group):
+                start = f"{v.start:g}" if kind != "output" else ""
+                print(f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}")
+
+
+def _limits(allowed: Range) -> str:
+    if allowed.min is None:
+        return "" if allowed.max is None else f", at most {allowed.max:g}"
+    return (
+        f", {allowed.min:g} to {allowed.max:g}" if allowed.max is not None else f", >= {allowed.min:g}"
+    )
 
 
 def build(names: Sequence[str], out: Path | None = None) -> list[Path]:
@@ -118,10 +149,7 @@ def cache_folder() -> Path:
 
 def _cached(name: str) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
-    own_file = Path(name) if name.endswith(".py") else None
-    if own_file is not None and not own_file.is_file():
-        raise BuildError(f"no such component file: '{name}'")
-    stem = own_file.stem if own_file is not None else name.removesuffix(".fmu")
+    stem, own_file = _which(name)
     folder = cache_folder() / _source_hash(own_file)
     fmu = folder / f"{stem}.fmu"
     if fmu.is_file():
@@ -134,6 +162,16 @@ def _cached(name: str) -> Path:
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
                 _place(_pack(component, module, own_file, Path(work)), fmu)
     return fmu
+
+
+def _which(name: str) -> tuple[str, Path | None]:
+    """What a name on the command line means: an FMU of ours, or a user's file and its stem."""
+    if not name.endswith(".py"):
+        return name.removesuffix(".fmu"), None
+    own_file = Path(name)
+    if not own_file.is_file():
+        raise BuildError(f"no such component file: '{name}'")
+    return own_file.stem, own_file
 
 
 def _source_hash(own_file: Path | None) -> str:
@@ -164,7 +202,18 @@ def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
     component = getattr(module, "COMPONENT", None)
     if not isinstance(component, Component):
         raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
+    try:
+        output_dependencies(component)
+        trace_init(component)
+    except Exception as error:
+        raise BuildError(f"{_place_of(error, own_file)}: {error}") from error
     return f"fmus.{own_file.stem}", component
+
+
+def _place_of(error: Exception, own_file: Path) -> str:
+    """File and line of a user's component where an error comes from."""
+    lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(own_file)]
+    return f"{own_file}:{lines[-1].lineno}: {lines[-1].line}" if lines else str(own_file)
 
 
 def _sources(module: str, own_file: Path | None) -> dict[str, str]:

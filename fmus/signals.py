@@ -47,7 +47,7 @@ class Target(NamedTuple):
 
     x_t: Annotated[float, "m", "target north position"] = 0.0
     y_t: Annotated[float, "m", "target east position"] = 0.0
-    psi_t: Annotated[float, "rad", "target heading"] = 0.0
+    psi_t: Annotated[float, "rad", "target heading in (-pi, pi]"] = 0.0
     x_t_dot: Annotated[float, "m/s", "target north velocity"] = 0.0
     y_t_dot: Annotated[float, "m/s", "target east velocity"] = 0.0
     psi_t_dot: Annotated[float, "rad/s", "target yaw rate"] = 0.0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -144,11 +145,8 @@ def test_wrong_fault_is_refused_by_name(ellipse, fault, message):
     assert "faults[0]" in str(error.value)
 
 
-def test_new_fault_registers_itself():
-    from typing import Literal
-
-    class Stuck(faults.Fault):
-        kind: Literal["stuck"]
-        stage = 6
-
-    assert faults.KINDS.pop("stuck") is Stuck
+def test_example_of_the_contributing_guide_registers_itself():
+    text = (ROOT / "CONTRIBUTING.md").read_text().split("```python\n")[2].split("```")[0]
+    exec(text, vars(faults) | {"__name__": "mine"})
+    assert play(make("scale", factor=3.0), [(2.0,)]) == [(6.0,)]
+    del faults.KINDS["scale"]

@@ -452,14 +452,47 @@ def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
 
 
 def test_example_of_the_contributing_guide_works(tmp_path, opened):
+    """As printed, outside the repository; and it passes the linter that a contribution has to pass."""
     text = (ROOT / "CONTRIBUTING.md").read_text()
-    code = text.split("```python\n")[1].split("```")[0]
-    own = tmp_path / "mine.py"
-    own.write_text(
-        code.replace("from ..", "from fmus.").replace("from .back", "from fmus.controller.back")
-    )
+    own = tmp_path / "pull.py"
+    own.write_text(text.split("```python\n")[1].split("```")[0])
     (path,) = build([str(own)], tmp_path)
     assert validate_fmu(str(path)) == []
     fmu = opened(path).initialise(x_t=1.5)
     fmu.step(0.0)
-    assert fmu.get("tau_X") == [1.5]
+    assert fmu.get("tau_X") == [3.0]
+    checks = [
+        ["check", "--config", str(ROOT / "pyproject.toml")],
+        ["format", "--check", "--line-length=105"],
+    ]
+    for check in checks:
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", *check, str(own)], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ("    return s, Force(1.0 if p.k > 0 else 0.0)\n", "may not branch on a value"),
+        ("    return s, Force(i.target.xt)\n", "has no attribute 'xt'"),
+        ("    return s, Force(math.sin(i.target.x_t))\n", "may not branch on a value, convert it"),
+    ],
+)
+def test_mistake_in_a_users_component_is_told_with_its_line(tmp_path, wrong, message):
+    own = tmp_path / "mine.py"
+    text = OWN.format(gain=1.0).replace("    e = i.target.x_t - i.estimate.x_hat\n", wrong)
+    own.write_text(text.replace("from typing", "import math\nfrom typing"))
+    done = run_build(own, "--out", tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert message in done.stderr
+    assert f"{own}:" in done.stderr
+    assert not list(tmp_path.glob("*.fmu"))
+
+
+def test_list_of_one_fmu_names_all_its_variables():
+    listed = run_build("--list", "vessel").stdout
+    assert all(v.name in listed and v.description in listed for v in COMPONENTS["vessel"].variables)
+    assert run_build("--list", "vesel").returncode == 2

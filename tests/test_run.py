@@ -55,6 +55,42 @@ def test_quiet_without_plots_says_and_draws_nothing(scenario, tmp_path):
     assert not PICTURES & {p.name for p in (tmp_path / "out").iterdir()}
 
 
+def test_metrics_do_not_depend_on_what_is_logged(scenario, tmp_path):
+    results = []
+    for k, log in enumerate(({}, {"every": 7}, {"signals": ["guidance.x_t"]})):
+        command(scenario(log=log), "--out", tmp_path / str(k), "--no-plots")
+        results.append(json.loads((tmp_path / str(k) / "metrics.json").read_text()))
+    assert results[0] == results[1] == results[2]
+
+
+def test_metrics_of_a_log_are_those_of_its_run(scenario, tmp_path):
+    command(scenario(metrics={"from": 0.5, "to": 1.5}), "--out", tmp_path / "out", "--no-plots")
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim.metrics", str(tmp_path / "out"), "--json"],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    )  # fmt: skip
+    again, own = json.loads(done.stdout), json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert again == pytest.approx(own)
+    assert (own["from"], own["to"]) == (0.5, 1.5)
+
+
+def test_runs_are_laid_over_each_other(scenario, tmp_path):
+    for name in "ab":
+        command(scenario(), "--out", tmp_path / name, "--no-plots")
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim.plots", *(str(tmp_path / n) for n in "ab"), "--out", str(tmp_path / "c")],
+        capture_output=True, text=True, cwd=ROOT, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {p.name for p in (tmp_path / "c").iterdir()} == PICTURES
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim.plots", str(tmp_path / "nowhere")],
+        capture_output=True, text=True, cwd=ROOT, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "no log in" in done.stderr
+
+
 def test_default_folder_is_results_and_the_name(scenario, tmp_path):
     done = command(scenario(name="mine"), "--no-plots", cwd=tmp_path)
     assert done.returncode == 0
@@ -66,7 +102,9 @@ def test_folder_holds_nothing_of_an_earlier_run(scenario, tmp_path):
     command(scenario(), "--out", out)
     (out / "notes.txt").write_text("mine")
     command(scenario(log={"signals": ["vessel.x"]}), "--out", out)
-    assert {p.name for p in out.iterdir()} == {"log.csv", "log.json", "notes.txt"}
+    assert {p.name for p in out.iterdir()} == {"log.csv", "log.json", "metrics.json", "notes.txt", *PICTURES} - {
+        "forces.png", "model_error.png",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -173,7 +211,7 @@ def test_real_time_is_kept(scenario, tmp_path):
     begun = time.monotonic()
     done = command(scenario(stop=3.0), "--out", tmp_path / "out", "--no-plots", "--realtime", "2")
     assert time.monotonic() - begun >= 1.5
-    assert "deadlines missed" in done.stdout
+    assert "missed deadlines" in done.stdout
     pace = json.loads((tmp_path / "out" / "log.json").read_text())["realtime"]
     assert pace["factor"] == 2.0
 
@@ -210,7 +248,7 @@ def test_parameter_set_beats_the_scenario_with_a_notice(scenario, ellipse, tmp_p
     assert done.returncode == 0
     assert "vessel.delta_X_u = -4.0" in done.stderr
     assert "beats -1.0" in done.stderr
-    assert "has values for 'other', which does not run here" in done.stderr
+    assert "has values for a model 'other', which does not run here" in done.stderr
     log = cosim.read_log(tmp_path / "out")
     assert log["vessel.omega_X"] == pytest.approx(-4.0 * log["vessel.u"])
 
@@ -276,7 +314,7 @@ def test_folder_without_permission_is_refused(scenario, tmp_path):
     assert done.returncode == 2
 
 
-@pytest.mark.parametrize("module", ["cosim.run", "cosim.metrics", "fmus.build"])
+@pytest.mark.parametrize("module", ["cosim.run", "cosim.metrics", "cosim.plots", "fmus.build"])
 def test_help_has_examples(module):
     done = subprocess.run(
         [sys.executable, "-m", module, "--help"], capture_output=True, text=True, cwd=ROOT, check=False

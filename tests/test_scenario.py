@@ -52,6 +52,8 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
         ({"log": {"evry": 1}}, "log.evry: unknown key; did you mean 'every'?"),
         ({"log": {"signals": ["vessel.xx"]}}, "log.signals[0]: 'vessel' has no variable 'xx'"),
         ({"log": {"signals": ["vesel.*"]}}, "log.signals[0]: nothing matches 'vesel.*'"),
+        ({"metrics": {"from": 5.0}}, "metrics: there is no time from 5.0 to 2.0 s in a run of 2.0 s"),
+        ({"metrics": {"from": 1.0, "to": 0.5}}, "no time from 1.0 to 0.5 s"),
         ({"metrics": {"form": 1.0}}, "metrics.form: unknown key; did you mean 'from'?"),
         (
             {"events": [{"time": 1.0, "model": "vesel", "variable": "X_u", "action": "reset"}]},
@@ -280,6 +282,11 @@ def test_own_name_wins_over_a_file_beside_and_other_files_are_found(ellipse, tmp
     system = prepare(load_scenario(path))
     assert system.models["vessel"].name == "vessel"
     assert system.models["extra"].name == "Other"
+    assert "'./vessel.fmu' would mean that file" in system.warnings[0]
+    ellipse["fmus"]["vessel"] = {"path": "./Other.fmu"}
+    ellipse["connections"] = ellipse["events"] = ellipse["faults"] = []
+    path.write_text(json.dumps(ellipse))
+    assert prepare(load_scenario(path)).models["vessel"].name == "Other"
 
 
 def test_public_names_are_there():
