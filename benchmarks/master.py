@@ -182,7 +182,7 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
 
     from cosim.fmu import Instance, Model
 
-    access = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+    pointer, size = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
     used = {*plan["signals"], *(source for source, _ in plan["connections"])}
     sources = {target: source for source, target in plan["connections"]}
     models = {name: Model(Path(path)) for name, path in plan["fmus"].items()}
@@ -200,8 +200,10 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
             references = (ctypes.c_uint * len(own))(*numbers)
             kept.append(references)
             address = table.ctypes.data + 8 * names.index(own[0])
-            arguments = [instance.component, ctypes.addressof(references), len(own), address]
-            calls.append((instance.function(function, *access), arguments))
+            arguments = (instance.component, ctypes.addressof(references), len(own), address)
+            convert = (pointer, pointer, size, pointer)
+            converted = [to_c(value) for to_c, value in zip(convert, arguments, strict=True)]
+            calls.append((instance.function(function), converted))
 
     for name, model in models.items():
         instance = Instance(name, model, lambda *message: None)
@@ -213,10 +215,10 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
         instance.enter_initialization()
         instance.exit_initialization()
         bind(instance, "fmi2SetReal", set_, inputs)
-        step = instance.function(
-            "fmi2DoStep", ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int
+        length, flag = ctypes.c_double.from_param(plan["step"]), ctypes.c_int.from_param(1)
+        calls.append(
+            (instance.function("fmi2DoStep"), [pointer(instance.component), time, length, flag])
         )
-        calls.append((step, [instance.component, time, plan["step"], 1]))
         bind(instance, "fmi2GetReal", got, outputs)
     order = np.array([got.index(sources[n]) for n in set_])
     before = perf_counter()

@@ -100,11 +100,10 @@ class Timed(Fault):
         return active
 
     def _draw_duration(self, step: float, rng: np.random.Generator) -> float:
-        if self.duration is None:
-            return step
+        """How long the fault lasts this time [s]: at least a sample."""
         if isinstance(self.duration, tuple):
-            return rng.uniform(*self.duration)
-        return self.duration
+            return max(step, rng.uniform(*self.duration))
+        return max(step, self.duration or 0.0)
 
 
 def _each(value: float | list[float], count: int) -> list[float]:
@@ -209,10 +208,10 @@ class Delay(Fault):
 
     kind: Literal["delay"]
     stage = 5
-    time: Times = Field(description="how late [s], rounded to samples")
+    time: float = Field(ge=0.0, le=1e6, description="how late [s], rounded to samples")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        samples = round(self.time / step)
+        samples = int(self.time / step + 0.5)
         queue: deque[list[float]] = deque()
 
         def effect(values: Values, t: float) -> None:

@@ -7,6 +7,7 @@ the library directly, with buffers that are laid out once.
 import ctypes
 import hashlib
 import itertools
+import math
 import os
 import shutil
 import sys
@@ -115,11 +116,14 @@ class Model:
         if self.description.coSimulation is None:
             raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
         self.name: str = self.description.modelName or path.stem
+        try:
+            self.variables = self._read_variables()
+        except Exception as error:
+            raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
         self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
         self._folder: Path | None = None
 
-    @cached_property
-    def variables(self) -> dict[str, Variable]:
+    def _read_variables(self) -> dict[str, Variable]:
         """All variables by name, in the order of the description."""
         units = {
             u.name: Unit(
@@ -128,7 +132,7 @@ class Model:
                 if (b := u.baseUnit) is None
                 # rad is no dimension of its own in SI: 1/s and rad/s go together.
                 else (b.kg, b.m, b.s, b.A, b.K, b.mol, b.cd),
-                1.0 if b is None else b.factor,
+                1.0 if b is None else b.factor or math.nan,
                 0.0 if b is None else b.offset,
             )
             for u in self.description.unitDefinitions
@@ -141,6 +145,8 @@ class Model:
             if declared is not None:
                 low = declared.min if low is None else low
                 high = declared.max if high is None else high
+            if v.name in found:
+                raise ValueError(f"two variables are called '{v.name}'")
             found[v.name] = Variable(
                 v.name,
                 v.type,
@@ -185,12 +191,19 @@ class Model:
             self._folder = folder
         return self._folder
 
+    def forget_modules(self) -> None:
+        """Let the next Python FMU import its own modules, even if they have the names of this one's."""
+        folder = str(self._folder)
+        for name, module in list(sys.modules.items()):
+            if (getattr(module, "__file__", None) or "").startswith(folder):
+                del sys.modules[name]
+        sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
+
     def close(self) -> None:
         """Remove what was unpacked."""
         if self._folder is not None:
-            folder = str(self._folder)
-            sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
-            shutil.rmtree(folder, ignore_errors=True)
+            self.forget_modules()
+            shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = None
 
 
@@ -224,18 +237,62 @@ class Instance:
             os.chdir(here)
             raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {error}") from error
 
-        self._environment = next(_environments)
-        _listeners[self._environment] = lambda status, text: on_message(name, status, text)
-        callbacks = _callbacks(self._environment)
-        try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
-        except Exception as error:
-            raise InputError(f"'{model.path}' cannot be instantiated as '{name}': {error}") from error
-        self.component = self._fmu.component
-        self.worst_status = 0
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others
         # may work in threads of their own and must not find it held.
-        self._keep_lock = (folder / "resources" / "slavemodule.txt").is_file()
+        self._keep_lock = hasattr(self._fmu.dll, "finalizePythonInterpreter")
+        if self._keep_lock and not (folder / "resources" / "slavemodule.txt").is_file():
+            raise InputError(f"'{model.path}' is a Python FMU without its resources/slavemodule.txt")
+        self.complaint = ""
+        self.worst_status = 0
+
+        def listen(status: int, text: str) -> None:
+            text = " ".join(text.split())
+            if status > 0:
+                self.complaint = text
+            on_message(name, status, text)
+
+        self._environment = next(_environments)
+        _listeners[self._environment] = listen
+        self._callbacks = _callbacks(self._environment)
+        self.component = self._instantiate(folder)
+
+    def _instantiate(self, folder: Path) -> int:
+        resources = folder / "resources"
+        # pythonfmu undoes no escapes but that of the space.
+        uri = f"file://{str(resources).replace(' ', '%20')}" if self._keep_lock else resources.as_uri()
+        # A module of the same name that is there already would be taken for the FMU's own.
+        script = resources / "slavemodule.txt"
+        module = script.read_text().strip() if self._keep_lock else ""
+        other = sys.modules.pop(module, None)
+        component = self._fmu.fmi2Instantiate(
+            self.name.encode(),
+            fmi2.fmi2CoSimulation,
+            str(self.model.description.guid).encode(),
+            uri.encode(),
+            ctypes.byref(self._callbacks),
+            fmi2.fmi2False,
+            fmi2.fmi2True,
+        )
+        self._fmu.component = component
+        if self._keep_lock:
+            self.model.forget_modules()
+        if other is not None:
+            sys.modules[module] = other
+        if not component:
+            why = f": {self.complaint}" if self.complaint else ""
+            raise InputError(f"'{self.model.path}' cannot be instantiated as '{self.name}'{why}")
+        return int(component)
+
+    def check(self, what: str, status: int) -> None:
+        """End the run if a call returned more than a warning.
+
+        Raises:
+            SimulationError: names the instance, the call and the status, and what the FMU said of it.
+        """
+        if status >= DISCARD:
+            self.worst_status = max(self.worst_status, status)
+            why = f": {self.complaint}" if self.complaint else ""
+            raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{why}")
 
     def function(self, name: str, *argument_types: Any) -> Callable[..., int]:
         """An FMI function of the library as a fast callable that returns a status."""
@@ -308,7 +365,7 @@ class Instance:
     def free(self) -> None:
         """Free the instance and its library; after a fatal error nothing of it may be called."""
         if self.worst_status < FATAL:
-            self._fmu.fmi2FreeInstance(self.component)
+            self._fmu.fmi2FreeInstance(self._fmu.component)
         _listeners.pop(self._environment, None)
         # The first pythonfmu library in a process cannot be unloaded. Left alone it would do this when
         # the process ends, after its own memory is gone, and now and then abort the process.

@@ -2,7 +2,6 @@
 
 import json
 import os
-import tempfile
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,19 +38,22 @@ class LogWriter:
         """
         if not len(block):
             return
-        if np.isfinite(block).all():
-            text = orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY)
-            self._file.write(text[2:-2].replace(b"],[", b"\n") + b"\n")
-        else:
-            rows = (",".join(map(repr, row)) for row in block.tolist())
-            self._file.write(("\n".join(rows) + "\n").encode())
+        lines = orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2].split(b"],[")
+        # JSON knows neither NaN nor infinity; all other numbers must look the same in every row.
+        for k in np.flatnonzero(~np.isfinite(block).all(axis=1)):
+            cells = lines[k].split(b",")
+            for j in np.flatnonzero(~np.isfinite(block[k])):
+                cells[j] = repr(float(block[k, j])).encode()
+            lines[k] = b",".join(cells)
+        self._file.write(b"\n".join(lines) + b"\n")
 
     def close(self) -> None:
         self._file.close()
 
 
 def _quoted(name: str) -> str:
-    """A column name as CSV wants it: FMI allows commas, as in ``M[1,2]``."""
+    """A column name as CSV wants it: FMI allows commas, as in ``M[1,2]``, and even line breaks."""
+    name = " ".join(name.split())
     return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name
 
 
@@ -63,13 +65,13 @@ def _header(line: str) -> list[str]:
 
 def write_json(path: Path, content: Any) -> None:
     """Write a JSON file so that it is never half there."""
-    text = json.dumps(content, indent=2, ensure_ascii=False)
-    with tempfile.NamedTemporaryFile(
-        "w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8"
-    ) as part:
-        part.write(text + "\n")
-    os.chmod(part.name, 0o644)
-    os.replace(part.name, path)
+    text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def to_parquet(folder: Path) -> Path:
@@ -77,9 +79,12 @@ def to_parquet(folder: Path) -> Path:
     from pyarrow import csv, parquet
 
     target = folder / PARQUET
-    part = folder / f"{PARQUET}.part"
-    parquet.write_table(csv.read_csv(folder / CSV), part)
-    os.replace(part, target)
+    part = folder / f".{PARQUET}.{os.getpid()}.part"
+    try:
+        parquet.write_table(csv.read_csv(folder / CSV), part)
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
     (folder / CSV).unlink()
     return target
 
@@ -104,6 +109,8 @@ def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[s
     try:
         with open(path, encoding="utf-8") as file:
             names = _header(file.readline().rstrip("\n"))
+            if "time" not in names:
+                raise InputError(f"'{path}' is not a log: it has no column 'time'")
             wanted = _wanted(names, columns, path)
             places = [names.index(name) for name in wanted]
             # A run that was killed may leave part of a line at the end.

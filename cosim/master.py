@@ -17,9 +17,9 @@ import numpy as np
 
 from .errors import SimulationError
 from .faults import EARLY, Effect
-from .fmu import DISCARD, STATUS, Instance, Variable
+from .fmu import DISCARD, Instance, Variable
 from .scenario import Event
-from .system import Connection, Signal, System
+from .system import INT_LIMIT, Connection, Signal, System
 
 _SETTERS = {
     "Integer": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
@@ -40,32 +40,24 @@ class Message:
 
 
 class Messages:
-    """Collects the warnings and errors that FMUs log: the first ones, and the last of each."""
+    """Collects the first warnings and errors that FMUs log."""
 
     KEEP = 200
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self.count = 0
         self.kept: list[Message] = []
-        self._last: dict[str, Message] = {}
         self._show = show
 
     def add(self, instance: str, status: int, text: str) -> None:
         if status == 0:  # mere information
             return
         self.count += 1
-        message = Message(instance, status, " ".join(text.split()))
-        self._last[instance] = message
         if self.count <= self.KEEP:
-            self.kept.append(message)
-            self._show(f"{instance}: {message.text}")
+            self.kept.append(Message(instance, status, text))
+            self._show(f"{instance}: {text}")
         elif self.count == self.KEEP + 1:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")
-
-    def why(self, instance: str) -> str:
-        """The last thing an instance complained about, to explain why it stopped."""
-        message = self._last.get(instance)
-        return f": {message.text}" if message is not None else ""
 
 
 class Table:
@@ -122,8 +114,8 @@ class Access:
         ]
 
     def __call__(self) -> None:
-        if self.real is not None and self.real(*self.arguments) > 1:
-            raise SimulationError(f"{self._instance.name}: {self._what} failed")
+        if self.real is not None:
+            self._instance.check(self._what, self.real(*self.arguments))
         for other in self._others:
             other()
 
@@ -142,7 +134,7 @@ class _Buffered:
         self, instance: Instance, kind: str, signals: Sequence[Signal], table: Table, setting: bool
     ) -> None:
         setter, getter, c_type = _SETTERS[kind]
-        self._name = instance.name
+        self._instance = instance
         self._what = setter if setting else getter
         self._setting = setting
         self._references = (ctypes.c_uint * len(signals))(*[s.variable.reference for s in signals])
@@ -160,9 +152,11 @@ class _Buffered:
     def __call__(self) -> None:
         if self._setting:
             for k, slot in enumerate(self._slots):
-                self._buffer[k] = round(self._values[slot])
-        if self._function(*self._arguments) > 1:
-            raise SimulationError(f"{self._name}: {self._what} failed")
+                value = self._values[slot]
+                if not abs(value) < INT_LIMIT:
+                    raise SimulationError(f"{self._instance.name}: {value} is not a 32-bit number")
+                self._buffer[k] = round(value)
+        self._instance.check(self._what, self._function(*self._arguments))
         if not self._setting:
             for k, slot in enumerate(self._slots):
                 self._values[slot] = float(self._buffer[k])
@@ -205,24 +199,35 @@ class Stepper:
         instance: Instance,
         table: Table,
         settable: set[str],
-        messages: Messages,
     ) -> None:
         self.instance = instance
-        self._messages = messages
         self.every = system.every[instance.name]
         self.step_size = self.every * system.scenario.step
         self._table = table
         own = [s for s in table.signals if s.instance == instance.name]
         self.set = Access(instance, [s for s in own if s.name in settable], table, setting=True)
+        self._inputs = [s for s in own if s.variable.causality == "input"]
         self.got = [s for s in own if s.variable.causality != "input"]
         self.get = Access(instance, self.got, table, setting=False)
         self._do_step = instance.function("fmi2DoStep", *_STEP)
         incoming = [c for c in system.connections if c.target.instance == instance.name]
         self._copies, self._runs, self._conversions = _transfers(incoming, table)
+        # Inputs without a source that events may change, and the values to return to.
+        sourced = {c.target.name for c in incoming}
+        free = [s for s in own if s.name in settable and s.name not in sourced]
+        self._free: list[tuple[int, Signal]] = [(table.slots[s.name], s) for s in free]
+        self._constants: list[tuple[int, float]] = []
+        self._special = bool(self._free or self._conversions)
         self.input_faults: list[Effect] = []
         self.output_faults: list[Effect] = []
         self.input_changes = Changes(table.values)
         self.output_changes = Changes(table.values)
+
+    def read_inputs(self) -> None:
+        """Take the start values of all inputs from the FMU."""
+        for signal in self._inputs:
+            self._table.values[self._table.slots[signal.name]] = self.instance.get_value(signal.variable)
+        self._constants = [(slot, self._table.values[slot]) for slot, _ in self._free]
 
     def exchange(self, t: float, faulty: bool = True) -> None:
         """Bring the newest values to the FMU's inputs; t is the time that they belong to."""
@@ -231,37 +236,42 @@ class Stepper:
             values[target] = values[source]
         for target, target_end, source, source_end in self._runs:
             values[target:target_end] = values[source:source_end]
+        if self._special or self.input_faults or self.input_changes:
+            self._exchange_special(t, faulty)
+        access = self.set
+        if access.only_reals:
+            status = access.real(*access.arguments)  # pyright: ignore[reportOptionalCall]
+            if status >= DISCARD:
+                self.instance.check("fmi2SetReal", status)
+        elif access:
+            access()
+
+    def _exchange_special(self, t: float, faulty: bool) -> None:
+        """What few FMUs need: constants, conversions, faults, events."""
+        values = self._table.values
+        for target, value in self._constants:
+            values[target] = value
         for target, source, factor, offset in self._conversions:
             values[target] = factor * values[source] + offset
         if faulty:
             for fault in self.input_faults:
                 fault(values, t)
-        if self.input_changes:
-            self.input_changes.apply()
-        access = self.set
-        if access.only_reals:
-            if access.real(*access.arguments) > 1:  # pyright: ignore[reportOptionalCall]
-                raise SimulationError(f"{self.instance.name}: fmi2SetReal failed")
-        elif access:
-            access()
+        self.input_changes.apply()
 
     def advance(self, t: float) -> None:
         """Step from t and bring the outputs to the table."""
         status = self._do_step(self.instance.component, t, self.step_size, 1)
         if status >= DISCARD:
-            name = self.instance.name
-            self.instance.worst_status = status
-            raise SimulationError(
-                f"{name}: the step from t = {t} s returned {STATUS[status]}{self._messages.why(name)}"
-            )
+            self.instance.check(f"the step from t = {t} s", status)
         self.read(t + self.step_size)
 
     def read(self, t: float, faulty: bool = True) -> None:
         """Bring the FMU's outputs to the table."""
         access = self.get
         if access.only_reals:
-            if access.real(*access.arguments) > 1:  # pyright: ignore[reportOptionalCall]
-                raise SimulationError(f"{self.instance.name}: fmi2GetReal failed")
+            status = access.real(*access.arguments)  # pyright: ignore[reportOptionalCall]
+            if status >= DISCARD:
+                self.instance.check("fmi2GetReal", status)
         elif access:
             access()
         if faulty:
@@ -326,8 +336,7 @@ class Master:
             for name in system.order:
                 self._instances[name] = Instance(name, system.models[name], self.messages.add)
             self._steppers = [
-                Stepper(system, self._instances[name], self.table, settable, self.messages)
-                for name in system.order
+                Stepper(system, self._instances[name], self.table, settable) for name in system.order
             ]
             self._bind_faults()
             self._originals: dict[str, float] = {}
@@ -360,11 +369,7 @@ class Master:
             for variable, value in system.parameters[instance.name]:
                 instance.set_value(variable, value)
             instance.enter_initialization()
-            for signal in self.table.signals:
-                if signal.instance == instance.name and signal.variable.causality == "input":
-                    self.table.values[self.table.slots[signal.name]] = instance.get_value(
-                        signal.variable
-                    )
+            stepper.read_inputs()
         # Values settle in as many sweeps as there are FMUs in a chain; only then may faults act.
         for _ in self._steppers:
             before = self.table.row.copy()
@@ -392,7 +397,6 @@ class Master:
             elif signal.variable.causality == "output":
                 slot = self.table.slots[signal.name]
                 stepper.output_changes.begin(slot, event)
-                stepper.output_changes.apply()
             else:
                 self._change_parameter(stepper.instance, signal.variable, event)
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from .command import Output, run_command
 from .errors import InputError
-from .log import SIDECAR, read_log
+from .log import CSV, SIDECAR, read_log
 
 Log = Mapping[str, np.ndarray]
 
@@ -356,6 +356,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stop = stop if options.stop is None else options.stop
         metrics = compute(log, start, stop)
         if options.out is not None:
+            if options.out.resolve().parent == options.folder.resolve() and options.out.name == CSV:
+                raise InputError(f"'{options.out}' is the log itself")
             _write_csv(options.out, over_time(log, start, stop))
     except (InputError, MetricsError) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -366,9 +368,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json:
         print(json.dumps(metrics, indent=2))
     else:
-        Console().print(table(metrics))
+        Output().print(table(metrics))
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -1,9 +1,8 @@
 """Run a scenario: ``python -m cosim.run SCENARIO [--out DIR]``."""
 
 import argparse
-import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 
 from rich.console import Console
@@ -17,12 +16,12 @@ from rich.progress import (
 )
 
 from . import metrics
+from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, run_command
 from .errors import InputError
 from .scenario import load_scenario
 from .simulation import Result, simulate
 
-BAD_INPUT, INTERRUPTED = 2, 130
-EXIT_CODES = {"done": 0, "failed": 3, "interrupted": INTERRUPTED}
+EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,10 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         console.print(f"error: {error}", markup=False)
         return BAD_INPUT
-    except KeyboardInterrupt:
-        console.print("interrupted")
-        return INTERRUPTED
-    _report(result, console, options.quiet)
+    with suppress(BrokenPipeError):
+        _report(result, console, options.quiet)
     return EXIT_CODES[result.status]
 
 
@@ -88,7 +85,7 @@ def _report(result: Result, console: Console, quiet: bool) -> None:
         console.print(f"interrupted: {result.rows} rows are kept in '{result.folder}'", markup=False)
     if quiet:
         return
-    output = Console(highlight=False)
+    output = Output(highlight=False)
     if result.metrics:
         output.print(metrics.table(result.metrics))
     if result.pace:
@@ -113,6 +110,12 @@ def _positive(text: str) -> float:
     return value
 
 
+def _folder(text: str) -> str:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("needs the name of a folder")
+    return text
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m cosim.run",
@@ -124,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
-    parser.add_argument("--out", metavar="DIR", help="result folder (results/<name>)")
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="result folder (results/<name>)")
     parser.add_argument(
         "--parameters",
         metavar="FILE.ssv",
@@ -146,4 +149,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -26,7 +26,11 @@ else:
         Union[tuple(faults.KINDS.values())],  # noqa: UP007 - made from the registry
         Field(discriminator="kind"),
     ]
-Value = bool | int | float | str
+# What a double can count without gaps.
+Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
+Value = bool | Whole | float | str
+# Below a microsecond, differences of time drown in rounding.
+Step = Annotated[float, Field(ge=1e-6)]
 
 
 def _folder_name(name: str) -> str:
@@ -36,9 +40,15 @@ def _folder_name(name: str) -> str:
 
 
 def _instance_name(name: str) -> str:
-    if not name.strip() or any(c in name for c in '.*,"\n'):
-        raise ValueError(f"'{name}' cannot be an instance: no dot, *, comma or quote in its name")
+    if not name.strip() or not name.isprintable() or any(c in name for c in '.*,"'):
+        raise ValueError(f"{name!r} cannot be an instance: no dot, *, comma or quote in its name")
     return name
+
+
+def _fmu_path(path: str) -> str:
+    if not path.isprintable() or not path.endswith(".fmu") or len(path) > 1000:
+        raise ValueError(f"{path[:100]!r} is not the name of an .fmu file")
+    return path
 
 
 class Strict(BaseModel):
@@ -50,10 +60,10 @@ class Strict(BaseModel):
 class FmuEntry(Strict):
     """One instance: which FMU, how often it steps, with what parameters."""
 
-    path: str = Field(
-        min_length=1, description="the project's FMU by bare name, or a path relative to the scenario"
+    path: Annotated[str, AfterValidator(_fmu_path)] = Field(
+        description="the project's FMU by bare name, or a path relative to the scenario"
     )
-    step: PositiveFloat | None = Field(None, description="own step [s], a multiple of the base step")
+    step: Step | None = Field(None, description="own step [s], a multiple of the base step")
     parameters: dict[str, Value] = Field(default_factory=dict, description="start values by name")
 
 
@@ -66,7 +76,7 @@ class Event(Strict):
     action: Literal["override", "bias", "reset", "hold"] = Field(
         description="give it a value, add to it, end all that, or keep the value it has"
     )
-    value: bool | int | float | None = Field(None, description="for override and bias")
+    value: bool | Whole | float | None = Field(None, description="for override and bias")
 
 
 class LogOptions(Strict):
@@ -95,8 +105,10 @@ class Scenario(Strict):
         min_length=1, description="also the name of the result folder"
     )
     description: str = ""
-    step: PositiveFloat = Field(description="base step [s]")
-    stop: PositiveFloat = Field(description="end of the simulation [s], a multiple of the base step")
+    step: Step = Field(description="base step [s]")
+    stop: PositiveFloat = Field(
+        le=1e9, description="end of the simulation [s], a multiple of the base step"
+    )
     seed: Annotated[int, Field(ge=0)] = Field(0, description="of all random faults")
     algorithm: Literal["gauss_seidel", "jacobi"] = Field(
         "gauss_seidel",
@@ -136,7 +148,8 @@ def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
         return _validate(source, "scenario", Path.cwd())
     path = Path(source)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_once)
+        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
+        json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
         raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
@@ -144,7 +157,7 @@ def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
         raise InputError(f"'{path}': {error}") from None
     except json.JSONDecodeError as error:
         raise InputError(f"'{path}' is not JSON: {error}") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"'{path}' cannot be read: {error}") from None
     return _validate(content, f"'{path}'", path.parent)
 
@@ -175,7 +188,7 @@ def _message(error: ValidationError, name: str) -> str:
     for part in first["loc"]:
         if isinstance(part, int):
             place += f"[{part}]"
-        elif part not in faults.KINDS and not str(part).startswith(("function-", "constrained-")):
+        elif part not in faults.KINDS and not str(part).startswith(_INTERNAL):
             place += f".{part}" if place else str(part)
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
@@ -189,6 +202,10 @@ def _message(error: ValidationError, name: str) -> str:
         text = "is missing"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"{name}: {place or 'the content'}: {text}{more}"
+
+
+# Parts of a place that come from how a type is checked, not from the file.
+_INTERNAL = ("function-", "constrained-", "bool", "int", "float", "str", "tuple", "list[")
 
 
 def _keys(location: tuple[int | str, ...]) -> list[str]:

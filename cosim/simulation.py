@@ -1,6 +1,7 @@
 """Run a checked scenario: step, record, look up now and then, and leave a tidy folder."""
 
 import importlib.metadata
+import math
 import signal
 import threading
 import time
@@ -55,23 +56,34 @@ class Pace:
 
     factor: float
     step: float
+    interrupted: Callable[[], bool]
     started: float = field(default_factory=time.perf_counter)
-    lateness: list[float] = field(default_factory=list)
+    steps: int = 0
+    misses: int = 0
+    worst: float = 0.0
+    total: float = 0.0
+    squares: float = 0.0
 
     def wait(self, t: float) -> None:
+        """Return when it is time for t, or when the user has had enough."""
         due = self.started + t / self.factor
-        while (left := due - time.perf_counter()) > 0.0:
+        while (left := due - time.perf_counter()) > 0.0 and not self.interrupted():
             time.sleep(min(left, 0.05))
-        self.lateness.append(time.perf_counter() - due)
+        late = time.perf_counter() - due
+        self.steps += 1
+        self.misses += late > self.step / self.factor
+        self.worst = max(self.worst, late)
+        self.total += late
+        self.squares += late * late
 
     def summary(self) -> dict[str, float]:
-        late = np.array(self.lateness or [0.0])
-        deadline = self.step / self.factor
+        """Numbers for log.json: how late steps were [s], and how many by more than a step."""
+        mean = self.total / max(1, self.steps)
         return {
             "factor": self.factor,
-            "deadline_misses": int((late > deadline).sum()),
-            "lateness_max": float(late.max()),
-            "jitter_rms": float(late.std()),
+            "deadline_misses": self.misses,
+            "lateness_max": self.worst,
+            "jitter_rms": math.sqrt(max(0.0, self.squares / max(1, self.steps) - mean * mean)),
         }
 
 
@@ -159,7 +171,8 @@ def interruptible() -> Iterator[Callable[[], bool]]:
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
-    previous = {n: signal.signal(n, ask) for n in (signal.SIGINT, signal.SIGTERM)}
+    numbers = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+    previous = {number: signal.signal(number, ask) for number in numbers}
     try:
         yield lambda: asked
     finally:
@@ -200,15 +213,16 @@ def simulate(
             show(f"warning: {warning}")
         if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
             raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
+        folder = Path(out) if out is not None else Path("results") / scenario.name
         try:
             master = Master(system, lambda text: show(f"warning: {text}"))
         except SimulationError as error:
-            return Result("failed", Path(), message=str(error), warnings=system.warnings)
+            _clear(folder, show)
+            failure = {**_describe(system), "status": "failed", "rows": 0, "message": str(error)}
+            logs.write_json(folder / logs.SIDECAR, failure)
+            return Result("failed", folder, message=str(error), warnings=system.warnings)
         try:
-            folder = Path(out) if out is not None else Path("results") / scenario.name
-            if (folder / logs.SIDECAR).exists():
-                show(f"note: replaces the earlier run in '{folder}'")
-            _clear(folder)
+            _clear(folder, show)
             result, recorder = _record(system, master, folder, realtime, progress)
         finally:
             master.close()
@@ -218,9 +232,11 @@ def simulate(
     return result
 
 
-def _clear(folder: Path) -> None:
+def _clear(folder: Path, show: Callable[[str], None]) -> None:
     """Make the result folder, without what an earlier run left there."""
     try:
+        if (folder / logs.SIDECAR).exists():
+            show(f"note: replaces the earlier run in '{folder}'")
         folder.mkdir(parents=True, exist_ok=True)
         for name in (
             logs.CSV,
@@ -244,31 +260,45 @@ def _record(
     """The run itself; returns how it ended, and what was recorded."""
     result = Result("running", folder, warnings=system.warnings)
     sidecar = _describe(system)
-    logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
-    recorder = Recorder(system, master, folder)
-    pace = Pace(realtime, system.scenario.step) if realtime else None
     try:
-        with interruptible() as interrupted, quiet_collector():
-            stopped = _loop(system, master, recorder, pace, interrupted, progress)
-        result.status = "interrupted" if stopped else "done"
-    except (SimulationError, OSError) as error:
-        with suppress(SimulationError, OSError):
-            recorder.flush()
-        result.status, result.message = "failed", str(error)
-    finally:
-        recorder.close()
-        result.rows = recorder.rows
-        if pace is not None:
-            result.pace = pace.summary()
-            sidecar["realtime"] = result.pace
-        sidecar["rows"] = result.rows
-        sidecar["messages"] = [
-            {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
-        ]
-        if result.message:
-            sidecar["message"] = result.message
+        logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
+        recorder = Recorder(system, master, folder)
+    except OSError as error:
+        raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+    with interruptible() as interrupted:
+        pace = Pace(realtime, system.scenario.step, interrupted) if realtime else None
+        try:
+            with quiet_collector():
+                stopped = _loop(system, master, recorder, pace, interrupted, progress)
+            result.status = "interrupted" if stopped else "done"
+        except (SimulationError, OSError, KeyboardInterrupt) as error:
+            with suppress(SimulationError, OSError):
+                recorder.flush()
+            # Whoever asks twice may hit an FMU in the middle of its step.
+            result.status = "interrupted" if interrupted() else "failed"
+            result.message = str(error)
+    recorder.close()
+    result.rows = sidecar["rows"] = recorder.rows
+    if pace is not None:
+        result.pace = sidecar["realtime"] = pace.summary()
+    sidecar["messages"] = [
+        {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
+    ]
+    if result.message:
+        sidecar["message"] = result.message
+    with _disk(result):
         logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
     return result, recorder
+
+
+@contextmanager
+def _disk(result: Result) -> Iterator[None]:
+    """What cannot be written any more makes a run a failed one, which keeps what there is."""
+    try:
+        yield
+    except OSError as error:
+        result.status = "failed"
+        result.message = result.message or f"cannot write to '{result.folder}': {error.strerror}"
 
 
 def _loop(
@@ -349,13 +379,17 @@ def _finish(
     columns = recorder.kept()
     try:
         result.metrics = metrics.compute(columns, window.start, window.stop)
-        logs.write_json(result.folder / logs.METRICS, result.metrics)
+        with _disk(result):
+            logs.write_json(result.folder / logs.METRICS, result.metrics)
     except metrics.MetricsError as error:
         show(f"note: no metrics: {error}")
     if pictures and result.status != "interrupted":
-        drawn = plots.draw({system.scenario.name: columns}, result.folder, window.start, window.stop)
-        missing = plots.PICTURES.keys() - {path.stem for path in drawn}
-        if missing:
-            show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
+        with _disk(result):
+            runs = {system.scenario.name: columns}
+            drawn = plots.draw(runs, result.folder, window.start, window.stop)
+            missing = plots.PICTURES.keys() - {path.stem for path in drawn}
+            if missing:
+                show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
     if system.scenario.log.format == "parquet" and result.status == "done":
-        logs.to_parquet(result.folder)
+        with _disk(result):
+            logs.to_parquet(result.folder)

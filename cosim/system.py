@@ -1,5 +1,6 @@
 """A scenario checked against its FMUs, and laid out for running. Nothing runs before this is done."""
 
+import math
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -11,9 +12,11 @@ from . import metrics
 from .errors import InputError, nearest
 from .fmu import NUMERIC, Model, Variable
 from .order import Link, execution_order
-from .scenario import Scenario, Value
+from .scenario import Event, Scenario, Value
+from .ssv import Parameter
 from .units import Conversion, conversion
 
+INT_LIMIT = 2**31
 # What an input of one type accepts from an output of another.
 ACCEPTS = {
     "Real": ("Real", "Integer", "Enumeration"),
@@ -23,7 +26,7 @@ ACCEPTS = {
 }
 
 # Parameter sets: file, and model name -> parameter -> value.
-Overrides = Sequence[tuple[Path, dict[str, dict[str, float]]]]
+Overrides = Sequence[tuple[Path, dict[str, dict[str, Parameter]]]]
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,7 @@ def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
     if not names:
         return {}
     done = subprocess.run(
-        [sys.executable, "-m", "fmus.build", *names], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "fmus.build", "--", *names], capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
@@ -166,6 +169,8 @@ def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
 
 def whole(ratio: float) -> int | None:
     """The whole number that a ratio of times is meant to be, if it is one."""
+    if not math.isfinite(ratio):
+        return None
     count = round(ratio)
     return count if count > 0 and abs(ratio - count) < 1e-6 * max(1.0, ratio) else None
 
@@ -190,6 +195,8 @@ def _count_steps(system: System) -> None:
             raise InputError(
                 f"fmus.{name}: step = {entry.step} s is not a multiple of step = {scenario.step} s"
             )
+        if every > steps:
+            raise InputError(f"fmus.{name}: step = {entry.step} s is longer than the whole run")
         system.every[name] = every
 
 
@@ -223,7 +230,9 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
                     f"'{path}' has values for a model '{model_name}', which does not run here{hint}"
                 )
             for name in targets:
-                for parameter, value in values.items():
+                for parameter, given in values.items():
+                    _check_unit(system.models[name], parameter, given, f"'{path}'")
+                    value: Value = given.value
                     old = chosen[name].get(parameter)
                     if old is not None and old[0] != value:
                         system.warnings.append(
@@ -231,6 +240,16 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
                         )
                     chosen[name][parameter] = (value, f"'{path}'")
     return chosen
+
+
+def _check_unit(model: Model, parameter: str, given: Parameter, where: str) -> None:
+    """A parameter set may leave the unit out, but not claim another one than the FMU's."""
+    variable = model.variables.get(parameter)
+    unit = variable.unit.name if variable is not None and variable.unit is not None else given.unit
+    if given.unit not in (None, unit):
+        raise InputError(
+            f"{where}: {model.name}.{parameter} is in '{given.unit}', but the FMU's unit is '{unit}'"
+        )
 
 
 def _check_value(variable: Variable, value: Value | None, where: str) -> None:
@@ -241,7 +260,7 @@ def _check_value(variable: Variable, value: Value | None, where: str) -> None:
     elif variable.type == "Real":
         fits = isinstance(value, (int, float)) and not isinstance(value, bool)
     else:
-        fits = isinstance(value, int) and not isinstance(value, bool)
+        fits = isinstance(value, int) and not isinstance(value, bool) and abs(value) < INT_LIMIT
     if not fits:
         raise InputError(f"{where} = {value!r}: needs a value of type {variable.type}")
     if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -358,17 +377,33 @@ def _check_events(system: System) -> None:
             raise InputError(
                 f"{where}: {signal.name} is {_kind(signal)} that cannot change during a run"
             )
-        if event.action in ("override", "bias"):
-            if event.value is None:
-                raise InputError(f"{where}: {event.action} needs a 'value'")
-            if event.action == "override":
-                _check_value(v, event.value, f"{where}: {signal.name}")
-        elif event.value is not None:
+        _check_event_value(system, event, signal, where)
+        if event.time >= system.scenario.stop:
+            system.warnings.append(f"{where}: no step starts at or after t = {event.time} s: no effect")
+
+
+def _check_event_value(system: System, event: Event, signal: Signal, where: str) -> None:
+    flowing = signal.variable.causality in ("input", "output")
+    if event.action not in ("override", "bias"):
+        if event.value is not None:
             raise InputError(f"{where}: {event.action} takes no 'value'")
-        if event.action == "hold" and v.causality not in ("input", "output"):
+        if event.action == "hold" and not flowing:
             raise InputError(f"{where}: {signal.name} is {_kind(signal)}, which holds its value anyway")
-        if event.time > system.scenario.stop:
-            system.warnings.append(f"{where}: t = {event.time} s is after the end; it has no effect")
+        return
+    value = event.value
+    if value is None:
+        raise InputError(f"{where}: {event.action} needs a 'value'")
+    if event.action == "bias":
+        if flowing:
+            return
+        value += _start_of(system, signal)
+    _check_value(signal.variable, value, f"{where}: {signal.name}")
+
+
+def _start_of(system: System, signal: Signal) -> float:
+    """The value that a parameter has before the first event [in its unit]."""
+    given = [value for v, value in system.parameters[signal.instance] if v == signal.variable]
+    return float(given[-1] if given else signal.variable.start or 0.0)
 
 
 def _choose_signals(system: System) -> None:

@@ -1,5 +1,6 @@
 """Whether two connected variables speak of the same quantity, and how to convert."""
 
+import math
 from dataclasses import dataclass
 
 from .errors import InputError
@@ -34,7 +35,7 @@ def conversion(source: Variable, target: Variable, ends: str, warnings: list[str
     a, b = source.unit, target.unit
     if a is None or b is None:
         return SAME
-    if a.exponents is None or b.exponents is None:
+    if a.exponents is None or b.exponents is None or math.isnan(a.factor * b.factor):
         if a.name != b.name:
             warnings.append(
                 f"{ends}: units '{a.name}' and '{b.name}' cannot be compared, "

@@ -12,6 +12,8 @@ import hashlib
 import importlib
 import importlib.metadata
 import importlib.util
+import keyword
+import math
 import os
 import re
 import shutil
@@ -25,8 +27,9 @@ from pathlib import Path
 from filelock import FileLock
 from platformdirs import user_cache_path
 
-from .declare import Component, DeclarationError, Range, discover, variables
-from .trace import output_dependencies, trace_init
+from .declare import Component, DeclarationError, Range, discover, variables, width
+from .trace import trace_init, trace_step
+from .units import base_exponents
 
 ROOT = Path(__file__).parent
 FACE = "fmus.slave"
@@ -77,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for path in build(options.names, options.out):
             print(path)
     except (BuildError, DeclarationError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
 
@@ -134,10 +137,12 @@ def build(names: Sequence[str], out: Path | None = None) -> list[Path]:
 
 def _place(source: Path, target: Path) -> Path:
     """Copy a file so that the target is either the old one or the whole new one."""
-    with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".part", delete=False) as part:
-        part.write(source.read_bytes())
-    os.chmod(part.name, 0o644)
-    os.replace(part.name, target)
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        shutil.copyfile(source, part)
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
     return target
 
 
@@ -155,7 +160,12 @@ def _cached(name: str) -> Path:
     if fmu.is_file():
         return fmu
     module, component = _load(stem, own_file)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BuildError(
+            f"cannot keep FMUs in '{folder}' ({error.strerror}); CYBERSHIP_CACHE may name another folder"
+        ) from None
     fmu = folder / f"{component.name}.fmu"
     with FileLock(folder / "lock"):
         if not fmu.is_file():
@@ -171,7 +181,11 @@ def _which(name: str) -> tuple[str, Path | None]:
     own_file = Path(name)
     if not own_file.is_file():
         raise BuildError(f"no such component file: '{name}'")
-    return own_file.stem, own_file
+    stem = own_file.stem
+    taken = {path.stem for path in ROOT.iterdir()}
+    if not stem.isidentifier() or keyword.iskeyword(stem) or stem in taken:
+        raise BuildError(f"'{name}': a component file cannot be called '{stem}'")
+    return stem, own_file
 
 
 def _source_hash(own_file: Path | None) -> str:
@@ -197,17 +211,31 @@ def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BuildError(f"'{own_file}' fails when imported: {error!r}") from error
     component = getattr(module, "COMPONENT", None)
     if not isinstance(component, Component):
         raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
     try:
-        output_dependencies(component)
-        trace_init(component)
+        _check(component)
     except Exception as error:
         raise BuildError(f"{_place_of(error, own_file)}: {error}") from error
     return f"fmus.{own_file.stem}", component
+
+
+def _check(component: Component) -> None:
+    """Find out now what is wrong with a user's component, while the error can still name the line."""
+    if not component.name.isidentifier() or not component.name.isascii():
+        raise DeclarationError(f"'{component.name}' cannot be the name of an FMU")
+    for v in component.variables:
+        base_exponents(v.unit)
+        if not math.isfinite(v.start):
+            raise DeclarationError(f"{v.name} starts at {v.start}")
+    for trace in (trace_init(component), trace_step(component)):
+        if len(trace.outputs) != width(component.outputs):
+            raise DeclarationError(
+                f"step gives {len(trace.outputs)} outputs, {width(component.outputs)} are declared"
+            )
 
 
 def _place_of(error: Exception, own_file: Path) -> str:
@@ -275,7 +303,7 @@ def _pack(component: Component, module: str, own_file: Path | None, work: Path) 
         path = work / package / inside
         path.parent.mkdir(parents=True, exist_ok=True)
         # A user's file imports fmus by name; inside the FMU the package is called otherwise.
-        path.write_text(re.sub(r"^(\s*(?:from|import)\s+)fmus\b", rf"\1{package}", text, flags=re.M))
+        path.write_text(re.sub(r"^(\s*(?:from|import)\s+)fmus\b", rf"\g<1>{package}", text, flags=re.M))
     script = work / f"{package}_fmu.py"
     script.write_text(
         SCRIPT.format(

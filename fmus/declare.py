@@ -29,6 +29,8 @@ class Range:
 
 POSITIVE = Range(min=0.0)
 FIXED = "fixed"
+# Of a long communication step; beyond, somebody has mistaken a unit.
+MOST_PARTS = 100_000
 
 
 @dataclass(frozen=True)
@@ -192,6 +194,8 @@ class Component:
         """One communication step of h [s], in parts where it is longer than ``max_step``."""
         if self.max_step is None or h <= self.max_step * (1.0 + 1e-9):
             return self.step(state, inputs, params, h)
+        if h > MOST_PARTS * self.max_step:
+            raise ValueError(f"a step of {h} s is too long: {self.max_step} s are integrated at once")
         parts = -int(-h / self.max_step // 1.0)
         outputs = None
         for _ in range(parts):

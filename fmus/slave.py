@@ -8,7 +8,7 @@ serialising follow from that.
 import json
 import uuid
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
@@ -110,6 +110,9 @@ class Slave(Fmi2Slave):
         self._initialising = False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        if not 0.0 <= step_size < inf:
+            self.log(f"step at t = {current_time} s: {step_size} s is no step size", Fmi2Status.error)
+            return False
         inputs, params = self._arguments()
         try:
             state, outputs = self.component.advance(self._state, inputs, params, step_size)

@@ -29,7 +29,7 @@ def base_exponents(unit: str) -> dict[str, int]:
     """
     total: Counter[str] = Counter()
     for sign, part in zip((1, -1), unit.split("/", 1), strict=False):
-        for factor in part.strip("()").split("."):
+        for factor in part.removeprefix("(").removesuffix(")").split("."):
             match = _FACTOR.fullmatch(factor)
             if match is None or match[1] not in _SYMBOLS:
                 raise ValueError(f"unknown unit '{factor}' in '{unit}'")

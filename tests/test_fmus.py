@@ -381,7 +381,19 @@ def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("x = 1\n", "declares no COMPONENT"), ("import nowhere\n", "fails when imported")],
+    [
+        ("x = 1\n", "declares no COMPONENT"),
+        ("import nowhere\n", "fails when imported"),
+        ("import sys\nsys.exit(5)\n", "fails when imported"),
+        (OWN.format(gain="float('nan')"), "k starts at nan"),
+        (OWN.format(gain=1.0).replace('"N/m"', '"furlong"'), "unknown unit 'furlong'"),
+        (OWN.format(gain=1.0).replace('"controller_mine"', '"../mine"'), "cannot be the name of an FMU"),
+        (
+            OWN.format(gain=1.0).replace("return s, Force(p.k * e, 0.0, 0.0)", "return s, ()"),
+            "0 outputs, 3 are",
+        ),
+        (OWN.format(gain=1.0).replace('Annotated[float, "N/m", "gain"]', "float"), "needs a unit"),
+    ],
 )
 def test_a_users_file_that_is_no_component_is_refused(tmp_path, text, message):
     own = tmp_path / "mine.py"
@@ -496,3 +508,28 @@ def test_list_of_one_fmu_names_all_its_variables():
     listed = run_build("--list", "vessel").stdout
     assert all(v.name in listed and v.description in listed for v in COMPONENTS["vessel"].variables)
     assert run_build("--list", "vesel").returncode == 2
+
+
+@pytest.mark.parametrize("name", ["ops.py", "hull.py", "hyph-en.py", "class.py"])
+def test_file_names_that_cannot_work_are_refused(tmp_path, name):
+    (tmp_path / name).write_text(OWN.format(gain=1.0))
+    with pytest.raises(BuildError, match="cannot be called"):
+        build([str(tmp_path / name)], tmp_path)
+
+
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_parameters_at_their_limits_keep_outputs_finite(name, opened):
+    for v in COMPONENTS[name].variables:
+        for limit in (v.range.min, v.range.max):
+            if limit is not None:
+                fmu = opened(name, f"{v.name}_{limit}").initialise(**{v.name: limit})
+                rows = play(fmu, random.Random(0), 3)
+                assert np.isfinite(rows).all(), (v.name, limit)
+
+
+def test_step_that_is_no_step_is_an_error(opened):
+    vessel = opened("vessel").initialise()
+    for h in (-0.01, math.nan, math.inf, 1e9):
+        with pytest.raises(Exception, match="discard"):
+            vessel.step(0.0, h)
+    assert len(vessel.messages) == 4

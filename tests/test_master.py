@@ -8,6 +8,7 @@ import pytest
 from conftest import COMPONENTS, GAIN
 
 import cosim
+from cosim.log import LogWriter
 from fmus.signals import Force
 
 
@@ -341,3 +342,98 @@ def test_two_runs_in_one_process_are_independent(ellipse, tmp_path):
     run(ellipse | {"seed": 9, "stop": 1.0}, tmp_path / "b")
     _, second = run(ellipse, tmp_path / "c")
     assert all((first[n] == second[n]).all() for n in first)
+
+
+def test_bytes_do_not_depend_on_when_blocks_are_written(tmp_path):
+    """Rows with NaN beside rows without, in blocks of any length."""
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([np.arange(50.0), rng.normal(0, 1e-6, (50, 3))])
+    rows[20:30, 2] = np.nan
+    rows[31, 1] = np.inf
+    texts = set()
+    for length in (1, 7, 50):
+        writer = LogWriter(tmp_path / "log.csv", ["time", "a", "b", "c"])
+        for k in range(0, 50, length):
+            writer.write(np.ascontiguousarray(rows[k : k + length]))
+        writer.close()
+        texts.add((tmp_path / "log.csv").read_bytes())
+    assert len(texts) == 1
+    log = cosim.read_log(tmp_path)
+    assert np.array_equal(np.column_stack(list(log.values())), rows, equal_nan=True)
+
+
+def test_two_python_fmus_of_one_module_name_run_their_own_code(plain_fmu, tmp_path):
+    """As two versions of somebody's controller would be."""
+    paths = []
+    for version in (1.0, 2.0):
+        fmu = plain_fmu("SameName", GAIN, f"self.y = {version}\nreturn True")
+        paths.append(fmu.rename(tmp_path / f"version{version:.0f}.fmu"))
+    content = {
+        "name": "versions", "step": 0.1, "stop": 0.5,
+        "fmus": {name: {"path": str(path)} for name, path in zip("ab", paths, strict=True)},
+    }  # fmt: skip
+    for _ in range(2):
+        _, log = run(content, tmp_path / "out")
+        assert (log["a.y"][-1], log["b.y"][-1]) == (1.0, 2.0)
+
+
+def test_events_on_an_input_without_source(tmp_path):
+    content = {
+        "name": "free", "step": 0.01, "stop": 0.5,
+        "fmus": {"vessel": {"path": "vessel.fmu", "parameters": {"tau_X": 0.2}}},
+        "events": [event(0.1, "bias", 0.1, "vessel"), event(0.2, "override", 0.7, "vessel"),
+                   event(0.3, "reset", None, "vessel")],
+    }  # fmt: skip
+    _, log = run(content, tmp_path)
+    seen = log["vessel.tau_X"]
+    assert (seen[:11] == 0.2).all()
+    assert seen[11:21] == pytest.approx(0.3)
+    assert (seen[21:31] == 0.7).all()
+    assert (seen[31:] == 0.2).all()
+
+
+def test_second_event_does_not_repeat_the_first(ellipse, tmp_path):
+    ellipse["algorithm"] = "jacobi"
+    ellipse["faults"] = []
+    ellipse["events"] = [
+        event(0.3, "bias", 10.0, "guidance", "x_t"), event(0.6, "bias", 1.0, "guidance", "y_t"),
+    ]  # fmt: skip
+    _, log = run(ellipse, tmp_path)
+    assert log["guidance.x_t"][31:].max() < 16.0
+    assert log["controller.x_t"][32:].max() < 16.0
+
+
+def test_failed_set_up_leaves_no_older_result(plain_fmu, tmp_path):
+    good = plain_fmu("Good", GAIN)
+    bad = plain_fmu("BadStart", GAIN + "\nself.enter_initialization_mode = lambda: 1 / 0\n")
+    for fmu, status in ((good, "done"), (bad, "failed")):
+        content = {"name": "s", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": str(fmu)}}}
+        assert cosim.simulate(cosim.load_scenario(content), tmp_path / "out").status == status
+        assert json.loads((tmp_path / "out" / "log.json").read_text())["status"] == status
+    assert not (tmp_path / "out" / "log.csv").exists()
+
+
+@pytest.mark.parametrize("folder", ["with space", "with#sharp", "münchen", "50%"])
+def test_temporary_folder_may_have_any_name(ellipse, tmp_path, monkeypatch, folder):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / folder))
+    (tmp_path / folder).mkdir()
+    assert run(ellipse | {"stop": 0.1}, tmp_path / "out")[0].status == "done"
+
+
+def test_numbers_too_large_for_an_integer_are_refused(plain_fmu, tmp_path):
+    init = """
+        self.n = 0
+        self.register_variable(Integer("n", causality=Fmi2Causality.input))
+    """
+    fmu = plain_fmu("Large", init)
+    content = {
+        "name": "large", "step": 0.1, "stop": 1.0,
+        "fmus": {"a": {"path": str(fmu), "parameters": {"n": 2**40}}},
+    }  # fmt: skip
+    with pytest.raises(cosim.InputError, match="type Integer"):
+        run(content, tmp_path)
+    content["fmus"]["a"]["parameters"] = {}
+    content["events"] = [event(0.2, "bias", 1e300, "a", "n")]
+    result, _ = run(content, tmp_path)
+    assert result.status == "failed"
+    assert "not a 32-bit number" in result.message

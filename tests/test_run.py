@@ -114,6 +114,7 @@ def test_folder_holds_nothing_of_an_earlier_run(scenario, tmp_path):
         ({}, ["--parameters", "nowhere.ssv"], "no such parameter set"),
         ({}, ["--realtime", "-1"], "positive number"),
         ({}, ["--outt", "x"], "unrecognized"),
+        ({}, ["--out", ""], "needs the name of a folder"),
         ({"log": {"signals": ["vessel.x_n"]}}, [], "did you mean 'x_m'"),
     ],
 )
@@ -271,6 +272,10 @@ def test_empty_parameter_set_is_valid(scenario, tmp_path):
         (SSV.format(parameter("vessel.delta_X_uu_", 1.0)), "does not exist; did you mean"),
         (SSV.format(parameter("vessel.m", -1.0)), "is below its minimum"),
         (SSV.format(parameter("vessel.delta_X_u", "nan")), "has no number"),
+        (SSV.format(parameter("vessel.delta_X_u", "1_000")), "has no number"),
+        (SSV.format(2 * parameter("vessel.delta_X_u", 1.0)), "stands there twice"),
+        (SSV.format(parameter("vessel.X_u", '1.0" unit="kN.s/m')), "but the FMU's unit is 'N.s/m'"),
+        (SSV.format("").replace("UTF-8", "foo"), "cannot be read as a parameter set"),
     ],
 )
 def test_wrong_parameter_set_is_refused(scenario, tmp_path, text, message):
@@ -330,3 +335,30 @@ def test_master_never_imports_the_physics():
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_reader_that_goes_away_is_no_error(scenario, tmp_path):
+    code = f"{sys.executable} -m cosim.run {scenario()} --out {tmp_path / 'out'} --no-plots | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.stdout.strip() == "0"
+    assert done.stderr == ""
+
+
+def test_full_disk_is_one_message(scenario, tmp_path):
+    """Not /dev/full: the log lies in a folder. A file size limit does the same."""
+    code = f"ulimit -f 400; exec {sys.executable} -m cosim.run {scenario(stop=9.0)} --out {tmp_path / 'out'} --no-plots --quiet"
+    done = subprocess.run(["bash", "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.returncode == 3
+    assert "Traceback" not in done.stderr
+    assert len(cosim.read_log(tmp_path / "out")["time"]) > 10
+    assert not list((tmp_path / "out").glob(".*"))
+
+
+def test_metrics_never_overwrite_the_log(scenario, tmp_path):
+    command(scenario(), "--out", tmp_path / "out", "--no-plots")
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim.metrics", str(tmp_path / "out"), "--out", str(tmp_path / "out" / "log.csv")],
+        capture_output=True, text=True, cwd=ROOT, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "is the log itself" in done.stderr

@@ -36,7 +36,7 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
     ("change", "message"),
     [
         ({"stopp": 1.0}, "stopp: unknown key; did you mean 'stop'?"),
-        ({"step": 0.0}, "step: Input should be greater than 0"),
+        ({"step": 0.0}, "step: Input should be greater than or equal to"),
         ({"step": "fast"}, "step: "),
         ({"stop": 2.005}, "stop = 2.005 s is not a multiple of step = 0.01 s"),
         ({"stop": float("inf")}, "stop: "),
@@ -45,6 +45,12 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
         ({"name": "a/b"}, "name: cannot be the name of a folder"),
         ({"name": ".."}, "name: cannot be the name of a folder"),
         ({"name": ""}, "name: "),
+        ({"fmus": {"a": {"path": "--list"}}}, "fmus.a.path: '--list' is not the name of an .fmu file"),
+        ({"fmus": {"a": {"path": "x\0.fmu"}}}, "is not the name of an .fmu file"),
+        ({"fmus": {"a": {"path": "x" * 5000 + ".fmu"}}}, "is not the name of an .fmu file"),
+        ({"fmus": {"a": {"path": "vessel.fmu", "parameters": {"X_u": 10**400}}}}, "fmus.a.parameters.X_u"),
+        ({"fmus": {"a": {"path": "vessel.fmu", "step": 5.0}}}, "longer than the whole run"),
+        ({"stop": 1e300, "step": 1e-5}, "stop"),
         ({"fmus": {"my.vessel": {"path": "vessel.fmu"}}}, "'my.vessel' cannot be an instance"),
         ({"fmus": {}}, "fmus: "),
         ({"connections": [["vessel.x_m"]]}, "connections[0]"),
@@ -86,6 +92,10 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
         (
             {"events": [{"time": 1.0, "model": "vessel", "variable": "X_u", "action": "overide", "value": 1}]},
             "events[0].action: ",
+        ),
+        (
+            {"events": [{"time": 1.0, "model": "thrusters", "variable": "F_bow", "action": "bias", "value": -100.0}]},
+            "thrusters.F_bow = -97.371 is below its minimum",
         ),
         (
             {"faults": [{"kind": "bias", "signals": ["vessel.X_u"], "value": 1.0}]},
@@ -196,6 +206,9 @@ def test_group_connects_all_that_agree(ellipse):
         ("bad.json", "{", "is not JSON"),
         ("list.json", "[]", "the content: "),
         ("twice.json", '{"name": "a", "step": 1, "step": 2}', "the key 'step' stands twice"),
+        ("deep.json", "[" * 100000, "cannot be read"),
+        ("digits.json", '{"stop": 1' + "0" * 5000 + "}", "cannot be read"),
+        ("surrogate.json", '{"name": "a", "description": "\\ud800"}', "cannot be read"),
         ("nan.json", '{"name": "a", "step": NaN, "stop": 1, "fmus": {"a": {"path": "b"}}}', "step: "),
         ("folder/", None, "no such scenario"),
         ("latin.json", b"\xff\xfe{}", "cannot be read"),

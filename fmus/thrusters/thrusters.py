@@ -8,19 +8,24 @@ zero.
 
 from typing import Annotated, NamedTuple
 
-from ..declare import POSITIVE, Component
+from ..declare import POSITIVE, Component, Range
 from ..hull import Triple
 from ..ops import Number, clip, finite
 from ..signals import Force, Velocity
+
+# The allocation divides by forces and by the distance between the thrusters.
+DIVISOR = Range(min=0.01)
+AFT = Range(max=-0.01)
+FORE = Range(min=0.01)
 
 
 class Allocation(NamedTuple):
     """What the allocation believes of the thrusters."""
 
-    F_vsp: Annotated[float, "N", "force per unit of VSP command", POSITIVE] = 1.165
-    F_bow: Annotated[float, "N", "force per unit of bow command", POSITIVE] = 2.629
-    l_vsp: Annotated[float, "m", "VSP position forward of the body origin"] = -0.4575
-    l_bow: Annotated[float, "m", "bow thruster position forward of the body origin"] = 0.3875
+    F_vsp: Annotated[float, "N", "force per unit of VSP command", DIVISOR] = 1.165
+    F_bow: Annotated[float, "N", "force per unit of bow command", DIVISOR] = 2.629
+    l_vsp: Annotated[float, "m", "VSP position forward of the body origin", AFT] = -0.4575
+    l_bow: Annotated[float, "m", "bow thruster position forward of the body origin", FORE] = 0.3875
     p_x: Annotated[float, "m", "assumed point of attack, forward"] = 0.0
     p_y: Annotated[float, "m", "assumed point of attack, to starboard"] = 0.0
 
