@@ -152,14 +152,14 @@ class Noise(Fault):
         return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        pairs = list(zip(slots, _each(self.std, len(slots)), strict=True))
-        drawn: list[float] = []
+        std = np.array(_each(self.std, len(slots)))
+        drawn: list[list[float]] = []
 
         def effect(values: Values, t: float) -> None:
             if not drawn:
-                drawn.extend(rng.standard_normal(1024 * len(pairs)).tolist())
-            for slot, std in pairs:
-                values[slot] += std * drawn.pop()
+                drawn.extend((std * rng.standard_normal((1024, len(slots)))).tolist())
+            for slot, error in zip(slots, drawn.pop(), strict=True):
+                values[slot] += error
 
         return effect
 

@@ -84,88 +84,85 @@ class Table:
         self.row = np.asarray(self.values)
 
 
-class Access:
-    """Get or set of some variables of one FMU, laid out once.
+def make_access(
+    instance: Instance, signals: Sequence[Signal], table: Table, setting: bool
+) -> Callable[[], None]:
+    """A function that sets or gets some variables of one FMU.
 
-    Reals pass directly between the FMU and the table; other types through a buffer of their own.
+    Reals pass directly between the FMU and the table, in one call; other types through buffers.
+
+    Args:
+        instance: whose variables.
+        signals: which; the Reals among them stand side by side in the table.
+        table: where the values are.
+        setting: whether to set, not get.
     """
+    calls: list[Callable[[], None]] = []
+    reals = [s for s in signals if s.variable.type == "Real"]
+    if reals:
+        address = table.address + 8 * table.slots[reals[0].name]
+        calls.append(_vector_call(instance, "fmi2SetReal" if setting else "fmi2GetReal", reals, address))
+    for kind in _SETTERS:
+        others = [s for s in signals if s.variable.type == kind]
+        if others:
+            calls.append(_buffered_call(instance, kind, others, table, setting))
+    if len(calls) == 1:
+        return calls[0]
 
-    def __init__(
-        self, instance: Instance, signals: Sequence[Signal], table: Table, setting: bool
-    ) -> None:
-        self._instance = instance
-        self._setting = setting
-        reals = [s for s in signals if s.variable.type == "Real"]
-        self._what = "fmi2SetReal" if setting else "fmi2GetReal"
-        self.real: Callable[..., int] | None = None
-        if reals:
-            self._references = (ctypes.c_uint * len(reals))(*[s.variable.reference for s in reals])
-            self.real = instance.function(self._what, *_ACCESS)
-            self.arguments = (
-                instance.component,
-                ctypes.addressof(self._references),
-                len(reals),
-                table.address + 8 * table.slots[reals[0].name],
-            )
-        self._others = [
-            _Buffered(instance, kind, [s for s in signals if s.variable.type == kind], table, setting)
-            for kind in _SETTERS
-            if any(s.variable.type == kind for s in signals)
-        ]
+    def access() -> None:
+        for call in calls:
+            call()
 
-    def __call__(self) -> None:
-        if self.real is not None:
-            self._instance.check(self._what, self.real(*self.arguments))
-        for other in self._others:
-            other()
-
-    def __bool__(self) -> bool:
-        return self.real is not None or bool(self._others)
-
-    @property
-    def only_reals(self) -> bool:
-        return self.real is not None and not self._others
+    return access
 
 
-class _Buffered:
-    """Access to variables that are not Real: whole numbers, converted on the way."""
+def _vector_call(
+    instance: Instance, what: str, signals: Sequence[Signal], address: int
+) -> Callable[[], None]:
+    """One vector get or set between an FMU and a memory."""
+    references = (ctypes.c_uint * len(signals))(*[s.variable.reference for s in signals])
+    function = instance.function(what, *_ACCESS)
+    component, count, start = instance.component, len(signals), ctypes.addressof(references)
 
-    def __init__(
-        self, instance: Instance, kind: str, signals: Sequence[Signal], table: Table, setting: bool
-    ) -> None:
-        setter, getter, c_type = _SETTERS[kind]
-        self._instance = instance
-        self._what = setter if setting else getter
-        self._setting = setting
-        self._references = (ctypes.c_uint * len(signals))(*[s.variable.reference for s in signals])
-        self._buffer = (c_type * len(signals))()
-        self._slots = [table.slots[s.name] for s in signals]
-        self._values = table.values
-        self._function = instance.function(self._what, *_ACCESS)
-        self._arguments = (
-            instance.component,
-            ctypes.addressof(self._references),
-            len(signals),
-            ctypes.addressof(self._buffer),
-        )
+    # The default argument keeps the references alive: the FMU only sees their address.
+    def call(_: object = references) -> None:
+        status = function(component, start, count, address)
+        if status >= DISCARD:
+            instance.check(what, status)
 
-    def __call__(self) -> None:
-        if self._setting:
-            for k, slot in enumerate(self._slots):
-                value = self._values[slot]
-                if not abs(value) < INT_LIMIT:
-                    raise SimulationError(f"{self._instance.name}: {value} is not a 32-bit number")
-                self._buffer[k] = round(value)
-        self._instance.check(self._what, self._function(*self._arguments))
-        if not self._setting:
-            for k, slot in enumerate(self._slots):
-                self._values[slot] = float(self._buffer[k])
+    return call
+
+
+def _buffered_call(
+    instance: Instance, kind: str, signals: Sequence[Signal], table: Table, setting: bool
+) -> Callable[[], None]:
+    """The same for variables that are not Real: whole numbers, converted on the way."""
+    setter, getter, c_type = _SETTERS[kind]
+    buffer = (c_type * len(signals))()
+    slots = [table.slots[s.name] for s in signals]
+    values = table.values
+    call = _vector_call(instance, setter if setting else getter, signals, ctypes.addressof(buffer))
+
+    def set_() -> None:
+        for k, slot in enumerate(slots):
+            if not abs(values[slot]) < INT_LIMIT:
+                raise SimulationError(f"{signals[k].name} = {values[slot]} is not a 32-bit number")
+            buffer[k] = round(values[slot])
+        call()
+
+    def get() -> None:
+        call()
+        for k, slot in enumerate(slots):
+            values[slot] = float(buffer[k])
+
+    return set_ if setting else get
 
 
 class Changes:
     """Events that act on the signals of one side of one instance: override, bias, hold."""
 
     def __init__(self, values: memoryview[float]) -> None:
+        self.active = False
         self._values = values
         self._fixed: dict[int, float] = {}
         self._added: dict[int, float] = {}
@@ -185,100 +182,101 @@ class Changes:
         else:
             held = self._values[slot] if event.action == "hold" else float(event.value or 0.0)
             self._fixed[slot] = held
-
-    def __bool__(self) -> bool:
-        return bool(self._fixed or self._added)
+        self.active = bool(self._fixed or self._added)
 
 
 class Stepper:
-    """One FMU in the loop: takes its inputs from the table, steps, puts its outputs there."""
+    """One FMU in the loop: takes its inputs from the table, steps, puts its outputs there.
 
-    def __init__(
-        self,
-        system: System,
-        instance: Instance,
-        table: Table,
-        settable: set[str],
-    ) -> None:
+    Attributes:
+        exchange: ``exchange(t, faulty=True)`` brings the newest values to the FMU's inputs; they belong
+            to time t.
+        read: ``read(t, faulty=True)`` brings its outputs to the table.
+        advance: ``advance(t)`` steps from t, and reads.
+    """
+
+    def __init__(self, system: System, instance: Instance, table: Table, settable: set[str]) -> None:
         self.instance = instance
         self.every = system.every[instance.name]
         self.step_size = self.every * system.scenario.step
-        self._table = table
-        own = [s for s in table.signals if s.instance == instance.name]
-        self.set = Access(instance, [s for s in own if s.name in settable], table, setting=True)
-        self._inputs = [s for s in own if s.variable.causality == "input"]
-        self.got = [s for s in own if s.variable.causality != "input"]
-        self.get = Access(instance, self.got, table, setting=False)
-        self._do_step = instance.function("fmi2DoStep", *_STEP)
-        incoming = [c for c in system.connections if c.target.instance == instance.name]
-        self._copies, self._runs, self._conversions = _transfers(incoming, table)
-        # Inputs without a source that events may change, and the values to return to.
-        sourced = {c.target.name for c in incoming}
-        free = [s for s in own if s.name in settable and s.name not in sourced]
-        self._free: list[tuple[int, Signal]] = [(table.slots[s.name], s) for s in free]
-        self._constants: list[tuple[int, float]] = []
-        self._special = bool(self._free or self._conversions)
         self.input_faults: list[Effect] = []
         self.output_faults: list[Effect] = []
         self.input_changes = Changes(table.values)
         self.output_changes = Changes(table.values)
+        own = [s for s in table.signals if s.instance == instance.name]
+        incoming = [c for c in system.connections if c.target.instance == instance.name]
+        sourced = {c.target.name for c in incoming}
+        self.got = [s for s in own if s.variable.causality != "input"]
+        self._table = table
+        self._inputs = [s for s in own if s.variable.causality == "input"]
+        # Inputs without a source that events may change, and the values that they return to.
+        self._free = [s for s in own if s.name in settable and s.name not in sourced]
+        self._constants: list[tuple[int, float]] = []
+        self.exchange = self._make_exchange(incoming, [s for s in own if s.name in settable])
+        self.read, self.advance = self._make_read_and_advance()
 
     def read_inputs(self) -> None:
         """Take the start values of all inputs from the FMU."""
+        values, slots = self._table.values, self._table.slots
         for signal in self._inputs:
-            self._table.values[self._table.slots[signal.name]] = self.instance.get_value(signal.variable)
-        self._constants = [(slot, self._table.values[slot]) for slot, _ in self._free]
+            values[slots[signal.name]] = self.instance.get_value(signal.variable)
+        self._constants[:] = [(slots[s.name], values[slots[s.name]]) for s in self._free]
 
-    def exchange(self, t: float, faulty: bool = True) -> None:
-        """Bring the newest values to the FMU's inputs; t is the time that they belong to."""
+    # The three functions that run every step keep what they need in their own scope, where Python finds
+    # it fastest.
+
+    def _make_exchange(
+        self, incoming: Sequence[Connection], settable: Sequence[Signal]
+    ) -> Callable[..., None]:
         values = self._table.values
-        for target, source in self._copies:
-            values[target] = values[source]
-        for target, target_end, source, source_end in self._runs:
-            values[target:target_end] = values[source:source_end]
-        if self._special or self.input_faults or self.input_changes:
-            self._exchange_special(t, faulty)
-        access = self.set
-        if access.only_reals:
-            status = access.real(*access.arguments)  # pyright: ignore[reportOptionalCall]
+        copies, runs, conversions = _transfers(incoming, self._table)
+        set_ = make_access(self.instance, settable, self._table, setting=True)
+        faults, changes, constants = self.input_faults, self.input_changes, self._constants
+
+        def special(t: float, faulty: bool) -> None:
+            for target, value in constants:
+                values[target] = value
+            for target, source, factor, offset in conversions:
+                values[target] = factor * values[source] + offset
+            if faulty:
+                for fault in faults:
+                    fault(values, t)
+            changes.apply()
+
+        def exchange(t: float, faulty: bool = True) -> None:
+            for target, source in copies:
+                values[target] = values[source]
+            for target, target_end, source, source_end in runs:
+                values[target:target_end] = values[source:source_end]
+            if faults or conversions or constants or changes.active:
+                special(t, faulty)
+            set_()
+
+        return exchange
+
+    def _make_read_and_advance(self) -> tuple[Callable[..., None], Callable[[float], None]]:
+        instance, h, values = self.instance, self.step_size, self._table.values
+        get = make_access(instance, self.got, self._table, setting=False)
+        component, do_step = instance.component, instance.function("fmi2DoStep", *_STEP)
+        faults, changes = self.output_faults, self.output_changes
+
+        def read(t: float, faulty: bool = True) -> None:
+            get()
+            if faulty:
+                for fault in faults:
+                    fault(values, t)
+            changes.apply()
+
+        def advance(t: float) -> None:
+            status = do_step(component, t, h, 1)
             if status >= DISCARD:
-                self.instance.check("fmi2SetReal", status)
-        elif access:
-            access()
+                instance.check(f"the step from t = {t} s", status)
+            if faults or changes.active:
+                read(t + h)
+            else:
+                get()
 
-    def _exchange_special(self, t: float, faulty: bool) -> None:
-        """What few FMUs need: constants, conversions, faults, events."""
-        values = self._table.values
-        for target, value in self._constants:
-            values[target] = value
-        for target, source, factor, offset in self._conversions:
-            values[target] = factor * values[source] + offset
-        if faulty:
-            for fault in self.input_faults:
-                fault(values, t)
-        self.input_changes.apply()
-
-    def advance(self, t: float) -> None:
-        """Step from t and bring the outputs to the table."""
-        status = self._do_step(self.instance.component, t, self.step_size, 1)
-        if status >= DISCARD:
-            self.instance.check(f"the step from t = {t} s", status)
-        self.read(t + self.step_size)
-
-    def read(self, t: float, faulty: bool = True) -> None:
-        """Bring the FMU's outputs to the table."""
-        access = self.get
-        if access.only_reals:
-            status = access.real(*access.arguments)  # pyright: ignore[reportOptionalCall]
-            if status >= DISCARD:
-                self.instance.check("fmi2GetReal", status)
-        elif access:
-            access()
-        if faulty:
-            for fault in self.output_faults:
-                fault(self._table.values, t)
-        if self.output_changes:
-            self.output_changes.apply()
+        return read, advance
 
 
 def _transfers(
@@ -416,15 +414,15 @@ class Master:
         """Time of base step k [s]: counted, never accumulated."""
         return round(k * self.system.scenario.step, 12)
 
-    def run(self) -> Iterator[int]:
-        """Step to the end; yields the number of base steps done, after each.
+    def run(self) -> Iterator[float]:
+        """Step to the end; yields the time [s] after each base step.
 
         Raises:
             SimulationError: an FMU returned an error, or an output is not finite.
         """
         one_by_one = self.system.scenario.algorithm == "gauss_seidel"
-        steppers = due = self._steppers
-        multirate = any(s.every > 1 for s in steppers)
+        everyone = due = [(s.exchange, s.advance, s.every) for s in self._steppers]
+        multirate = any(every > 1 for _, _, every in everyone)
         time = self.time
         events = self._events
         t = 0.0
@@ -434,18 +432,18 @@ class Master:
             t_next = time(k)
             if multirate:
                 # An FMU steps when its own time is full, with inputs of the end of its step.
-                due = [s for s in steppers if k % s.every == 0]
+                due = [one for one in everyone if k % one[2] == 0]
             if one_by_one:
-                for stepper in due:
-                    stepper.exchange(t_next)
-                    stepper.advance(t if stepper.every == 1 else time(k - stepper.every))
+                for exchange, advance, every in due:
+                    exchange(t_next)
+                    advance(t if every == 1 else time(k - every))
             else:
-                for stepper in due:
-                    stepper.exchange(t)
-                for stepper in due:
-                    stepper.advance(t if stepper.every == 1 else time(k - stepper.every))
+                for exchange, _, _ in due:
+                    exchange(t)
+                for _, advance, every in due:
+                    advance(t if every == 1 else time(k - every))
             t = t_next
-            yield k
+            yield t
 
     @property
     def outputs(self) -> list[str]:
@@ -466,10 +464,17 @@ class Master:
 
 @contextmanager
 def quiet_collector() -> Iterator[None]:
-    """What exists now is not looked through again by the garbage collector while stepping."""
+    """No garbage collection while stepping, but where the caller asks for it.
+
+    What exists now is not looked through again, so that asking is cheap.
+    """
+    was_enabled = gc.isenabled()
     gc.collect()
     gc.freeze()
+    gc.disable()
     try:
         yield
     finally:
         gc.unfreeze()
+        if was_enabled:
+            gc.enable()

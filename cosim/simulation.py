@@ -1,5 +1,6 @@
 """Run a checked scenario: step, record, look up now and then, and leave a tidy folder."""
 
+import gc
 import importlib.metadata
 import math
 import signal
@@ -114,10 +115,10 @@ class Recorder:
 
     def take(self, t: float) -> bool:
         """Remember the table as it is at t; returns whether it is time to flush."""
-        times = self._times
-        self._taken[len(times)] = self._row
-        times.append(t)
-        return len(times) == BLOCK
+        count = len(self._times)
+        self._taken[count] = self._row
+        self._times.append(t)
+        return count == BLOCK - 1
 
     def flush(self) -> None:
         """Write what has been taken.
@@ -311,25 +312,28 @@ def _loop(
 ) -> bool:
     """Step, record, and look up now and then; returns whether the user stopped it."""
     recorder.take(0.0)
-    look, interval = 1, 1
+    take = recorder.take
+    left = interval = 1  # steps to the next look at the clock
     glance = flushed = time.perf_counter()
-    for k in master.run():
-        t = master.time(k)
-        full = recorder.take(t)
+    for t in master.run():
+        full = take(t)
         if pace is not None:
             pace.wait(t)
-        if k >= look or full:
-            now = time.perf_counter()
-            if full or now - flushed > ATTENTION:
-                recorder.flush()
-                progress(t)
-                flushed = now
-            if interrupted():
-                recorder.flush()
-                return True
-            # Quick steps need no look at the clock after each of them.
-            interval = min(2 * interval, BLOCK // 8) if now - glance < 0.1 * ATTENTION else 1
-            glance, look = now, k + interval
+        left -= 1
+        if left and not full:
+            continue
+        now = time.perf_counter()
+        if full or now - flushed > ATTENTION:
+            recorder.flush()
+            gc.collect()
+            progress(t)
+            flushed = now
+        if interrupted():
+            recorder.flush()
+            return True
+        # Quick steps need no look at the clock after each of them.
+        interval = min(2 * interval, BLOCK // 8) if now - glance < 0.1 * ATTENTION else 1
+        glance, left = now, interval
     recorder.flush()
     progress(system.scenario.stop)
     return False

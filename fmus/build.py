@@ -21,7 +21,8 @@ import sys
 import tempfile
 import traceback
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock
@@ -315,8 +316,26 @@ def _pack(component: Component, module: str, own_file: Path | None, work: Path) 
             version=importlib.metadata.version("cybership"),
         )
     )
-    raw = FmuBuilder.build_FMU(script, dest=work / "raw", project_files=[work / package])
+    with _own_imports(package, script.stem):
+        raw = FmuBuilder.build_FMU(script, dest=work / "raw", project_files=[work / package])
     return _repeatable(Path(raw), work / f"{component.name}.fmu")
+
+
+@contextmanager
+def _own_imports(*names: str) -> Iterator[None]:
+    """pythonfmu imports what it packs: neither from an FMU that has run here, nor for the next build."""
+
+    def forget() -> None:
+        for module in [m for m in sys.modules if m.partition(".")[0] in names]:
+            del sys.modules[module]
+
+    path = list(sys.path)
+    forget()
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        forget()
 
 
 def _repeatable(raw: Path, fmu: Path) -> Path:

@@ -40,7 +40,8 @@ class Slave(Fmi2Slave):
         self._fixed = {k for k, v in enumerate(c.variables) if v.fixed}
         bounds = (0, width(c.params), width(c.params) + width(c.inputs), len(self._values))
         self._slices = [slice(a, b) for a, b in pairwise(bounds)]
-        self._packers = [packer(c.params), packer(c.inputs)]
+        self._all_inputs = list(range(bounds[1], bounds[2]))
+        self._pack_params, self._pack_inputs = packer(c.params), packer(c.inputs)
         self._params: Any = None
         self._state: Any = None
         self._initialising = True
@@ -54,20 +55,25 @@ class Slave(Fmi2Slave):
         return model_description(self.component, guid, self.code_version)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        first_input, first_output = self._slices[1].start, self._slices[1].stop
-        hold = self.component.hold_nonfinite
-        for vr, value in zip(vrs, values, strict=True):
-            if first_input <= vr < first_output:
-                if hold and value - value != 0.0:
-                    self._warn(f"input {self._names[vr]} is {value}; it keeps its last value")
-                else:
-                    self._values[vr] = value
-            elif 0 <= vr < first_input:
-                self._set_parameter(vr, value)
-            else:
-                self._warn(f"value reference {vr} cannot be set")
+        if vrs == self._all_inputs and all(map(isfinite, values)):
+            self._values[self._slices[1]] = values  # what a master does in every step
+        else:
+            for vr, value in zip(vrs, values, strict=True):
+                self._set(vr, value)
         if self._initialising:
             self._stale = True
+
+    def _set(self, vr: int, value: float) -> None:
+        inputs = self._slices[1]
+        if inputs.start <= vr < inputs.stop:
+            if self.component.hold_nonfinite and not isfinite(value):
+                self._warn(f"input {self._names[vr]} is {value}; it keeps its last value")
+            else:
+                self._values[vr] = value
+        elif 0 <= vr < inputs.start:
+            self._set_parameter(vr, value)
+        else:
+            self._warn(f"value reference {vr} cannot be set")
 
     def _set_parameter(self, vr: int, value: float) -> None:
         if not isfinite(value):
@@ -90,8 +96,8 @@ class Slave(Fmi2Slave):
     def _arguments(self) -> tuple[Any, Any]:
         """Inputs and parameters as the component wants them."""
         if self._params is None:
-            self._params = self._packers[0](self._values[self._slices[0]])
-        return self._packers[1](self._values[self._slices[1]]), self._params
+            self._params = self._pack_params(self._values[self._slices[0]])
+        return self._pack_inputs(self._values[self._slices[1]]), self._params
 
     def _initialise(self) -> None:
         """State and outputs that follow from the present inputs and parameters."""
@@ -120,8 +126,7 @@ class Slave(Fmi2Slave):
         except Exception as error:
             self.log(f"step at t = {current_time} s failed: {error!r}", Fmi2Status.error)
             return False
-        # A finite sum of zero multiples means that every output is finite.
-        if sum([0.0 * value for value in flat]) != 0.0:
+        if not all(map(isfinite, flat)):
             bad = [n for n, x in zip(self._names[self._slices[2]], flat, strict=True) if not isfinite(x)]
             self.log(
                 f"step at t = {current_time} s failed: {', '.join(bad)} not finite", Fmi2Status.error
