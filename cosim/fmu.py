@@ -294,15 +294,15 @@ class Instance:
             why = f": {self.complaint}" if self.complaint else ""
             raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{why}")
 
-    def function(self, name: str, *argument_types: Any) -> Callable[..., int]:
-        """An FMI function of the library as a fast callable that returns a status."""
+    def function(self, name: str) -> Callable[..., int]:
+        """An FMI function of the library; its arguments must be ctypes values."""
         kind = ctypes.PYFUNCTYPE if self._keep_lock else ctypes.CFUNCTYPE
         try:
             address = ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value
         except AttributeError:
             raise InputError(f"'{self.model.path}' does not export {name}") from None
         assert address is not None
-        return kind(ctypes.c_int, *argument_types)(address)
+        return kind(ctypes.c_int)(address)
 
     def call(self, what: str, action: Callable[[], Any]) -> None:
         """Run a step of the life cycle; an FMU that refuses it ends the run."""

@@ -12,11 +12,13 @@ import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from .errors import SimulationError
-from .faults import EARLY, Effect
+from .faults import EARLY, Effect, Values
 from .fmu import DISCARD, Instance, Variable
 from .scenario import Event
 from .system import INT_LIMIT, Connection, Signal, System
@@ -26,8 +28,6 @@ _SETTERS = {
     "Enumeration": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
     "Boolean": ("fmi2SetBoolean", "fmi2GetBoolean", ctypes.c_int),
 }
-_ACCESS = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
-_STEP = (ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 
 
 @dataclass
@@ -84,10 +84,14 @@ class Table:
         self.row = np.asarray(self.values)
 
 
+# A function and its arguments, converted for C once and for all; returns an FMI status.
+Call = tuple[Callable[..., int], tuple[Any, ...]]
+
+
 def make_access(
     instance: Instance, signals: Sequence[Signal], table: Table, setting: bool
-) -> Callable[[], None]:
-    """A function that sets or gets some variables of one FMU.
+) -> list[Call]:
+    """Calls that set or get some variables of one FMU.
 
     Reals pass directly between the FMU and the table, in one call; other types through buffers.
 
@@ -97,7 +101,7 @@ def make_access(
         table: where the values are.
         setting: whether to set, not get.
     """
-    calls: list[Callable[[], None]] = []
+    calls: list[Call] = []
     reals = [s for s in signals if s.variable.type == "Real"]
     if reals:
         address = table.address + 8 * table.slots[reals[0].name]
@@ -105,75 +109,71 @@ def make_access(
     for kind in _SETTERS:
         others = [s for s in signals if s.variable.type == kind]
         if others:
-            calls.append(_buffered_call(instance, kind, others, table, setting))
-    if len(calls) == 1:
-        return calls[0]
-
-    def access() -> None:
-        for call in calls:
-            call()
-
-    return access
+            calls.append((_buffered_call(instance, kind, others, table, setting), ()))
+    return calls
 
 
-def _vector_call(
-    instance: Instance, what: str, signals: Sequence[Signal], address: int
-) -> Callable[[], None]:
+def _vector_call(instance: Instance, what: str, signals: Sequence[Signal], address: int) -> Call:
     """One vector get or set between an FMU and a memory."""
     references = (ctypes.c_uint * len(signals))(*[s.variable.reference for s in signals])
-    function = instance.function(what, *_ACCESS)
-    component, count, start = instance.component, len(signals), ctypes.addressof(references)
-
-    # The default argument keeps the references alive: the FMU only sees their address.
-    def call(_: object = references) -> None:
-        status = function(component, start, count, address)
-        if status >= DISCARD:
-            instance.check(what, status)
-
-    return call
+    return instance.function(what), (
+        ctypes.c_void_p.from_param(instance.component),
+        ctypes.byref(references),
+        ctypes.c_size_t.from_param(len(signals)),
+        ctypes.c_void_p.from_param(address),
+    )
 
 
 def _buffered_call(
     instance: Instance, kind: str, signals: Sequence[Signal], table: Table, setting: bool
-) -> Callable[[], None]:
+) -> Callable[[], int]:
     """The same for variables that are not Real: whole numbers, converted on the way."""
     setter, getter, c_type = _SETTERS[kind]
     buffer = (c_type * len(signals))()
     slots = [table.slots[s.name] for s in signals]
     values = table.values
-    call = _vector_call(instance, setter if setting else getter, signals, ctypes.addressof(buffer))
+    what = setter if setting else getter
+    function, arguments = _vector_call(instance, what, signals, ctypes.addressof(buffer))
 
-    def set_() -> None:
+    def set_() -> int:
         for k, slot in enumerate(slots):
             if not abs(values[slot]) < INT_LIMIT:
                 raise SimulationError(f"{signals[k].name} = {values[slot]} is not a 32-bit number")
             buffer[k] = round(values[slot])
-        call()
+        return function(*arguments)
 
-    def get() -> None:
-        call()
+    def get() -> int:
+        status = function(*arguments)
         for k, slot in enumerate(slots):
             values[slot] = float(buffer[k])
+        return status
 
     return set_ if setting else get
 
 
 class Changes:
-    """Events that act on the signals of one side of one instance: override, bias, hold."""
+    """Events that act on the signals of one side of one instance: override, bias, hold.
 
-    def __init__(self, values: memoryview[float]) -> None:
-        self.active = False
+    Args:
+        values: the table.
+        effects: what acts on these signals; the changes join it, as the last, when the first one begins.
+    """
+
+    def __init__(self, values: memoryview[float], effects: list[Effect]) -> None:
         self._values = values
+        self._effects = effects
         self._fixed: dict[int, float] = {}
         self._added: dict[int, float] = {}
 
-    def apply(self) -> None:
+    def _apply(self, values: Values, t: float) -> None:
         for slot, value in self._added.items():
-            self._values[slot] += value
+            values[slot] += value
         for slot, value in self._fixed.items():
-            self._values[slot] = value
+            values[slot] = value
 
     def begin(self, slot: int, event: Event) -> None:
+        if self._apply not in self._effects:
+            self._effects.append(self._apply)
         if event.action == "reset":
             self._fixed.pop(slot, None)
             self._added.pop(slot, None)
@@ -182,101 +182,114 @@ class Changes:
         else:
             held = self._values[slot] if event.action == "hold" else float(event.value or 0.0)
             self._fixed[slot] = held
-        self.active = bool(self._fixed or self._added)
 
 
 class Stepper:
     """One FMU in the loop: takes its inputs from the table, steps, puts its outputs there.
 
     Attributes:
-        exchange: ``exchange(t, faulty=True)`` brings the newest values to the FMU's inputs; they belong
-            to time t.
-        read: ``read(t, faulty=True)`` brings its outputs to the table.
+        exchange: ``exchange(t)`` brings the newest values, which belong to time t, to the FMU's inputs.
+        read: ``read(t)`` brings its outputs to the table.
         advance: ``advance(t)`` steps from t, and reads.
+        input_effects, output_effects: act on the values on their way, in this order.
     """
 
     def __init__(self, system: System, instance: Instance, table: Table, settable: set[str]) -> None:
         self.instance = instance
         self.every = system.every[instance.name]
         self.step_size = self.every * system.scenario.step
-        self.input_faults: list[Effect] = []
-        self.output_faults: list[Effect] = []
-        self.input_changes = Changes(table.values)
-        self.output_changes = Changes(table.values)
+        self.input_effects: list[Effect] = []
+        self.output_effects: list[Effect] = []
+        self.input_changes = Changes(table.values, self.input_effects)
+        self.output_changes = Changes(table.values, self.output_effects)
         own = [s for s in table.signals if s.instance == instance.name]
         incoming = [c for c in system.connections if c.target.instance == instance.name]
         sourced = {c.target.name for c in incoming}
         self.got = [s for s in own if s.variable.causality != "input"]
         self._table = table
         self._inputs = [s for s in own if s.variable.causality == "input"]
-        # Inputs without a source that events may change, and the values that they return to.
+        # Inputs without a source that events may change.
         self._free = [s for s in own if s.name in settable and s.name not in sourced]
-        self._constants: list[tuple[int, float]] = []
         self.exchange = self._make_exchange(incoming, [s for s in own if s.name in settable])
-        self.read, self.advance = self._make_read_and_advance()
+        self.read = self._make_read()
+        self.advance = self._make_advance()
 
     def read_inputs(self) -> None:
         """Take the start values of all inputs from the FMU."""
         values, slots = self._table.values, self._table.slots
         for signal in self._inputs:
             values[slots[signal.name]] = self.instance.get_value(signal.variable)
-        self._constants[:] = [(slots[s.name], values[slots[s.name]]) for s in self._free]
+        if self._free:
+            constants = [(slots[s.name], values[slots[s.name]]) for s in self._free]
+            self.input_effects.insert(0, partial(_restore, constants))
 
     # The three functions that run every step keep what they need in their own scope, where Python finds
     # it fastest.
 
     def _make_exchange(
         self, incoming: Sequence[Connection], settable: Sequence[Signal]
-    ) -> Callable[..., None]:
-        values = self._table.values
+    ) -> Callable[[float], None]:
+        instance, values, effects = self.instance, self._table.values, self.input_effects
         copies, runs, conversions = _transfers(incoming, self._table)
-        set_ = make_access(self.instance, settable, self._table, setting=True)
-        faults, changes, constants = self.input_faults, self.input_changes, self._constants
+        sets = make_access(instance, settable, self._table, setting=True)
+        if conversions:
+            effects.append(partial(_convert, conversions))
 
-        def special(t: float, faulty: bool) -> None:
-            for target, value in constants:
-                values[target] = value
-            for target, source, factor, offset in conversions:
-                values[target] = factor * values[source] + offset
-            if faulty:
-                for fault in faults:
-                    fault(values, t)
-            changes.apply()
-
-        def exchange(t: float, faulty: bool = True) -> None:
+        def exchange(t: float) -> None:
             for target, source in copies:
                 values[target] = values[source]
             for target, target_end, source, source_end in runs:
                 values[target:target_end] = values[source:source_end]
-            if faults or conversions or constants or changes.active:
-                special(t, faulty)
-            set_()
+            for effect in effects:
+                effect(values, t)
+            for function, arguments in sets:
+                if (status := function(*arguments)) >= DISCARD:
+                    instance.check("setting its inputs", status)
 
         return exchange
 
-    def _make_read_and_advance(self) -> tuple[Callable[..., None], Callable[[float], None]]:
-        instance, h, values = self.instance, self.step_size, self._table.values
-        get = make_access(instance, self.got, self._table, setting=False)
-        component, do_step = instance.component, instance.function("fmi2DoStep", *_STEP)
-        faults, changes = self.output_faults, self.output_changes
+    def _make_read(self) -> Callable[[float], None]:
+        instance, values, effects = self.instance, self._table.values, self.output_effects
+        gets = make_access(instance, self.got, self._table, setting=False)
 
-        def read(t: float, faulty: bool = True) -> None:
-            get()
-            if faulty:
-                for fault in faults:
-                    fault(values, t)
-            changes.apply()
+        def read(t: float) -> None:
+            for function, arguments in gets:
+                if (status := function(*arguments)) >= DISCARD:
+                    instance.check("getting its outputs", status)
+            for effect in effects:
+                effect(values, t)
+
+        return read
+
+    def _make_advance(self) -> Callable[[float], None]:
+        instance, h, read = self.instance, self.step_size, self.read
+        do_step, now = instance.function("fmi2DoStep"), ctypes.c_double()
+        arguments = (
+            ctypes.c_void_p.from_param(instance.component),
+            now,
+            ctypes.c_double.from_param(h),
+            ctypes.c_int.from_param(1),
+        )
 
         def advance(t: float) -> None:
-            status = do_step(component, t, h, 1)
-            if status >= DISCARD:
+            now.value = t
+            if (status := do_step(*arguments)) >= DISCARD:
                 instance.check(f"the step from t = {t} s", status)
-            if faults or changes.active:
-                read(t + h)
-            else:
-                get()
+            read(t + h)
 
-        return read, advance
+        return advance
+
+
+def _restore(constants: Sequence[tuple[int, float]], values: Values, t: float) -> None:
+    """Inputs without a source return to their start values, from which events change them."""
+    for target, value in constants:
+        values[target] = value
+
+
+def _convert(conversions: Sequence[tuple[int, int, float, float]], values: Values, t: float) -> None:
+    """Connections between different units."""
+    for target, source, factor, offset in conversions:
+        values[target] = factor * values[source] + offset
 
 
 def _transfers(
@@ -336,7 +349,6 @@ class Master:
             self._steppers = [
                 Stepper(system, self._instances[name], self.table, settable) for name in system.order
             ]
-            self._bind_faults()
             self._originals: dict[str, float] = {}
             self._events = sorted(system.scenario.events, key=lambda e: e.time)
             self._initialise()
@@ -357,7 +369,7 @@ class Master:
             slots = [self.table.slots[s.name] for s in signals]
             effect = fault.bind(slots, stepper.step_size, np.random.default_rng(seed))
             is_input = signals[0].variable.causality == "input"
-            (stepper.input_faults if is_input else stepper.output_faults).append(effect)
+            (stepper.input_effects if is_input else stepper.output_effects).append(effect)
 
     def _initialise(self) -> None:
         system = self.system
@@ -372,10 +384,11 @@ class Master:
         for _ in self._steppers:
             before = self.table.row.copy()
             for stepper in self._steppers:
-                stepper.exchange(0.0, faulty=False)
-                stepper.read(0.0, faulty=False)
+                stepper.exchange(0.0)
+                stepper.read(0.0)
             if np.array_equal(before, self.table.row, equal_nan=True):
                 break
+        self._bind_faults()
         self._begin_events(0.0)
         for stepper in self._steppers:
             stepper.exchange(0.0)
