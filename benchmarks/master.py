@@ -459,7 +459,10 @@ def measure(steps: int, repeat: int) -> dict[str, Any]:
         plan = make_plan(work, steps)
         cases: dict[str, dict[str, Any]] = {case: {"runs": []} for case in CASES}
         for k in range(repeat):
-            for case, found in cases.items():
+            names = list(cases)
+            # Each round starts with another case: what ran before makes a difference.
+            for case in names[k % len(names) :] + names[: k % len(names)]:
+                found = cases[case]
                 print(f"\r{k + 1}/{repeat}  {CASES[case].label:40}", end="", file=sys.stderr, flush=True)
                 if "error" not in found:
                     result = run_apart(case, work, 60.0 + 0.01 * steps)

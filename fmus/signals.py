@@ -3,6 +3,10 @@
 from typing import Annotated, NamedTuple
 
 
+class Nothing(NamedTuple):
+    """The inputs of a component that has none."""
+
+
 class Measurement(NamedTuple):
     """Pose as the measurement system reports it, eta_m."""
 

@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 from conftest import COMPONENTS
 
+from fmus.declare import flatten, packer, variables
+
 GUIDANCE = [name for name in COMPONENTS if name.startswith("guidance_")]
 
 
 def follow(name, seconds, h=0.01, **parameters):
     """Rows of (time, target) along a path."""
     c = COMPONENTS[name]
-    p = c.params(**parameters)
+    names = [v.name for v in variables(c.params)]
+    p = packer(c.params)(
+        [parameters.pop(n, start) for n, start in zip(names, flatten(c.params()), strict=True)]
+    )
+    assert not parameters
     s = c.init(c.inputs(), p)
     rows = [c.step(s, c.inputs(), p, 0.0)[1]]
     for _ in range(round(seconds / h)):

@@ -1,30 +1,18 @@
-"""Guidance along an ellipse at constant speed, (4.39)-(4.40); no inputs.
-
-With ``calls`` = 4 it repeats the fault of the thesis' experiments: the path parameter is advanced four
-times in every step while each call believes that one step has passed, so the target runs at four
-times the speed that its own derivatives state.
-"""
+"""Guidance along an ellipse at constant speed, (4.39)-(4.40); no inputs."""
 
 from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import Component, Range
 from ..ops import Number, cos, sin, sqrt
-from ..signals import Target
-from .path import PathPoint, target
+from ..signals import Nothing, Target
+from .path import Course, PathPoint, target
 
 
 class Params(NamedTuple):
     u_t: Annotated[float, "m/s", "speed along the path", Range(-2.0, 2.0)] = 0.08
-    x_c: Annotated[float, "m", "north position of the centre"] = 5.0
-    y_c: Annotated[float, "m", "east position of the centre"] = 0.5
     a_x: Annotated[float, "m", "semi-axis to the north", Range(min=0.01)] = 1.0
     a_y: Annotated[float, "m", "semi-axis to the east", Range(min=0.01)] = 1.5
-    theta_0: Annotated[float, "rad", "path parameter at the start", FIXED] = 0.0
-    calls: Annotated[float, "1", "times the path is advanced each step", Range(0.0, 100.0)] = 1.0
-
-
-class Inputs(NamedTuple):
-    """None."""
+    course: Course = Course()
 
 
 class State(NamedTuple):
@@ -40,19 +28,19 @@ def rates(theta: Number, p: Params) -> tuple[Number, Number]:
     return theta_dot, -theta_dot * theta_dot * (p.a_y * p.a_y - p.a_x * p.a_x) * s * c / square
 
 
-def init(i: Inputs, p: Params) -> State:
-    return State(p.theta_0)
+def init(i: Nothing, p: Params) -> State:
+    return State(p.course.theta_0)
 
 
-def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Target]:
+def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     half, _ = rates(s.theta, p)
-    middle, _ = rates(s.theta + 0.5 * h * p.calls * half, p)
-    theta = s.theta + h * p.calls * middle
+    middle, _ = rates(s.theta + 0.5 * h * p.course.calls * half, p)
+    theta = s.theta + h * p.course.calls * middle
     theta_dot, theta_ddot = rates(theta, p)
     n, e = sin(theta), cos(theta)
     point = PathPoint(
-        p.x_c + p.a_x * n,
-        p.y_c + p.a_y * e,
+        p.course.x_c + p.a_x * n,
+        p.course.y_c + p.a_y * e,
         p.a_x * e,
         -p.a_y * n,
         -p.a_x * n,
@@ -68,7 +56,7 @@ COMPONENT = Component(
     description="Guidance along an ellipse at constant speed",
     params=Params,
     state=State,
-    inputs=Inputs,
+    inputs=Nothing,
     outputs=Target,
     init=init,
     step=step,

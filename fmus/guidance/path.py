@@ -1,9 +1,24 @@
 """From a parametrised path eta_t = g(theta) to a target with exact derivatives, (4.38)."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+from ..declare import FIXED, Range
 from ..ops import Number, atan2
 from ..signals import Target
+
+
+class Course(NamedTuple):
+    """What all closed paths have: where they lie, where they start, and how they can go wrong.
+
+    With ``calls`` = 4 a path repeats the fault of the thesis' experiments: the path parameter is
+    advanced four times in every step while each call believes that one step has passed, so the target
+    runs at four times the speed that its own derivatives state.
+    """
+
+    x_c: Annotated[float, "m", "north position of the centre"] = 5.0
+    y_c: Annotated[float, "m", "east position of the centre"] = 0.5
+    theta_0: Annotated[float, "rad", "path parameter at the start", FIXED] = 0.0
+    calls: Annotated[float, "1", "times the path is advanced each step", Range(0.0, 100.0)] = 1.0
 
 
 class PathPoint(NamedTuple):

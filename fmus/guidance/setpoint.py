@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 from ..declare import FIXED, Component, Range
 from ..ops import Number, exp, wrap
-from ..signals import Target
+from ..signals import Nothing, Target
 
 
 class Params(NamedTuple):
@@ -20,10 +20,6 @@ class Params(NamedTuple):
     y_0: Annotated[float, "m", "east position of the reference at the start", FIXED] = 2.0
     psi_0: Annotated[float, "rad", "heading of the reference at the start", FIXED] = 0.0
     bandwidth: Annotated[float, "rad/s", "pole of the reference", Range(0.001, 10.0)] = 0.2
-
-
-class Inputs(NamedTuple):
-    """None."""
 
 
 class Axis(NamedTuple):
@@ -52,11 +48,11 @@ def approach(axis: Axis, error: Number, w: Number, h: Number) -> Axis:
     return Axis(axis.value + (left - error), rate, 2.0 * decay * c2 - w * slope - w * rate)
 
 
-def init(i: Inputs, p: Params) -> State:
+def init(i: Nothing, p: Params) -> State:
     return State(Axis(p.x_0), Axis(p.y_0), Axis(p.psi_0))
 
 
-def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Target]:
+def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     x = approach(s.x, s.x.value - p.x_s, p.bandwidth, h)
     y = approach(s.y, s.y.value - p.y_s, p.bandwidth, h)
     psi = approach(s.psi, wrap(s.psi.value - p.psi_s), p.bandwidth, h)
@@ -78,7 +74,7 @@ COMPONENT = Component(
     description="Guidance to a set point along a smooth reference",
     params=Params,
     state=State,
-    inputs=Inputs,
+    inputs=Nothing,
     outputs=Target,
     init=init,
     step=step,
