@@ -11,6 +11,7 @@ import statistics
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,7 +41,8 @@ def position_error(controller: str, seed: int) -> float:
 
 def over_seeds(seeds: Sequence[int]) -> dict[str, list[float]]:
     """Controller -> error for each seed, on two processes."""
-    with ProcessPoolExecutor(2) as pool:
+    # Forking a process that has loaded FMUs would copy their threads' locks.
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         return {
             controller: list(pool.map(position_error, [controller] * len(seeds), seeds))
             for controller in CONTROLLERS
