@@ -95,6 +95,13 @@ def where(condition: Number, a: Number, b: Number) -> Number:
     return _call("where", condition, a, b)
 
 
+def choose(condition: Number, a: Any, b: Any) -> Any:
+    """:func:`where` for two tuples of numbers of the same class."""
+    if condition.__class__ is bool:
+        return a if condition else b
+    return type(a)._make([where(condition, x, y) for x, y in zip(a, b, strict=True)])
+
+
 def fmin(a: Number, b: Number) -> Number:
     if a.__class__ in _SCALARS and b.__class__ in _SCALARS:
         return a if a < b else b

@@ -6,14 +6,24 @@ from itertools import pairwise
 
 import pytest
 
-from fmus.observer.mdf import COMPONENT, Inputs, Params, State
+from fmus.declare import flatten, packer, variables
+from fmus.observer.mdf import COMPONENT, Inputs, State
 from fmus.signals import Force, Measurement
 
 H = 0.01
+
+
+def params(component=COMPONENT, **changes):
+    """Parameters of an observer, some changed by name."""
+    names = [v.name for v in variables(component.params)]
+    start = zip(names, flatten(component.params()), strict=True)
+    return packer(component.params)([changes.pop(name, value) for name, value in start])
+
+
 NAN = math.nan
 
 
-def run(measurements, p=Params(), h=H):
+def run(measurements, p=params(), h=H):
     """Estimates for a sequence of measured poses."""
     first = Inputs(Measurement(*measurements[0]), Force())
     state, estimate = COMPONENT.step(COMPONENT.init(first, p), first, p, 0.0)
@@ -70,7 +80,7 @@ def test_heading_is_continuous_over_many_turns():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_unwrapped_heading_is_the_measured_one_plus_whole_turns(sign):
-    p = Params(a=0.999999, b=0.5)
+    p = params(a=0.999999, b=0.5)
     for k, e in enumerate(run([circle(k, rate=sign * 2.0) for k in range(5000)], p)):
         assert e.psi_hat == pytest.approx(sign * 2.0 * k * H, abs=1e-4)
 
@@ -141,7 +151,7 @@ def test_ship_that_is_lost_for_good_is_not_carried_away():
 
 def test_slower_measurement_is_not_a_freeze():
     """20 Hz samples held for a 100 Hz observer."""
-    p = Params(measurement_period=0.05)
+    p = params(measurement_period=0.05)
     estimates = run([circle(5 * (k // 5)) for k in range(3000)], p)
     assert not any(e.frozen for e in estimates)
     held = run([circle(5 * (k // 5)) for k in range(2995)] + [circle(2994)] * 10, p)
@@ -150,7 +160,7 @@ def test_slower_measurement_is_not_a_freeze():
 
 def test_another_step_size_gives_the_same_filter():
     fine = run([circle(k) for k in range(4001)])[-1]
-    coarse = run([circle(k, h=0.02) for k in range(2001)], Params(measurement_period=0.02), 0.02)[-1]
+    coarse = run([circle(k, h=0.02) for k in range(2001)], params(measurement_period=0.02), 0.02)[-1]
     assert coarse[:6] == pytest.approx(fine[:6], abs=2e-3)
 
 
@@ -159,9 +169,9 @@ def test_state_is_all_there_is():
     poses = [circle(k) for k in range(200)]
     state = State()
     for m in poses[:100]:
-        state, _ = COMPONENT.step(state, Inputs(Measurement(*m), Force()), Params(), H)
+        state, _ = COMPONENT.step(state, Inputs(Measurement(*m), Force()), params(), H)
     copy = State._make(state)
     for m in poses[100:]:
-        state, a = COMPONENT.step(state, Inputs(Measurement(*m), Force()), Params(), H)
-        copy, b = COMPONENT.step(copy, Inputs(Measurement(*m), Force()), Params(), H)
+        state, a = COMPONENT.step(state, Inputs(Measurement(*m), Force()), params(), H)
+        copy, b = COMPONENT.step(copy, Inputs(Measurement(*m), Force()), params(), H)
         assert a == b

@@ -1,0 +1,87 @@
+"""Observers that predict and correct, 4.3.3 and 4.3.4: what the two of the thesis share."""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import Range
+from ..ops import Number, cos, sin, where
+from ..signals import Estimate
+from .derivative import FRACTION, Acceleration, accelerated, weight
+from .screen import Sample, Seen
+
+GAIN = Range(0.0, 50.0)
+
+
+class Gains(NamedTuple):
+    """K_1 and K_2, and the filter of the acceleration."""
+
+    k1_x: Annotated[float, "rad/s", "correction of the north position", GAIN] = 6.0
+    k1_y: Annotated[float, "rad/s", "correction of the east position", GAIN] = 6.0
+    k1_psi: Annotated[float, "rad/s", "correction of the heading", GAIN] = 6.0
+    k2_u: Annotated[float, "rad2/s2", "correction of the surge velocity", GAIN] = 9.0
+    k2_v: Annotated[float, "rad2/s2", "correction of the sway velocity", GAIN] = 9.0
+    k2_r: Annotated[float, "rad2/s2", "correction of the yaw rate", GAIN] = 9.0
+    b: Annotated[float, "1", "weight of a new acceleration in its filter", FRACTION] = 0.05
+    filter_period: Annotated[float, "s", "sampling period that b belongs to", Range(1e-6)] = 0.01
+
+
+class Motion(NamedTuple):
+    """Pose, heading continuous over turns, and body-fixed velocity."""
+
+    x: Any = 0.0
+    y: Any = 0.0
+    psi: Any = 0.0
+    u: Any = 0.0
+    v: Any = 0.0
+    r: Any = 0.0
+
+
+class State(NamedTuple):
+    seen: Seen = Seen()
+    motion: Motion = Motion()
+    acceleration: Acceleration = Acceleration()
+
+
+def moved(m: Motion, h: Number) -> Motion:
+    """The pose after h [s] at the present velocity, (4.47)."""
+    c, n = cos(m.psi), sin(m.psi)
+    return m._replace(
+        x=m.x + h * (c * m.u - n * m.v), y=m.y + h * (n * m.u + c * m.v), psi=m.psi + h * m.r
+    )
+
+
+def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
+    """A prediction corrected by a good sample, (4.48); by any other, nothing but a fading velocity."""
+    dx, dy, dpsi = s.x - m.x, s.y - m.y, s.psi - m.psi
+    c, n = cos(m.psi), sin(m.psi)
+    gain = where(s.good, h, 0.0)
+    # With nothing to correct it for long, a velocity is worth less and less.
+    keep = where(s.overdue, 1.0 - weight(k.b, h, k.filter_period), 1.0)
+    on = Motion(
+        m.x + gain * k.k1_x * dx,
+        m.y + gain * k.k1_y * dy,
+        m.psi + gain * k.k1_psi * dpsi,
+        keep * m.u + gain * k.k2_u * (c * dx + n * dy),
+        keep * m.v + gain * k.k2_v * (c * dy - n * dx),
+        keep * m.r + gain * k.k2_r * dpsi,
+    )
+    return Motion(
+        where(s.first, s.x, on.x),
+        where(s.first, s.y, on.y),
+        where(s.first, s.psi, on.psi),
+        where(s.first, 0.0, on.u),
+        where(s.first, 0.0, on.v),
+        where(s.first, 0.0, on.r),
+    )
+
+
+def estimated(
+    s: State, seen: Seen, after: Motion, good: Number, k: Gains, h: Number
+) -> tuple[State, Estimate]:
+    """State and outputs after a step that ends in ``after``."""
+    nu = (after.u, after.v, after.r)
+    b = weight(k.b, h, k.filter_period)
+    before = (s.motion.u, s.motion.v, s.motion.r)
+    acceleration = accelerated(s.acceleration, before, nu, b, h)
+    return State(seen, after, acceleration), Estimate(
+        after.x, after.y, after.psi, *nu, *acceleration, where(good, 0.0, 1.0)
+    )

@@ -1,0 +1,103 @@
+"""Every observer in the closed loop of the ellipse: faults survived, velocities found."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import COMPONENTS
+
+import cosim
+from fmus.declare import packer, variables
+
+OBSERVERS = [name for name in COMPONENTS if name.startswith("observer_")]
+SIGNALS = ["observer.x_m", "observer.y_m", "observer.psi_m"]
+
+
+def run(ellipse, out, observer, stop=60.0, faults=()):
+    content = ellipse | {"stop": stop, "metrics": {}}
+    content["fmus"]["observer"] = {"path": f"{observer}.fmu"}
+    content["faults"] = [*ellipse["faults"], *faults]
+    result = cosim.simulate(cosim.load_scenario(content), out)
+    assert result.status == "done"
+    return cosim.read_log(out)
+
+
+def error(log, name, after=20.0):
+    """RMS error of an estimate against the truth."""
+    difference = log[f"observer.{name}_hat"] - log[f"vessel.{name}"]
+    return float(np.sqrt(np.mean(difference[log["time"] >= after] ** 2)))
+
+
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_faults_of_the_measurement_are_survived(ellipse, tmp_path, observer):
+    """NaN, zeros and spikes one after the other; three seconds later all is well again."""
+    faults = [
+        {"kind": "dropout", "signals": SIGNALS, "at": [5.0], "duration": 0.5, "value": "nan"},
+        {"kind": "spikes", "signals": SIGNALS, "at": [12.0], "size": 0.05},
+        {"kind": "dropout", "signals": SIGNALS, "at": [8.0], "duration": 0.05, "value": "zero"},
+    ]
+    log = run(ellipse, tmp_path, observer, 20.0, faults)
+    assert all(
+        np.isfinite(v).all() for n, v in log.items() if n.startswith("observer") and n not in SIGNALS
+    )
+    late = log["time"] >= 17.0
+    assert np.abs(log["observer.x_hat"] - log["vessel.x"])[late].max() < 0.05
+    assert np.abs(log["observer.u_hat"] - log["vessel.u"])[late].max() < 0.05
+
+
+@pytest.mark.parametrize("observer", [o for o in OBSERVERS if o != "observer_df"])
+def test_heading_runs_on_over_turns(ellipse, tmp_path, observer):
+    log = run(ellipse, tmp_path, observer)
+    assert np.abs(log["vessel.psi"]).max() > math.pi
+    assert np.abs(log["observer.psi_hat"] - log["vessel.psi"]).max() < 0.1
+
+
+def test_filter_of_before_the_thesis_takes_a_wrap_for_a_turn(ellipse, tmp_path):
+    """What the modification is for: the yaw rate it reports there is absurd."""
+    before = run(ellipse, tmp_path / "df", "observer_df")
+    modified = run(ellipse, tmp_path / "mdf", "observer_mdf")
+    assert np.abs(before["observer.r_hat"]).max() > 1.0
+    assert np.abs(modified["observer.r_hat"]).max() < 0.3
+
+
+def test_model_makes_better_velocities(ellipse, tmp_path):
+    """With the true model, the Luenberger observer is the best in every velocity."""
+    logs = {o: run(ellipse, tmp_path / o, o) for o in OBSERVERS}
+    for name in ("u", "v", "r"):
+        errors = {o: error(log, name) for o, log in logs.items()}
+        assert min(errors, key=errors.__getitem__) == "observer_luenberger"
+        assert errors["observer_luenberger"] < 0.5 * errors["observer_mdf"]
+
+
+def test_nonlinear_observer_has_the_poles_of_its_gains():
+    """From a wrong velocity, the error of the pose follows s2 + k1 s + k2."""
+    component = COMPONENTS["observer_nonlinear"]
+    inputs = packer(component.inputs)
+    k1, k2, h = 3.0, 2.0, 0.001
+    names = [v.name for v in variables(component.params)]
+    values = {"k1_x": k1, "k2_u": k2, "rest_time": 0.0}
+    params = packer(component.params)([values.get(v.name, v.start) for v in variables(component.params)])
+    assert {"k1_x", "k2_u", "rest_time"} <= set(names)
+    state = component.init(inputs([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), params)
+    times = np.arange(1, 3001) * h
+    errors = []
+    for t in times:  # a ship that moves ahead at 1 m/s, while the observer starts from rest
+        state, estimate = component.step(state, inputs([1.0 + t, 0.0, 0.0, 0.0, 0.0, 0.0]), params, h)
+        errors.append(1.0 + t - estimate.x_hat)
+    expected = np.exp(-times) - np.exp(-2.0 * times)  # poles -1 and -2, unit slope
+    assert np.allclose(errors, expected, atol=2e-3)
+
+
+def test_luenberger_without_measurement_is_the_model():
+    component, vessel = COMPONENTS["observer_luenberger"], COMPONENTS["vessel"]
+    pack, force = packer(component.inputs), packer(vessel.inputs)
+    params, p = component.params(), vessel.params()
+    h, tau = 0.001, [0.5, -0.2, 0.05]
+    ship = vessel.init(None, p)
+    state = component.init(pack([ship.x, ship.y, ship.psi, *tau]), params)
+    for _ in range(2000):
+        state, estimate = component.step(state, pack([math.nan] * 3 + tau), params, h)
+        ship, _ = vessel.step(ship, force(tau), p, h)
+    assert estimate[3:6] == pytest.approx((ship.u, ship.v, ship.r), rel=0.01)
+    assert estimate[:3] == pytest.approx((ship.x, ship.y, ship.psi), abs=1e-3)
+    assert estimate.frozen == 1.0
