@@ -99,3 +99,15 @@ def test_set_point_may_change_during_a_run():
         if k == 9999:
             assert target.x_t == pytest.approx(6.0, abs=1e-3)
     assert target.x_t == pytest.approx(4.0, abs=1e-3)
+
+
+def test_multisine_starts_from_rest_and_excites_everything():
+    rows = follow("guidance_multisine", 240.0, 0.1)
+    assert rows[0, :6] == pytest.approx([5.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    c, s = np.cos(rows[:, 2]), np.sin(rows[:, 2])
+    u, v, r = c * rows[:, 3] + s * rows[:, 4], c * rows[:, 4] - s * rows[:, 3], rows[:, 5]
+    assert 0.05 < np.hypot(u, v).max() < 0.25
+    # Ahead, astern and sideways; the velocities hardly go together.
+    assert u.min() < -0.03 < 0.03 < u.max()
+    assert v.min() < -0.03 < 0.03 < v.max()
+    assert np.abs(np.corrcoef([u, v, r]) - np.eye(3)).max() < 0.5
