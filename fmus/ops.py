@@ -7,6 +7,7 @@ an infinity instead of raising.
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 # Any: float, numpy array or symbol. The dispatch is by type, which Python's typing cannot express.
@@ -30,49 +31,27 @@ def _call(name: str, *args: Number) -> Number:
 _NUMPY_NAMES = {"atan2": "arctan2", "fmin": "minimum", "fmax": "maximum"}
 
 
-def sin(x: Number) -> Number:
-    if x.__class__ is float:
-        try:
-            return math.sin(x)
-        except ValueError:
-            return math.nan
-    return _call("sin", x)
+def _guarded(
+    name: str, function: Callable[[float], float], beyond: Callable[[float], float]
+) -> Callable[[Number], Number]:
+    """A function of ``math`` that outside its domain gives what C gives."""
+
+    def guarded(x: Number) -> Number:
+        if x.__class__ is float:
+            try:
+                return function(x)
+            except (ValueError, OverflowError):
+                return beyond(x)
+        return _call(name, x)
+
+    return guarded
 
 
-def cos(x: Number) -> Number:
-    if x.__class__ is float:
-        try:
-            return math.cos(x)
-        except ValueError:
-            return math.nan
-    return _call("cos", x)
-
-
-def exp(x: Number) -> Number:
-    if x.__class__ is float:
-        try:
-            return math.exp(x)
-        except OverflowError:
-            return math.inf
-    return _call("exp", x)
-
-
-def log(x: Number) -> Number:
-    if x.__class__ is float:
-        try:
-            return math.log(x)
-        except ValueError:
-            return -math.inf if x == 0.0 else math.nan
-    return _call("log", x)
-
-
-def sqrt(x: Number) -> Number:
-    if x.__class__ is float:
-        try:
-            return math.sqrt(x)
-        except ValueError:
-            return math.nan
-    return _call("sqrt", x)
+sin = _guarded("sin", math.sin, lambda x: math.nan)
+cos = _guarded("cos", math.cos, lambda x: math.nan)
+exp = _guarded("exp", math.exp, lambda x: math.inf)
+log = _guarded("log", math.log, lambda x: -math.inf if x == 0.0 else math.nan)
+sqrt = _guarded("sqrt", math.sqrt, lambda x: math.nan)
 
 
 def floor(x: Number) -> Number:

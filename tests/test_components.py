@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import COMPONENTS
 
+from fmus import ops
 from fmus.declare import Component, DeclarationError, flatten, packer, rebuild, variables
 from fmus.trace import (
     TraceError,
@@ -230,3 +231,11 @@ def test_units_are_taken_apart(unit, exponents):
 def test_unknown_unit_is_refused():
     with pytest.raises(ValueError, match="furlong"):
         base_exponents("furlong/s")
+
+
+@pytest.mark.parametrize("name", ["sin", "cos", "exp", "log", "sqrt"])
+@pytest.mark.parametrize("x", [0.0, 1.5, -2.0, 1e4, math.inf, -math.inf, math.nan])
+def test_functions_give_outside_their_domain_what_arrays_give(name, x):
+    with np.errstate(all="ignore"):
+        expected = getattr(ops, name)(np.array([x]))[0]
+    assert getattr(ops, name)(x) == pytest.approx(expected, nan_ok=True)
