@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 from .declare import POSITIVE
 from .ops import Number
+from .signals import Force
 
 Triple = tuple[Any, Any, Any]
 
@@ -156,3 +157,21 @@ def damping_force(u: Number, v: Number, r: Number, c: Any) -> Triple:
     _, Y2, N2 = rotational_damping_force(v, r, rotational)
     X3, Y3, N3 = extra_damping_force(u, v, r, extra)
     return X1 + X3, Y1 + Y2 + Y3, N1 + N2 + N3
+
+
+class Hull(NamedTuple):
+    """Inertia, its inverse and damping: what does not change during a step, computed once."""
+
+    inertia: Inertia
+    inverse: tuple[Any, Any, Any, Any, Any]
+    damping: Damping
+
+
+def motion(u: Number, v: Number, r: Number, tau: Force, b: Hull) -> Triple:
+    """nu_dot [m/s2, m/s2, rad/s2] of the hull under a force, (2.2), corrected: C(nu) nu."""
+    inertia, (i11, i22, i23, i32, i33), damping = b
+    CX, CY, CN = coriolis_force(u, v, r, inertia)
+    DX, DY, DN = damping_force(u, v, r, damping)
+    Y = tau[1] - CY + DY
+    N = tau[2] - CN + DN
+    return i11 * (tau[0] - CX + DX), i22 * Y + i23 * N, i32 * Y + i33 * N

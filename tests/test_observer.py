@@ -7,7 +7,8 @@ from itertools import pairwise
 import pytest
 
 from fmus.declare import flatten, packer, variables
-from fmus.observer.mdf import COMPONENT, Inputs, State
+from fmus.observer.mdf import COMPONENT, State
+from fmus.observer.screen import Inputs
 from fmus.signals import Force, Measurement
 
 H = 0.01

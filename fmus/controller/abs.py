@@ -7,8 +7,9 @@ learned while the observer says that its measurement is frozen.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import FIXED, Component, Range, variables, vector
+from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import RotationalDamping, rotational_regressors
-from ..ops import Number, cos, sin, where
+from ..ops import Number, where
 from .backstepping import (
     GAIN,
     Belief,
@@ -20,7 +21,6 @@ from .backstepping import (
     PhiStart,
     control,
     control_errors,
-    rotate_to_body,
 )
 
 # Table 5.1, in the order of (2.31).
@@ -76,12 +76,12 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     z, alpha_dot = control_errors(e, i.target, p.gains)
     dt = where((e.frozen > 0.5) & (p.hold_frozen > 0.5), 0.0, h)
     rates = phi_rate(z, e.v_hat, e.r_hat, p.gamma)
-    c, n = cos(e.psi_hat), sin(e.psi_hat)
+    z2_north, z2_east = rotate_to_earth(e.psi_hat, z.z2_u, z.z2_v)
     d = p.disturbance
     s = State(
         PhiHat._make([value + dt * rate for value, rate in zip(s.phi_hat, rates, strict=True)]),
-        s.omega_x + dt * d.gamma_omega_x * (c * z.z2_u - n * z.z2_v),
-        s.omega_y + dt * d.gamma_omega_y * (n * z.z2_u + c * z.z2_v),
+        s.omega_x + dt * d.gamma_omega_x * z2_north,
+        s.omega_y + dt * d.gamma_omega_y * z2_east,
         s.omega_psi + dt * d.gamma_omega_psi * z.z2_r,
     )
     w = (*rotate_to_body(e.psi_hat, s.omega_x, s.omega_y), s.omega_psi)

@@ -7,6 +7,7 @@ omega_hat is what the law compensates for. Every heading difference is wrapped.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range, variables, vector
+from ..frames import rotate_to_body
 from ..hull import (
     Inertia,
     RotationalDamping,
@@ -17,7 +18,7 @@ from ..hull import (
     rotational_damping_force,
     towed_damping_force,
 )
-from ..ops import Number, cos, sin, wrap
+from ..ops import wrap
 from ..signals import Estimate, Force, Target
 
 GAIN = Range(0.0, 1000.0)
@@ -87,13 +88,6 @@ class Outputs(NamedTuple):
     omega_hat_Y: Annotated[float, "N", "estimated model error in sway"] = 0.0
     omega_hat_N: Annotated[float, "N.m", "estimated model error in yaw"] = 0.0
     phi_hat: Any = PhiHat()
-
-
-def rotate_to_body(psi: Number, x: Number, y: Number) -> tuple[Any, Any]:
-    """R^T(psi) of an earth-fixed vector."""
-    c = cos(psi)
-    s = sin(psi)
-    return c * x + s * y, c * y - s * x
 
 
 def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:

@@ -3,10 +3,11 @@
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
-from ..ops import Number, cos, sin, where
+from ..frames import rotate_to_body, rotate_to_earth
+from ..ops import Number, where
 from ..signals import Estimate
 from .derivative import FRACTION, Acceleration, accelerated, weight
-from .screen import Sample, Seen
+from .screen import Inputs, Sample, Seen, first_look
 
 GAIN = Range(0.0, 50.0)
 
@@ -41,18 +42,22 @@ class State(NamedTuple):
     acceleration: Acceleration = Acceleration()
 
 
+def start(i: Inputs) -> State:
+    """At rest where the first sample shows the ship."""
+    seen = first_look(i.measurement)
+    return State(seen, Motion(seen.x_m, seen.y_m, seen.psi_m))
+
+
 def moved(m: Motion, h: Number) -> Motion:
     """The pose after h [s] at the present velocity, (4.47)."""
-    c, n = cos(m.psi), sin(m.psi)
-    return m._replace(
-        x=m.x + h * (c * m.u - n * m.v), y=m.y + h * (n * m.u + c * m.v), psi=m.psi + h * m.r
-    )
+    x_dot, y_dot = rotate_to_earth(m.psi, m.u, m.v)
+    return m._replace(x=m.x + h * x_dot, y=m.y + h * y_dot, psi=m.psi + h * m.r)
 
 
 def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
     """A prediction corrected by a good sample, (4.48); by any other, nothing but a fading velocity."""
     dx, dy, dpsi = s.x - m.x, s.y - m.y, s.psi - m.psi
-    c, n = cos(m.psi), sin(m.psi)
+    ahead, aside = rotate_to_body(m.psi, dx, dy)
     gain = where(s.good, h, 0.0)
     # With nothing to correct it for long, a velocity is worth less and less.
     keep = where(s.overdue, 1.0 - weight(k.b, h, k.filter_period), 1.0)
@@ -60,8 +65,8 @@ def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
         m.x + gain * k.k1_x * dx,
         m.y + gain * k.k1_y * dy,
         m.psi + gain * k.k1_psi * dpsi,
-        keep * m.u + gain * k.k2_u * (c * dx + n * dy),
-        keep * m.v + gain * k.k2_v * (c * dy - n * dx),
+        keep * m.u + gain * k.k2_u * ahead,
+        keep * m.v + gain * k.k2_v * aside,
         keep * m.r + gain * k.k2_r * dpsi,
     )
     return Motion(

@@ -3,7 +3,8 @@
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
-from ..ops import Number, cos, exp, log, sin, where
+from ..frames import rotate_to_body
+from ..ops import Number, exp, log, where
 
 FRACTION = Range(0.0, 0.999999)
 
@@ -61,8 +62,7 @@ def filtered(f: Filtered, x: Number, y: Number, psi: Number, w: Weights, h: Numb
 
 def body_velocity(f: Filtered) -> tuple[Any, Any, Any]:
     """nu_hat = R^T(psi) eta_dot [m/s, m/s, rad/s], (4.45)."""
-    c, n = cos(f.psi), sin(f.psi)
-    return c * f.x_dot + n * f.y_dot, c * f.y_dot - n * f.x_dot, f.psi_dot
+    return *rotate_to_body(f.psi, f.x_dot, f.y_dot), f.psi_dot
 
 
 def accelerated(

@@ -18,7 +18,7 @@ from .derivative import (
     filtered,
     weight,
 )
-from .mdf import Inputs
+from .screen import Inputs
 
 
 class State(NamedTuple):

@@ -9,12 +9,11 @@ measurement ends in a wrong turn: lost for longer than ``rest_time``, the veloci
 from typing import NamedTuple
 
 from ..declare import Component
-from ..hull import Damping, Inertia, coriolis_force, damping_force, inverse_mass
+from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number, finite
 from ..signals import Estimate, Force
-from .correction import Gains, Motion, State, corrected, estimated, moved
-from .mdf import Inputs
-from .screen import Screening, first_look, look
+from .correction import Gains, Motion, State, corrected, estimated, moved, start
+from .screen import Inputs, Screening, look
 
 
 class Params(NamedTuple):
@@ -26,20 +25,14 @@ class Params(NamedTuple):
 
 def accelerate(m: Motion, tau: Force, p: Params, h: Number) -> Motion:
     """The velocity after h [s] of a force, by the model."""
-    CX, CY, CN = coriolis_force(m.u, m.v, m.r, p.inertia)
-    DX, DY, DN = damping_force(m.u, m.v, m.r, p.damping)
-    i11, i22, i23, i32, i33 = inverse_mass(p.inertia)
-    X = finite(tau.tau_X, 0.0) - CX + DX
-    Y = finite(tau.tau_Y, 0.0) - CY + DY
-    N = finite(tau.tau_N, 0.0) - CN + DN
-    return m._replace(
-        u=m.u + h * i11 * X, v=m.v + h * (i22 * Y + i23 * N), r=m.r + h * (i32 * Y + i33 * N)
-    )
+    force = Force(finite(tau.tau_X, 0.0), finite(tau.tau_Y, 0.0), finite(tau.tau_N, 0.0))
+    hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
+    u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, force, hull)
+    return m._replace(u=m.u + h * u_dot, v=m.v + h * v_dot, r=m.r + h * r_dot)
 
 
 def init(i: Inputs, p: Params) -> State:
-    seen = first_look(i.measurement)
-    return State(seen, Motion(seen.x_m, seen.y_m, seen.psi_m))
+    return start(i)
 
 
 def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:

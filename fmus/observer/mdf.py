@@ -7,8 +7,9 @@ velocity. A pose that is lost for longer than ``rest_time`` is predicted with fa
 from typing import NamedTuple
 
 from ..declare import Component
-from ..ops import Number, choose, cos, sin, where
-from ..signals import Estimate, Force, Measurement
+from ..frames import rotate_to_earth
+from ..ops import Number, choose, where
+from ..signals import Estimate
 from .derivative import (
     Acceleration,
     Filtered,
@@ -18,17 +19,12 @@ from .derivative import (
     filtered,
     weight,
 )
-from .screen import Screening, Seen, first_look, look
+from .screen import Inputs, Screening, Seen, first_look, look
 
 
 class Params(NamedTuple):
     weights: Weights = Weights()
     screening: Screening = Screening()
-
-
-class Inputs(NamedTuple):
-    measurement: Measurement = Measurement()
-    tau: Force = Force()
 
 
 class State(NamedTuple):
@@ -41,13 +37,13 @@ def predicted(f: Filtered, keep: Number, h: Number) -> Filtered:
     """The filter after h [s] without a measurement, (4.46), with a share of its velocity."""
     u, v, r = body_velocity(f)
     psi = f.psi + h * f.psi_dot
-    c, n = cos(psi), sin(psi)
+    x_dot, y_dot = rotate_to_earth(psi, u, v)
     return Filtered(
         f.x + h * f.x_dot,
         f.y + h * f.y_dot,
         psi,
-        keep * (c * u - n * v),
-        keep * (n * u + c * v),
+        keep * x_dot,
+        keep * y_dot,
         keep * r,
     )
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 from ..declare import Component
 from ..ops import Number
 from ..signals import Estimate
-from .correction import Gains, Motion, State, corrected, estimated, moved
-from .mdf import Inputs
-from .screen import Screening, first_look, look
+from .correction import Gains, State, corrected, estimated, moved, start
+from .screen import Inputs, Screening, look
 
 
 class Params(NamedTuple):
@@ -21,8 +20,7 @@ class Params(NamedTuple):
 
 
 def init(i: Inputs, p: Params) -> State:
-    seen = first_look(i.measurement)
-    return State(seen, Motion(seen.x_m, seen.y_m, seen.psi_m))
+    return start(i)
 
 
 def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:

@@ -9,12 +9,19 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
 from ..ops import TWO_PI, Number, floor, is_finite, not_, where
-from ..signals import Measurement
+from ..signals import Force, Measurement
 
 
 class Screening(NamedTuple):
     measurement_period: Annotated[float, "s", "time between new measurements", Range(1e-6)] = 0.01
     rest_time: Annotated[float, "s", "an identical pose for longer means rest", Range(0.0)] = 3.0
+
+
+class Inputs(NamedTuple):
+    """What every observer takes."""
+
+    measurement: Measurement = Measurement()
+    tau: Force = Force()
 
 
 class Seen(NamedTuple):

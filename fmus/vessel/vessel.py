@@ -8,19 +8,20 @@ from operator import add
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import FIXED, Component, variables, vector
+from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
     ExtraDamping,
+    Hull,
     Inertia,
     RotationalDamping,
     TowedDamping,
-    Triple,
-    coriolis_force,
     damping_force,
     inverse_mass,
+    motion,
     rotational_damping_force,
 )
-from ..ops import Number, cos, finite, sin, wrap
+from ..ops import Number, finite, wrap
 from ..signals import Force, Measurement, Velocity
 
 
@@ -108,50 +109,25 @@ def total_damping(p: Params) -> Damping:
     )
 
 
-def kinematics(psi: Number, u: Number, v: Number) -> tuple[Any, Any]:
-    """North and east velocity [m/s] of a body-fixed velocity, (2.1)."""
-    c = cos(psi)
-    s = sin(psi)
-    return c * u - s * v, s * u + c * v
-
-
-class Hull(NamedTuple):
-    """What does not change during a step, computed once."""
-
-    inertia: Inertia
-    inverse: tuple[Any, Any, Any, Any, Any]
-    damping: Damping
-
-
 def hull(p: Params) -> Hull:
     """The hull with the changes of its damping applied."""
     return Hull(p.inertia, inverse_mass(p.inertia), total_damping(p))
-
-
-def motion(u: Number, v: Number, r: Number, tau: Force, b: Hull) -> Triple:
-    """nu_dot [m/s2, m/s2, rad/s2] of the hull under a force, (2.2), corrected: C(nu) nu."""
-    inertia, (i11, i22, i23, i32, i33), damping = b
-    CX, CY, CN = coriolis_force(u, v, r, inertia)
-    DX, DY, DN = damping_force(u, v, r, damping)
-    Y = tau[1] - CY + DY
-    N = tau[2] - CN + DN
-    return i11 * (tau[0] - CX + DX), i22 * Y + i23 * N, i32 * Y + i33 * N
 
 
 def integrate(s: State, tau: Force, b: Hull, h: Number) -> State:
     """State after h [s] of constant force by one step of the classical Runge-Kutta method."""
     x, y, psi, u, v, r = s
     half = 0.5 * h
-    x1, y1 = kinematics(psi, u, v)
+    x1, y1 = rotate_to_earth(psi, u, v)
     u1, v1, r1 = motion(u, v, r, tau, b)
     ub, vb, rb = u + half * u1, v + half * v1, r + half * r1
-    x2, y2 = kinematics(psi + half * r, ub, vb)
+    x2, y2 = rotate_to_earth(psi + half * r, ub, vb)
     u2, v2, r2 = motion(ub, vb, rb, tau, b)
     uc, vc, rc = u + half * u2, v + half * v2, r + half * r2
-    x3, y3 = kinematics(psi + half * rb, uc, vc)
+    x3, y3 = rotate_to_earth(psi + half * rb, uc, vc)
     u3, v3, r3 = motion(uc, vc, rc, tau, b)
     ud, vd, rd = u + h * u3, v + h * v3, r + h * r3
-    x4, y4 = kinematics(psi + h * rc, ud, vd)
+    x4, y4 = rotate_to_earth(psi + h * rc, ud, vd)
     u4, v4, r4 = motion(ud, vd, rd, tau, b)
     sixth = h / 6.0
     return State(
