@@ -1,4 +1,4 @@
-"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR]``.
+"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR] [--effects FILE.py]``.
 
 An FMU carries the source of its component and of every module of ours that this imports, in a package
 whose name holds a hash of that source. So two FMUs in one process never run each other's code, nor that
@@ -29,17 +29,19 @@ from filelock import FileLock
 from platformdirs import user_cache_path
 
 from .declare import Component, DeclarationError, Range, discover, variables, width
+from .effects import registry
 from .trace import trace_init, trace_step
 from .units import base_exponents
 
 ROOT = Path(__file__).parent
 FACE = "fmus.slave"
+EFFECTS = "fmus.effects"
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
 SCRIPT = '''"""Entry point of the FMU {name}."""
 
-from {package}.{module} import COMPONENT
+{effects}from {package}.{module} import COMPONENT
 from {package}.slave import Slave
 
 
@@ -65,7 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog="examples:  python -m fmus.build\n"
         "           python -m fmus.build vessel controller_abs --out fmu\n"
         "           python -m fmus.build my_controller.py --out fmu\n"
-        "           python -m fmus.build --list vessel",
+        "           python -m fmus.build --list vessel\n"
+        "           python -m fmus.build vessel --effects my_effects.py --out fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
@@ -73,8 +76,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--list", action="store_true", help="list the FMUs, or the variables of those named"
     )
+    parser.add_argument(
+        "--effects",
+        type=Path,
+        metavar="FILE.py",
+        action="append",
+        default=[],
+        help="a file of model effects of your own, for vessel and thrusters; may be repeated",
+    )
     options = parser.parse_args(arguments)
     try:
+        for file in options.effects:
+            registry.load(file)
         if options.list:
             _print_list(options.names)
             return 0
@@ -192,7 +205,8 @@ def _which(name: str) -> tuple[str, Path | None]:
 def _source_hash(own_file: Path | None) -> str:
     """Hash of everything that a build reads."""
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
-    for path in [*sorted(ROOT.rglob("*.py")), *([own_file] if own_file else [])]:
+    own = [*registry.LOADED.values(), *([own_file] if own_file else [])]
+    for path in [*sorted(ROOT.rglob("*.py")), *own]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
@@ -202,6 +216,8 @@ def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
     if own_file is None:
         known = {component.name: (module, component) for module, component in discover()}
         if name in known:
+            if registry.LOADED:
+                _check_effects(known[name][1])
             return known[name]
         near = difflib.get_close_matches(name, known, 1, 0.5)
         hint = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
@@ -239,9 +255,20 @@ def _check(component: Component) -> None:
             )
 
 
+def _check_effects(component: Component) -> None:
+    """Find out now whether a component works with the effects of a user's files."""
+    try:
+        _check(component)
+    except Exception as error:
+        places = [_place_of(error, file) for file in registry.LOADED.values()]
+        told = [place for place in places if ":" in place] or places
+        raise BuildError(f"{told[0]}: {error}") from error
+
+
 def _place_of(error: Exception, own_file: Path) -> str:
-    """File and line of a user's component where an error comes from."""
-    lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(own_file)]
+    """File and line of a user's file where an error comes from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [f for f in frames if Path(f.filename).resolve() == own_file.resolve()]
     return f"{own_file}:{lines[-1].lineno}: {lines[-1].line}" if lines else str(own_file)
 
 
@@ -262,6 +289,8 @@ def _sources(module: str, own_file: Path | None) -> dict[str, str]:
         relative = Path(*name.split(".")[1:])
         if own_file is not None and name == module:
             path, inside = own_file, f"{relative}.py"
+        elif name.startswith(f"{EFFECTS}.") and relative.name in registry.LOADED:
+            path, inside = registry.LOADED[relative.name], f"{relative}.py"
         elif (ROOT / relative).is_dir():
             path, inside = ROOT / relative / "__init__.py", str(relative / "__init__.py")
         elif (ROOT / relative).with_suffix(".py").is_file():
@@ -273,6 +302,8 @@ def _sources(module: str, own_file: Path | None) -> dict[str, str]:
         found[inside] = path.read_text()
         package = name if inside.endswith("__init__.py") else name.rpartition(".")[0]
         pending += [package, *_imports(found[inside], package)]
+        if name == EFFECTS:
+            pending += [f"{EFFECTS}.{stem}" for stem in registry.LOADED]
     return found
 
 
@@ -312,6 +343,11 @@ def _pack(component: Component, module: str, own_file: Path | None, work: Path) 
             package=package,
             module=module.partition(".")[2],
             class_name=component.name.title().replace("_", ""),
+            effects="".join(
+                f"import {package}.effects.{stem}\n"
+                for stem in registry.LOADED
+                if f"effects/{stem}.py" in sources
+            ),
             code_hash=code_hash,
             version=importlib.metadata.version("cybership"),
         )

@@ -65,6 +65,18 @@ def vector(
     return made
 
 
+def bundle(typename: str, **groups: Any) -> type[Any]:
+    """A NamedTuple class that nests declared NamedTuples, for classes that differ only in a part.
+
+    Args:
+        typename: name of the class.
+        groups: field -> the nested tuple with its start values.
+    """
+    made = namedtuple(typename, list(groups), defaults=list(groups.values()))
+    made.__annotations__ = dict.fromkeys(groups, Any)
+    return made
+
+
 def variables(cls: type[Any]) -> list[Variable]:
     """The scalars of a declared NamedTuple class, nested ones included, in order.
 
@@ -176,6 +188,9 @@ class Component:
         hold_nonfinite: True where an input that is NaN or infinite keeps its last finite value; False
             for a component that makes its own sense of such a value.
         max_step: a longer communication step [s] is divided into equal parts no longer than this.
+        prepare: ``prepare(params)`` gives what follows from the parameters alone, where computing it
+            anew in every step would cost time.
+        prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
     """
 
     name: str
@@ -189,17 +204,24 @@ class Component:
     sampled: bool = True
     max_step: float | None = None
     hold_nonfinite: bool = True
+    prepare: Callable[[Any], Any] | None = None
+    prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
 
-    def advance(self, state: Any, inputs: Any, params: Any, h: float) -> tuple[Any, Any]:
+    def prepared(self, params: Any) -> Any:
+        """What :meth:`advance` wants of the parameters: to be kept while they stay the same."""
+        return params if self.prepare is None else self.prepare(params)
+
+    def advance(self, state: Any, inputs: Any, prepared: Any, h: float) -> tuple[Any, Any]:
         """One communication step of h [s], in parts where it is longer than ``max_step``."""
+        step = self.prepared_step or self.step
         if self.max_step is None or h <= self.max_step * (1.0 + 1e-9):
-            return self.step(state, inputs, params, h)
+            return step(state, inputs, prepared, h)
         if h > MOST_PARTS * self.max_step:
             raise ValueError(f"a step of {h} s is too long: {self.max_step} s are integrated at once")
         parts = -int(-h / self.max_step // 1.0)
         outputs = None
         for _ in range(parts):
-            state, outputs = self.step(state, inputs, params, h / parts)
+            state, outputs = step(state, inputs, prepared, h / parts)
         return state, outputs
 
     @cached_property

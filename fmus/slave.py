@@ -43,6 +43,7 @@ class Slave(Fmi2Slave):
         self._all_inputs = list(range(bounds[1], bounds[2]))
         self._pack_params, self._pack_inputs = packer(c.params), packer(c.inputs)
         self._params: Any = None
+        self._prepared: Any = None
         self._state: Any = None
         self._initialising = True
         self._stale = True
@@ -97,15 +98,16 @@ class Slave(Fmi2Slave):
         """Inputs and parameters as the component wants them."""
         if self._params is None:
             self._params = self._pack_params(self._values[self._slices[0]])
+            self._prepared = self.component.prepared(self._params)
         return self._pack_inputs(self._values[self._slices[1]]), self._params
 
     def _initialise(self) -> None:
         """State and outputs that follow from the present inputs and parameters."""
         self._stale = False
-        inputs, params = self._arguments()
         try:
+            inputs, params = self._arguments()
             self._state = self.component.init(inputs, params)
-            _, outputs = self.component.step(self._state, inputs, params, 0.0)
+            _, outputs = self.component.advance(self._state, inputs, self._prepared, 0.0)
             self._values[self._slices[2]] = flatten(outputs)
         except Exception as error:
             self.log(f"initialisation failed: {error!r}", Fmi2Status.error)
@@ -119,9 +121,9 @@ class Slave(Fmi2Slave):
         if not 0.0 <= step_size < inf:
             self.log(f"step at t = {current_time} s: {step_size} s is no step size", Fmi2Status.error)
             return False
-        inputs, params = self._arguments()
         try:
-            state, outputs = self.component.advance(self._state, inputs, params, step_size)
+            inputs, _ = self._arguments()
+            state, outputs = self.component.advance(self._state, inputs, self._prepared, step_size)
             flat = flatten(outputs)
         except Exception as error:
             self.log(f"step at t = {current_time} s failed: {error!r}", Fmi2Status.error)

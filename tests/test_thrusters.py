@@ -5,23 +5,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.signals import Force, Velocity
-from fmus.thrusters.thrusters import (
-    COMPONENT,
-    Allocation,
-    Inputs,
-    Params,
-    Plant,
-    State,
-    allocate,
-    thrust,
-)
+from fmus.thrusters.allocation import Allocation, allocate, thrust
+from fmus.thrusters.chain import Inputs, Past, Plant
+from fmus.thrusters.thrusters import COMPONENT
+
+Params = COMPONENT.params
 
 command = st.floats(-1.0, 1.0)
 offset = st.floats(-0.1, 0.1)
 
 
 def run(X, Y, N, p=Params()):
-    return COMPONENT.step(State(), Inputs(Force(X, Y, N), Velocity()), p, 0.01)[1]
+    return COMPONENT.step(Past(), Inputs(Force(X, Y, N), Velocity()), p, 0.01)[1]
 
 
 @given(command, command, command, offset, offset)

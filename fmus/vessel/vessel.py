@@ -1,13 +1,16 @@
-"""The hull of CyberShip Enterprise 1 in surge, sway and yaw, (2.1)-(2.9).
+"""The hull of CyberShip Enterprise 1 in surge, sway and yaw, (2.1)-(2.9), and what acts on it.
 
 Integrated by the classical fourth-order Runge-Kutta method with the force held over the step; a
-communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero.
+communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero. Every
+model effect on the hull, from outside, or in the measurement is off until a parameter says otherwise.
 """
 
 from operator import add
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, variables, vector
+from ..declare import FIXED, Component
+from ..effects.environment import current
+from ..effects.registry import Ship
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
@@ -16,37 +19,32 @@ from ..hull import (
     Inertia,
     RotationalDamping,
     TowedDamping,
+    Triple,
+    coriolis_force,
     damping_force,
+    inertia_force,
     inverse_mass,
     motion,
     rotational_damping_force,
 )
-from ..ops import Number, finite, wrap
+from ..ops import Number, finite, when, wrap
 from ..signals import Force, Measurement, Velocity
+from .model_errors import (
+    CALM,
+    CHANGES,
+    IN_MEASUREMENT,
+    INERTIA,
+    NONE,
+    OUTSIDE,
+    UNCHANGED,
+    WATER,
+    ChangeForces,
+    OutsideForces,
+    forces_of,
+)
 
-
-def _changes(coefficients: type[Any]) -> type[Any]:
-    """Additions to a group of coefficients, as parameters ``delta_<coefficient>``."""
-    return vector(
-        f"{coefficients.__name__}Change",
-        [
-            (f"delta_{c.name}", c.unit, f"addition to {c.name}: a model error", 0.0)
-            for c in variables(coefficients)
-        ],
-    )
-
-
-TowedChange = _changes(TowedDamping)
-RotationalChange = _changes(RotationalDamping)
-ExtraChange = _changes(ExtraDamping)
-
-
-class DampingChange(NamedTuple):
-    """Additions to all damping coefficients, in the order of Damping."""
-
-    towed: Any = TowedChange()
-    rotational: Any = RotationalChange()
-    extra: Any = ExtraChange()
+_TOWED = len(TowedDamping._fields)
+_ROTATIONAL = _TOWED + len(RotationalDamping._fields)
 
 
 class Start(NamedTuple):
@@ -63,19 +61,24 @@ class Start(NamedTuple):
 class Params(NamedTuple):
     inertia: Inertia = Inertia()
     damping: Damping = Damping()
-    change: DampingChange = DampingChange()
+    change: Any = CHANGES.params()
+    outside: Any = OUTSIDE.params()
+    water: Any = WATER.params()
+    heavier: Any = INERTIA.params()
+    seen: Any = IN_MEASUREMENT.params()
     start: Start = Start()
 
 
 class State(NamedTuple):
-    """eta and nu; the heading is continuous over turns."""
+    """eta, nu over ground, and time; the heading is continuous over turns."""
 
-    x: float = 0.0
-    y: float = 0.0
-    psi: float = 0.0
-    u: float = 0.0
-    v: float = 0.0
-    r: float = 0.0
+    x: Any = 0.0
+    y: Any = 0.0
+    psi: Any = 0.0
+    u: Any = 0.0
+    v: Any = 0.0
+    r: Any = 0.0
+    t: Any = 0.0
 
 
 class Pose(NamedTuple):
@@ -97,72 +100,175 @@ class Outputs(NamedTuple):
     omega_star_X: Annotated[float, "N", "what control model (2.27) lacks in surge"] = 0.0
     omega_star_Y: Annotated[float, "N", "what control model (2.27) lacks in sway"] = 0.0
     omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
-
-
-def total_damping(p: Params) -> Damping:
-    """The nominal damping coefficients plus their changes."""
-    nominal, change = p.damping, p.change
-    return Damping(
-        TowedDamping._make(map(add, nominal.towed, change.towed)),
-        RotationalDamping._make(map(add, nominal.rotational, change.rotational)),
-        ExtraDamping._make(map(add, nominal.extra, change.extra)),
-    )
+    change: Any = UNCHANGED
+    outside: Any = CALM
 
 
 def hull(p: Params) -> Hull:
-    """The hull with the changes of its damping applied."""
-    return Hull(p.inertia, inverse_mass(p.inertia), total_damping(p))
+    """The hull with the changes of its damping and inertia applied."""
+    inertia = p.inertia
+    for member in INERTIA.members:
+        inertia = member.apply(member.acting(p.heavier), p.heavier, inertia, inertia)
+    nominal, change = p.damping, p.change
+    damping = Damping(
+        TowedDamping._make(map(add, nominal.towed, change[:_TOWED])),
+        RotationalDamping._make(map(add, nominal.rotational, change[_TOWED:_ROTATIONAL])),
+        ExtraDamping._make(map(add, nominal.extra, change[_ROTATIONAL:])),
+    )
+    return Hull(inertia, inverse_mass(inertia), damping)
 
 
-def integrate(s: State, tau: Force, b: Hull, h: Number) -> State:
-    """State after h [s] of constant force by one step of the classical Runge-Kutta method."""
-    x, y, psi, u, v, r = s
+class Prepared(NamedTuple):
+    """What follows from the parameters alone: the hull, and which effects act."""
+
+    params: Params
+    hull: Hull
+    changes: tuple[Any, ...]
+    outside: tuple[Any, ...]
+    changed: Any
+    stirred: Any
+    heavier: Any
+
+
+def prepare(p: Params) -> Prepared:
+    """Everything that a step needs of the parameters."""
+    return Prepared(
+        p,
+        hull(p),
+        tuple([member.acting(p.change) for member in CHANGES.members]),
+        tuple([member.acting(p.outside) for member in OUTSIDE.members]),
+        CHANGES.acting(p.change),
+        OUTSIDE.acting(p.outside) | WATER.acting(p.water),
+        INERTIA.acting(p.heavier),
+    )
+
+
+def through_water(s: State, p: Params) -> tuple[Ship, Any, Any]:
+    """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
+    ship = Ship(s.t, s.x, s.y, s.psi, s.u, s.v, s.r)
+    u_c, v_c = current(ship, *p.water)
+    return ship._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
+
+
+def calm(s: State, tau: Force, b: Hull) -> Triple:
+    """nu_dot [m/s2, m/s2, rad/s2] where nothing acts but the thrusters and still water."""
+    return motion(s[3], s[4], s[5], tau, b)
+
+
+def stirred(s: State, tau: Force, b: Prepared) -> Triple:
+    """nu_dot [m/s2, m/s2, rad/s2] with every effect, in a current that the hull sees as nu_r."""
+    ship, u_c, v_c = through_water(s, b.params)
+    X, Y, N = tau
+    for member, acts in zip(OUTSIDE.members, b.outside, strict=True):
+        dX, dY, dN = member.apply(acts, b.params.outside, NONE, ship)
+        X, Y, N = X + dX, Y + dY, N + dN
+    u_dot, v_dot, r_dot = motion(ship.u, ship.v, ship.r, Force(X, Y, N), b.hull)
+    # A constant current turns backwards in the turning ship's frame.
+    return u_dot + s.r * v_c, v_dot - s.r * u_c, r_dot
+
+
+def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = calm) -> State:
+    """State after h [s] of constant force by one step of the classical Runge-Kutta method.
+
+    The law gives nu_dot from state, force and b: :func:`calm` with b a Hull, :func:`stirred` with b
+    a Prepared.
+    """
+    x, y, psi, u, v, r, t = s
     half = 0.5 * h
     x1, y1 = rotate_to_earth(psi, u, v)
-    u1, v1, r1 = motion(u, v, r, tau, b)
-    ub, vb, rb = u + half * u1, v + half * v1, r + half * r1
-    x2, y2 = rotate_to_earth(psi + half * r, ub, vb)
-    u2, v2, r2 = motion(ub, vb, rb, tau, b)
-    uc, vc, rc = u + half * u2, v + half * v2, r + half * r2
-    x3, y3 = rotate_to_earth(psi + half * rb, uc, vc)
-    u3, v3, r3 = motion(uc, vc, rc, tau, b)
-    ud, vd, rd = u + h * u3, v + h * v3, r + h * r3
-    x4, y4 = rotate_to_earth(psi + h * rc, ud, vd)
-    u4, v4, r4 = motion(ud, vd, rd, tau, b)
+    u1, v1, r1 = law(s, tau, b)
+    psi2, u2, v2, r2 = psi + half * r, u + half * u1, v + half * v1, r + half * r1
+    x2, y2 = rotate_to_earth(psi2, u2, v2)
+    du2, dv2, dr2 = law(State(x + half * x1, y + half * y1, psi2, u2, v2, r2, t + half), tau, b)
+    psi3, u3, v3, r3 = psi + half * r2, u + half * du2, v + half * dv2, r + half * dr2
+    x3, y3 = rotate_to_earth(psi3, u3, v3)
+    du3, dv3, dr3 = law(State(x + half * x2, y + half * y2, psi3, u3, v3, r3, t + half), tau, b)
+    psi4, u4, v4, r4 = psi + h * r3, u + h * du3, v + h * dv3, r + h * dr3
+    x4, y4 = rotate_to_earth(psi4, u4, v4)
+    du4, dv4, dr4 = law(State(x + h * x3, y + h * y3, psi4, u4, v4, r4, t + h), tau, b)
     sixth = h / 6.0
     return State(
         x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
         y + sixth * (y1 + 2.0 * (y2 + y3) + y4),
-        psi + sixth * (r + 2.0 * (rb + rc) + rd),
-        u + sixth * (u1 + 2.0 * (u2 + u3) + u4),
-        v + sixth * (v1 + 2.0 * (v2 + v3) + v4),
-        r + sixth * (r1 + 2.0 * (r2 + r3) + r4),
+        psi + sixth * (r + 2.0 * (r2 + r3) + r4),
+        u + sixth * (u1 + 2.0 * (du2 + du3) + du4),
+        v + sixth * (v1 + 2.0 * (dv2 + dv3) + dv4),
+        r + sixth * (r1 + 2.0 * (dr2 + dr3) + dr4),
+        t + h,
     )
 
 
+def change_forces(s: State, b: Prepared) -> Any:
+    """The force of each change of a damping coefficient."""
+    ship, _, _ = through_water(s, b.params)
+    return ChangeForces._make(forces_of(CHANGES, b.changes, b.params.change, ship))
+
+
+def outside_forces(s: State, b: Prepared) -> Any:
+    """The force of each other effect on the hull."""
+    ship, _, _ = through_water(s, b.params)
+    return OutsideForces._make(forces_of(OUTSIDE, b.outside, b.params.outside, ship))
+
+
+def model_error(s: State, nu_dot: Triple, tau: Force, p: Params) -> Triple:
+    """omega [N, N, N m]: what the nominal model lacks of the force on the hull, (2.36)."""
+    MX, MY, MN = inertia_force(*nu_dot, p.inertia)
+    CX, CY, CN = coriolis_force(s.u, s.v, s.r, p.inertia)
+    DX, DY, DN = damping_force(s.u, s.v, s.r, p.damping)
+    return MX + CX - DX - tau[0], MY + CY - DY - tau[1], MN + CN - DN - tau[2]
+
+
+def measured(s: State, p: Params) -> Measurement:
+    """The pose as the measurement system sees it."""
+    pose = (s.x, s.y, s.psi)
+    for member in IN_MEASUREMENT.members:
+        pose = member.apply(member.acting(p.seen), p.seen, pose, pose)
+    return Measurement(pose[0], pose[1], wrap(pose[2]))
+
+
 def init(i: Force, p: Params) -> State:
-    return State._make(p.start)
+    return State(*p.start, 0.0)
 
 
-def step(s: State, i: Force, p: Params, h: Number) -> tuple[State, Outputs]:
+def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Outputs]:
+    p = b.params
     tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
-    b = hull(p)
-    s = integrate(s, tau, b, h)
-    x, y, psi, u, v, r = s
-    omega_X, omega_Y, omega_N = damping_force(u, v, r, p.change)
-    _, phi_Y, phi_N = rotational_damping_force(v, r, p.damping.rotational)
-    return s, Outputs(
-        Pose(x, y, psi),
-        Velocity(u, v, r),
-        *motion(u, v, r, tau, b),
-        Measurement(x, y, wrap(psi)),
+    after, nu_dot = when(
+        b.stirred, lambda: moved(s, tau, b, h, stirred), lambda: moved(s, tau, b.hull, h, calm)
+    )
+    wrong = b.changed | b.stirred | b.heavier
+    omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
+    change = when(b.changed, lambda: change_forces(after, b), lambda: UNCHANGED)
+    outside = when(b.stirred, lambda: outside_forces(after, b), lambda: CALM)
+    _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
+    u_dot, v_dot, r_dot = nu_dot
+    omega_X, omega_Y, omega_N = omega
+    return after, Outputs(
+        Pose(after.x, after.y, after.psi),
+        Velocity(after.u, after.v, after.r),
+        u_dot,
+        v_dot,
+        r_dot,
+        measured(after, p),
         omega_X,
         omega_Y,
         omega_N,
         omega_X,
         omega_Y + phi_Y,
         omega_N + phi_N,
+        change,
+        outside,
     )
+
+
+def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Triple]:
+    """The state after h [s], and nu_dot there."""
+    after = integrate(s, tau, b, h, law)
+    return after, law(after, tau, b)
+
+
+def step(s: State, i: Force, p: Params, h: Number) -> tuple[State, Outputs]:
+    return prepared_step(s, i, prepare(p), h)
 
 
 COMPONENT = Component(
@@ -177,4 +283,6 @@ COMPONENT = Component(
     sampled=False,
     max_step=0.02,
     hold_nonfinite=False,
+    prepare=prepare,
+    prepared_step=prepared_step,
 )

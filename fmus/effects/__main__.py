@@ -1,0 +1,81 @@
+"""Print the table of all model effects: ``python -m fmus.effects [FILE.py ...]``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..declare import DeclarationError, Variable
+from .registry import EFFECTS, Effect, load
+
+HEAD = """# Model effects
+
+What the real ship may have and the nominal model lacks. Every effect is off (its coefficients are zero)
+until a parameter of the vessel or the thrusters says otherwise; all parameters can be changed during a
+run. Printed by `python -m fmus.effects`.
+
+| id | kind | axis | formula | symbol | parameters [unit] | sign | source |
+|---|---|---|---|---|---|---|---|
+"""
+
+
+def _cell(text: str) -> str:
+    """Text that cannot end a cell of a table."""
+    return text.replace("|", "\\|") or "–"
+
+
+def _parameters(e: Effect) -> str:
+    """Names of the parameters with their units, a curve's nodes as one."""
+    if len(e.parameters) > 8:
+        first, *_, last, reach = e.parameters
+        return f"`{first.name}` … `{last.name}` [{first.unit}], {_one(reach)}"
+    return ", ".join(map(_one, e.parameters))
+
+
+def _one(p: Variable) -> str:
+    return f"`{p.name}` [{p.unit}]" + (f" = {p.start:g}" if p.start else "")
+
+
+def table() -> str:
+    """The registry as a table in Markdown."""
+    rows = [
+        " | ".join(
+            [
+                f"| `{_cell(e.id)}`<br>{_cell(e.description)}",
+                e.kind,
+                e.axis,
+                _cell(e.formula),
+                _cell(e.symbol),
+                _parameters(e) or "–",
+                _cell(e.sign),
+                _cell(e.source) + " |",
+            ]
+        )
+        for e in sorted(EFFECTS.values(), key=lambda e: ORDER.index(e.kind))
+    ]
+    return HEAD + "\n".join(rows) + "\n"
+
+
+ORDER = ["force", "inertia", "actuator", "environment", "measurement"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(
+        prog="python -m fmus.effects",
+        description="Print the table of all model effects as Markdown.",
+        epilog="example:  python -m fmus.effects my_effects.py",
+    )
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="effects of your own")
+    try:
+        for file in parser.parse_args(arguments).files:
+            load(file)
+    except DeclarationError as error:
+        print("error:", error, file=sys.stderr)
+        return 2
+    print(table(), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,35 @@
+"""Free shapes: a curve through values at equally spaced nodes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..declare import Range, Variable
+from ..ops import Number, clip, fmax
+
+NODES = 21
+
+
+def hats(x: Number, low: Number, high: Number, count: int) -> list[Any]:
+    """Weights of ``count`` equally spaced nodes that interpolate linearly at x; constant outside."""
+    place = (clip(x, low, high) - low) / (high - low) * (count - 1.0)
+    return [fmax(0.0, 1.0 - abs(place - k)) for k in range(count)]
+
+
+def interpolate(x: Number, low: Number, high: Number, values: Sequence[Any]) -> Any:
+    """The piecewise linear curve through ``values`` at equally spaced nodes from low to high, at x."""
+    total = 0.0
+    for weight, value in zip(hats(x, low, high, len(values)), values, strict=True):
+        total = total + weight * value
+    return total
+
+
+def node_parameters(
+    prefix: str, unit: str, what: str, over: str, over_unit: str, reach: float
+) -> tuple[Variable, ...]:
+    """Parameters of a curve: its value at each of the nodes, and the range that they span."""
+    nodes = [
+        Variable(f"{prefix}_{k}", unit, f"{what}, node {k} of {NODES}", 0.0, Range(), False)
+        for k in range(1, NODES + 1)
+    ]
+    span = f"reach of the nodes of {prefix}: {over}"
+    return (*nodes, Variable(f"{prefix}_range", over_unit, span, reach, Range(min=0.01), False))

@@ -1,0 +1,110 @@
+"""Wind, waves and current: what acts on the ship from outside."""
+
+import math
+from typing import Annotated, Any
+
+from ..declare import POSITIVE, Range
+from ..frames import rotate_to_body
+from ..hull import Triple
+from ..ops import Number, cos, sin
+from .registry import Ship, effect
+
+# Frequencies of the waves as shares of the peak; no two have a common period within an hour.
+_SHARES = tuple(0.72 + 0.0717 * k + 0.00113 * k * k for k in range(8))
+_GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
+
+
+@effect(
+    "earth_force",
+    "environment",
+    "XY",
+    formula="(X, Y) = R^T(psi) (F_n, F_e) (1 + swing sin(2 pi t / period))",
+    sign="F_n pushes north, F_e pushes east",
+    source="(2.3), (2.33)",
+    settings=("earth_force_swing",),
+)
+def earth_force(
+    ship: Ship,
+    F_n: Annotated[float, "N", "earth-fixed force to the north"] = 0.0,
+    F_e: Annotated[float, "N", "earth-fixed force to the east"] = 0.0,
+    earth_force_period: Annotated[float, "s", "period of its slow swing", Range(min=1.0)] = 100.0,
+    earth_force_swing: Annotated[float, "1", "how much it swings, as a share of itself"] = 0.0,
+) -> Triple:
+    """Constant or slowly varying earth-fixed force."""
+    swing = 1.0 + earth_force_swing * sin(2.0 * math.pi * ship.t / earth_force_period)
+    return *rotate_to_body(ship.psi, swing * F_n, swing * F_e), 0.0
+
+
+@effect(
+    "body_bias",
+    "environment",
+    "XYN",
+    formula="(X, Y, N) = constant",
+    symbol="X, Y, N",
+    sign="positive pushes ahead, to starboard, and turns to starboard",
+    source="(2.33)",
+)
+def body_bias(
+    ship: Ship,
+    body_bias_X: Annotated[float, "N", "constant surge force"] = 0.0,
+    body_bias_Y: Annotated[float, "N", "constant sway force"] = 0.0,
+    body_bias_N: Annotated[float, "N.m", "constant yaw moment"] = 0.0,
+) -> Triple:
+    """Constant body-fixed force."""
+    return body_bias_X, body_bias_Y, body_bias_N
+
+
+def surface(t: Number, peak: Number) -> Number:
+    """A wave signal of unit variance around a peak frequency [rad/s] at time t [s].
+
+    Eight cosines with fixed phases: the sharp, narrow spectrum of a swell, the same in every run.
+    """
+    total = 0.0
+    power = 0.0
+    for k, share in enumerate(_SHARES):
+        amplitude = math.exp(-0.5 * ((share - 1.0) / 0.12) ** 2)
+        power += 0.5 * amplitude * amplitude
+        total = total + amplitude * cos(share * peak * t + _GOLDEN * (k + 1) * (k + 2))
+    return total / math.sqrt(power)
+
+
+@effect(
+    "waves",
+    "environment",
+    "XYN",
+    formula="(X, Y) = R^T(psi) (cos b, sin b) (F_w xi(t) + drift), N = arm · Y",
+    symbol="F_w, drift",
+    sign="drift pushes towards where the waves run",
+    source="(2.33), (7.15); Fossen 2011, 8.2",
+    settings=("wave_direction",),
+)
+def waves(
+    ship: Ship,
+    wave_force: Annotated[float, "N", "standard deviation of the wave force", POSITIVE] = 0.0,
+    wave_drift: Annotated[float, "N", "mean drift force of the waves"] = 0.0,
+    wave_peak: Annotated[float, "rad/s", "peak frequency of the waves", Range(0.1, 50.0)] = 4.0,
+    wave_direction: Annotated[float, "rad", "where the waves run to, from north"] = 0.0,
+    wave_arm: Annotated[float, "m", "forward lever of their sway force"] = 0.1,
+) -> Triple:
+    """Wave-frequency force with a mean drift."""
+    F = wave_force * surface(ship.t, wave_peak) + wave_drift
+    X, Y = rotate_to_body(ship.psi, F * cos(wave_direction), F * sin(wave_direction))
+    return X, Y, wave_arm * Y
+
+
+@effect(
+    "current",
+    "environment",
+    "XYN",
+    formula="nu_r = nu - R^T(psi) (V_n, V_e); all hydrodynamic force follows nu_r",
+    sign="direction that the water moves towards",
+    source="Fossen 2011, 8.3; irrotational",
+    linear=False,
+)
+def current(
+    ship: Ship,
+    V_n: Annotated[float, "m/s", "the water's velocity to the north", Range(-2.0, 2.0)] = 0.0,
+    V_e: Annotated[float, "m/s", "the water's velocity to the east", Range(-2.0, 2.0)] = 0.0,
+) -> tuple[Any, Any]:
+    """Irrotational current; gives the water's body-fixed velocity [m/s, m/s]."""
+    return rotate_to_body(ship.psi, V_n, V_e)

@@ -1,0 +1,34 @@
+"""Thrusters that are propellers: the force grows with the square of the speed of rotation, (2.11).
+
+f = sign(n) K_T rho D^4 n^2; with n proportional to the command and F the force at full command this is
+F |u| u. The allocation knows and takes the root.
+"""
+
+from typing import Any
+
+from ..effects.registry import Running
+from ..hull import Triple
+from ..ops import Number, sqrt, where
+from .chain import thrusters
+from .thrusters import Line
+
+
+def squared(now: Running, p: Any) -> Triple:
+    """Shares of full force: the commands squared, with their sign, (2.11)."""
+    x, y, bow = now.u_vsp_x, now.u_vsp_y, now.u_bow
+    return abs(x) * x, abs(y) * y, abs(bow) * bow
+
+
+def root(share: Number) -> Number:
+    """The command that gives a share of full force."""
+    size = sqrt(abs(share))
+    return where(share < 0.0, -size, size)
+
+
+COMPONENT = thrusters(
+    "thrusters_propeller",
+    "Thrust allocation, and thrusters whose force grows with the square of the command",
+    Line,
+    squared,
+    root,
+)
