@@ -18,7 +18,7 @@ H = 0.002
 
 def true_estimate(s, nu_dot=(0.0, 0.0, 0.0)):
     """What an observer without error would say."""
-    return Estimate(*s, *nu_dot, 0.0)
+    return Estimate(*s[:6], *nu_dot, 0.0)
 
 
 def rich_target(t):
