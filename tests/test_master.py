@@ -60,7 +60,7 @@ def test_command_of_a_row_acts_from_its_time_to_the_next(ellipse, tmp_path):
         state = V.state(*(float(log[f"vessel.{n}"][k]) for n in names))
         tau = Force(*(float(log[f"thrusters.tau_act_{a}"][k]) for a in "XYN"))
         after, _ = V.step(state, tau, V.params(), 0.01)
-        assert after == tuple(log[f"vessel.{n}"][k + 1] for n in names)
+        assert after[:6] == tuple(log[f"vessel.{n}"][k + 1] for n in names)
 
 
 def test_time_is_counted_and_rows_are_complete(ellipse, tmp_path):
