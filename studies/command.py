@@ -1,0 +1,53 @@
+"""The command line that the studies share."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"needs a whole number above zero, not '{text}'")
+    return int(text)
+
+
+def study_parser(name: str, description: str, examples: str, seeds: int = 10) -> argparse.ArgumentParser:
+    """A parser with the options of every study: ``--out``, ``--seeds``, ``--jobs``, ``--quick``.
+
+    Args:
+        name: of the study's module.
+        description: what it does.
+        examples: lines for the end of the help.
+        seeds: how many by default.
+    """
+    parser = argparse.ArgumentParser(
+        prog=f"python -m studies.{name}",
+        description=description,
+        epilog=f"examples:\n{examples}\n"
+        "exit codes: 0 done, 2 bad input, 3 a run failed, 130 interrupted",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    out = Path("results") / f"study_{name}"
+    parser.add_argument("--out", type=Path, metavar="DIR", default=out, help=f"report folder ({out})")
+    parser.add_argument(
+        "--seeds", type=_count, metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
+    )
+    parser.add_argument("--jobs", type=_count, metavar="N", help="runs at a time (one for each core)")
+    parser.add_argument(
+        "--quick", action="store_true", help="few seeds and short runs, for a first look"
+    )
+    return parser
+
+
+@contextmanager
+def progress(total: int, what: str) -> Iterator[Callable[[], None]]:
+    """A bar on the terminal, if there is one; gives the function that moves it on by one."""
+    console = Console(stderr=True)
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)

@@ -1,0 +1,169 @@
+"""Variants of the shipped scenarios, run over many seeds in several processes; means with intervals."""
+
+import copy
+import json
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+import cosim
+from cosim.errors import nearest
+
+SCENARIOS = Path(__file__).parent.parent / "scenarios"
+
+Content = dict[str, Any]
+
+
+def shipped(name: str) -> Content:
+    """The content of ``scenarios/<name>.json``.
+
+    Raises:
+        InputError: there is no such scenario.
+    """
+    path = SCENARIOS / f"{name}.json"
+    if not path.is_file():
+        known = [p.stem for p in SCENARIOS.glob("*.json")]
+        raise cosim.InputError(f"no scenario '{name}'{nearest(name, known)}")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def vary(
+    content: Content,
+    fmus: Mapping[str, str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **keys: Any,
+) -> Content:
+    """A scenario with something else in it.
+
+    Args:
+        content: of a scenario; is not changed.
+        fmus: instance -> FMU that takes its place; parameters of the one before go with it.
+        parameters: ``instance.parameter`` -> value.
+        keys: other keys of the scenario that are replaced, such as ``faults``, ``stop``, ``log``.
+
+    Raises:
+        InputError: a parameter of an instance that there is not.
+    """
+    varied = {**copy.deepcopy(content), **keys}
+    for instance, path in (fmus or {}).items():
+        varied["fmus"][instance] = {"path": path}
+    for name, value in (parameters or {}).items():
+        instance, _, parameter = name.partition(".")
+        if instance not in varied["fmus"]:
+            raise cosim.InputError(f"no instance for '{name}'{nearest(instance, varied['fmus'])}")
+        varied["fmus"][instance].setdefault("parameters", {})[parameter] = value
+    return varied
+
+
+def without(faults: Sequence[Content], *kinds: str) -> list[Content]:
+    """The faults that are of none of these kinds."""
+    return [fault for fault in faults if fault["kind"] not in kinds]
+
+
+def metrics(result: cosim.Result) -> dict[str, float]:
+    """The metrics of a run that must have ended well.
+
+    Raises:
+        SimulationError: it did not.
+    """
+    if result.status != "done":
+        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
+    return result.metrics
+
+
+def _one(content: Content, folder: Path | None, analyse: Callable[[cosim.Result], Any]) -> Any:
+    """One run in a process of the pool, and what the analysis makes of it."""
+    with TemporaryDirectory() as scratch:
+        result = cosim.simulate(cosim.load_scenario(content), folder or scratch)
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        return analyse(result)
+
+
+def run_all(
+    variants: Mapping[str, Content],
+    seeds: Sequence[int],
+    analyse: Callable[[cosim.Result], Any] = metrics,
+    folder: Path | None = None,
+    processes: int | None = None,
+    advance: Callable[[], None] = lambda: None,
+) -> dict[str, list[Any]]:
+    """Run every variant with every seed.
+
+    Args:
+        variants: name -> content of a scenario.
+        seeds: of noise and faults.
+        analyse: function of a module (another process calls it) that takes the run, which may have
+            failed, reads from its folder what it needs, and returns the little that is kept.
+        folder: keeps the logs in ``<folder>/<variant>/<seed>``; None keeps none.
+        processes: how many runs at a time; None is one for each core.
+        advance: called after each finished run.
+
+    Returns:
+        Variant -> what the analysis returned, in the order of the seeds.
+    """
+    jobs = [(name, seed) for name in variants for seed in seeds]
+    found: dict[str, list[Any]] = {name: [] for name in variants}
+    # Forking a process that has loaded FMUs would copy their threads' locks.
+    pool = ProcessPoolExecutor(processes or os.cpu_count(), get_context("spawn"))
+    try:
+        futures = [
+            pool.submit(
+                _one,
+                {**variants[name], "seed": seed},
+                folder / name / str(seed) if folder else None,
+                analyse,
+            )
+            for name, seed in jobs
+        ]
+        for future in futures:
+            future.add_done_callback(lambda _: advance())
+        for (name, _), future in zip(jobs, futures, strict=True):
+            found[name].append(future.result())
+    finally:
+        with suppress(KeyboardInterrupt):
+            pool.shutdown(cancel_futures=True)
+    return found
+
+
+class Interval(NamedTuple):
+    """A mean and the interval that holds the true one with 95 % confidence."""
+
+    mean: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        if not all(map(math.isfinite, self)):
+            return f"{self.mean:.4g}"
+        return f"{self.mean:.4g} [{self.low:.4g}, {self.high:.4g}]"
+
+
+def interval(values: Sequence[float], level: float = 0.95) -> Interval:
+    """Mean of independent values with its Student t interval, which one value leaves open."""
+    x = np.asarray(values, float)
+    mean = float(x.mean())
+    if x.size < 2:
+        return Interval(mean, -math.inf, math.inf)
+    half = float(stats.t.ppf(0.5 + 0.5 * level, x.size - 1) * x.std(ddof=1) / math.sqrt(x.size))
+    return Interval(mean, mean - half, mean + half)
+
+
+def paired(a: Sequence[float], b: Sequence[float], level: float = 0.95) -> Interval:
+    """Interval of the mean of a - b, where both were run with the same seeds in the same order."""
+    return interval(np.subtract(a, b).tolist(), level)
+
+
+def ratio(a: Sequence[float], b: Sequence[float], level: float = 0.95) -> Interval:
+    """Interval of the geometric mean of a/b over the same seeds, for positive values."""
+    logs = np.log(np.divide(a, b)).tolist()
+    return Interval(*(math.exp(x) for x in interval(logs, level)))

@@ -1,0 +1,125 @@
+"""What the studies share: variants of scenarios, runs over seeds, intervals, reports."""
+
+import json
+
+import numpy as np
+import pytest
+
+import cosim
+from studies.command import study_parser
+from studies.report import Report, seeds_line, whole
+from studies.runs import Interval, interval, paired, ratio, run_all, shipped, vary, without
+
+
+def test_variant_leaves_the_shipped_content_alone():
+    content = shipped("ellipse")
+    before = json.dumps(content)
+    varied = vary(
+        content,
+        fmus={"observer": "observer_df.fmu"},
+        parameters={"vessel.delta_X_u": -4.0},
+        faults=without(content["faults"], "freeze"),
+        stop=5.0,
+    )
+    assert json.dumps(content) == before
+    assert varied["fmus"]["observer"] == {"path": "observer_df.fmu"}
+    assert varied["fmus"]["vessel"]["parameters"]["delta_X_u"] == -4.0
+    assert varied["fmus"]["vessel"]["parameters"]["x_0"] == 5.0
+    assert {fault["kind"] for fault in varied["faults"]} == {"noise"}
+    assert varied["stop"] == 5.0
+
+
+def test_wrong_names_are_told_with_what_was_near():
+    with pytest.raises(cosim.InputError, match="did you mean 'ellipse'"):
+        shipped("elipse")
+    with pytest.raises(cosim.InputError, match="did you mean 'vessel'"):
+        vary(shipped("ellipse"), parameters={"vesel.m": 1.0})
+
+
+def last_x(result):
+    return float(cosim.read_log(result.folder, ["observer.x_m"])["observer.x_m"][-1])
+
+
+def test_runs_come_back_by_variant_and_seed(tmp_path):
+    short = vary(shipped("ellipse"), stop=0.5, metrics={})
+    moved = vary(short, parameters={"vessel.x_0": 7.0})
+    finished = []
+    found = run_all({"a": short, "b": moved}, [3, 4], last_x, tmp_path, 2, lambda: finished.append(1))
+    assert len(finished) == 4
+    assert found["a"] == pytest.approx([5.0, 5.0], abs=0.05)
+    assert found["b"] == pytest.approx([7.0, 7.0], abs=0.05)
+    assert found["a"][0] != found["a"][1], "another seed gives other noise"
+    assert json.loads((tmp_path / "b" / "4" / "log.json").read_text())["scenario"]["seed"] == 4
+
+
+def test_interval_holds_the_true_mean_as_often_as_it_says():
+    rng = np.random.default_rng(0)
+    inside = 0
+    for _ in range(2000):
+        found = interval(rng.normal(1.0, 2.0, 5).tolist())
+        inside += found.low <= 1.0 <= found.high
+    assert 0.935 < inside / 2000 < 0.965
+
+
+def test_pairing_takes_off_what_both_share():
+    rng = np.random.default_rng(1)
+    shared = rng.normal(0.0, 100.0, 10)
+    a, b = shared + 1.0 + rng.normal(0.0, 0.01, 10), shared
+    assert paired(a, b).low > 0.9
+    assert interval(a - 50.0).low < 0.0
+    assert ratio(np.abs(b) * 2.0, np.abs(b)).mean == pytest.approx(2.0)
+
+
+def test_single_value_has_an_open_interval():
+    assert interval([3.0]) == (3.0, -np.inf, np.inf)
+    assert str(interval([3.0])) == "3"
+
+
+def test_report_holds_what_was_put_in(tmp_path):
+    from matplotlib.figure import Figure
+
+    report = Report(tmp_path / "new", "A study", [0, 1, 2])
+    report.heading("Part")
+    report.table(["name", "|e| [m]"], [["x|y", 0.123456], ["none", float("nan")]])
+    report.figure("picture", Figure(), "What is seen")
+    report.result("error", {"x": Interval(1.0, 0.5, 1.5), "y": np.array([1.0, np.nan])})
+    text = report.write().read_text()
+    assert "Seeds 0-2." in text
+    assert "| x\\|y | 0.1235 |" in text
+    assert "| none | – |" in text
+    assert "![What is seen](picture.png)" in text
+    results = json.loads((tmp_path / "new" / "results.json").read_text())
+    assert results["error"] == {"x": {"mean": 1.0, "low": 0.5, "high": 1.5}, "y": [1.0, None]}
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
+        "picture.png",
+        "report.md",
+        "results.json",
+    ]
+
+
+def test_what_fails_half_way_leaves_the_file_of_before(tmp_path):
+    path = tmp_path / "report.md"
+    path.write_text("before")
+
+    def fail():
+        with whole(path) as scratch:
+            scratch.write_text("half")
+            raise RuntimeError("stopped half way")
+
+    with pytest.raises(RuntimeError, match="half way"):
+        fail()
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_seeds_are_told_shortly():
+    assert seeds_line(range(10)) == "seeds 0-9"
+    assert seeds_line([3]) == "seed 3"
+    assert seeds_line([1, 5]) == "seeds 1, 5"
+
+
+@pytest.mark.parametrize("wrong", [["--seeds", "0"], ["--seeds", "many"], ["--jobs", "-1"], ["--what"]])
+def test_wrong_option_ends_in_exit_code_2(wrong):
+    with pytest.raises(SystemExit) as ended:
+        study_parser("nothing", "", "").parse_args(wrong)
+    assert ended.value.code == 2
