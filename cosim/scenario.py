@@ -65,6 +65,11 @@ class FmuEntry(Strict):
     )
     step: Step | None = Field(None, description="own step [s], a multiple of the base step")
     parameters: dict[str, Value] = Field(default_factory=dict, description="start values by name")
+    table: str | None = Field(
+        None,
+        min_length=1,
+        description="CSV file, relative to the scenario; column c holds the parameters c_1, c_2, ...",
+    )
 
 
 class Event(Strict):
