@@ -36,14 +36,14 @@ def read_table(path: Path) -> dict[str, list[float]]:
     names = [name.strip() for name in lines[0][1]]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"'{path}': the column '{name}' stands there twice")
+            raise InputError(f"'{path}': the column {name!r} stands there twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for line, cells in lines[1:]:
         where = f"'{path}', line {line}"
         if len(cells) != len(names):
             raise InputError(f"{where} has {len(cells)} cells, not {len(names)}")
         for name, cell in zip(names, cells, strict=True):
-            columns[name].append(_number(cell, f"{where}: {name}"))
+            columns[name].append(_number(cell, f"{where}: {name!r}"))
     return columns
 
 
@@ -52,7 +52,7 @@ def _number(text: str, where: str) -> float:
         value = float(text)
         if math.isfinite(value) and "_" not in text:
             return value
-    raise InputError(f"{where} = '{text[:40]}' is not a number")
+    raise InputError(f"{where} = {text[:40]!r} is not a number")
 
 
 def table_parameters(
@@ -75,7 +75,7 @@ def table_parameters(
     takes = [name.removesuffix("_1") for name in known if name.endswith("_1")]
     for name in columns:
         if name not in takes:
-            raise InputError(f"{where}: no column '{name}' is wanted{nearest(name, takes)}")
+            raise InputError(f"{where}: no column {name!r} is wanted{nearest(name, takes)}")
     for name in takes:
         if name not in columns and f"{name}_given" not in known:
             raise InputError(f"{where}: the column '{name}' is missing")
