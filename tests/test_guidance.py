@@ -176,6 +176,8 @@ def test_route_keeps_its_speed_and_ends_at_rest():
     speed = np.hypot(rows[:, 3], rows[:, 4])
     assert rows[0, :6] == pytest.approx(np.zeros(6))
     assert speed[200:9500] == pytest.approx(0.1)
+    moved = np.diff(rows[:, :2], axis=0) / 0.01
+    assert np.allclose(moved, 0.5 * (rows[1:, 3:5] + rows[:-1, 3:5]), atol=1e-5), "down to the end"
     assert rows[-1] == pytest.approx([0.0, 3.0, math.pi, *np.zeros(6)], abs=1e-6)
 
 
