@@ -51,6 +51,12 @@ def _fmu_path(path: str) -> str:
     return path
 
 
+def _table_path(path: str) -> str:
+    if not path.isprintable() or not path.endswith(".csv") or len(path) > 1000:
+        raise ValueError(f"{path[:100]!r} is not the name of a .csv file")
+    return path
+
+
 class Strict(BaseModel):
     """Refuses keys that it does not know."""
 
@@ -65,6 +71,10 @@ class FmuEntry(Strict):
     )
     step: Step | None = Field(None, description="own step [s], a multiple of the base step")
     parameters: dict[str, Value] = Field(default_factory=dict, description="start values by name")
+    table: Annotated[str, AfterValidator(_table_path)] | None = Field(
+        None,
+        description="CSV file, relative to the scenario; column c holds the parameters c_1, c_2, ...",
+    )
 
 
 class Event(Strict):

@@ -352,6 +352,7 @@ def _describe(system: System) -> dict[str, Any]:
     resolved["connections"] = [[c.source.name, c.target.name] for c in system.connections]
     for name, values in system.parameters.items():
         resolved["fmus"][name]["parameters"] = {v.name: value for v, value in values}
+        resolved["fmus"][name]["table"] = None  # its values are among the parameters
     return {
         "columns": columns,
         "fmus": {

@@ -14,6 +14,7 @@ from .fmu import NUMERIC, Model, Variable
 from .order import Link, execution_order
 from .scenario import Event, Scenario, Value
 from .ssv import Parameter
+from .table import read_table, table_parameters
 from .units import Conversion, conversion
 
 INT_LIMIT = 2**31
@@ -219,6 +220,7 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
     chosen: dict[str, dict[str, tuple[Value, str]]] = {}
     for name, entry in system.scenario.fmus.items():
         chosen[name] = {k: (v, f"fmus.{name}.parameters") for k, v in entry.parameters.items()}
+        chosen[name] |= _from_table(system, name)
     for path, by_model in overrides:
         for model_name, values in by_model.items():
             targets = [n for n, model in system.models.items() if model.name == model_name]
@@ -240,6 +242,20 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
                         )
                     chosen[name][parameter] = (value, f"'{path}'")
     return chosen
+
+
+def _from_table(system: System, name: str) -> dict[str, tuple[Value, str]]:
+    """The parameters of one instance that stand in a table, and where they come from."""
+    entry = system.scenario.fmus[name]
+    if entry.table is None:
+        return {}
+    path = system.scenario.folder / entry.table
+    known = {k: v for k, v in system.models[name].variables.items() if v.causality == "parameter"}
+    found = table_parameters(read_table(path), known, f"fmus.{name}.table '{path}'")
+    for parameter in entry.parameters:
+        if parameter in found:
+            raise InputError(f"fmus.{name}: {parameter} is given twice, in parameters and by '{path}'")
+    return {parameter: (value, f"'{path}'") for parameter, value in found.items()}
 
 
 def _check_unit(model: Model, parameter: str, given: Parameter, where: str) -> None:

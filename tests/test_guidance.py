@@ -1,6 +1,7 @@
 """Guidance: the derivatives are those of the path, and the paths are those of the thesis."""
 
 import math
+import random
 
 import numpy as np
 import pytest
@@ -27,23 +28,37 @@ def follow(name, seconds, h=0.01, **parameters):
     return np.array(rows)
 
 
+# What makes a path show all that it has.
+LIVELY = {
+    "guidance_setpoint": {"psi_s": 2.5},
+    "guidance_ellipse": {"pulse": 1.0},
+    "guidance_eight": {"pulse": 0.7, "pulse_rise": 100.0},
+    "guidance_zigzag": {"length": 1.0, "psi_c": 2.0, "pulse": 0.5},
+    "guidance_waypoints": {
+        "x_2": 6.0, "loop": 0.0, "psi_given": 1.0, "psi_2": 1.0, "psi_3": 3.0, "psi_4": -3.0,
+        "u_given": 1.0, "u_1": 0.08, "u_2": 0.05, "u_3": 0.07, "pulse": 0.3,
+    },
+}  # fmt: skip
+PACED = ["guidance_ellipse", "guidance_eight", "guidance_zigzag", "guidance_waypoints"]
+
+
+@pytest.mark.parametrize("parameters", [{}, LIVELY], ids=["plain", "lively"])
 @pytest.mark.parametrize("name", GUIDANCE)
-def test_derivatives_are_those_of_the_target(name):
-    extra = {"psi_s": 2.5} if name == "guidance_setpoint" else {}
-    h = 0.005
-    rows = follow(name, 60.0, h, **extra)
+def test_derivatives_are_those_of_the_target(name, parameters):
+    h = 0.001
+    rows = follow(name, 60.0, h, **parameters.get(name, {}))
     pose, rate, acceleration = rows[:, 0:3], rows[:, 3:6], rows[:, 6:9]
     pose = np.unwrap(pose, axis=0)
-    middle = slice(200, -2)  # a set point starts with a jump in its third derivative
+    middle = slice(1000, -2)  # a set point starts with a jump in its third derivative
     differenced = (pose[2:] - pose[:-2]) / (2.0 * h)
     assert np.allclose(differenced[middle], rate[1:-1][middle], atol=2e-5)
     differenced = (rate[2:] - rate[:-2]) / (2.0 * h)
     assert np.allclose(differenced[middle], acceleration[1:-1][middle], atol=2e-5)
 
 
-@pytest.mark.parametrize("name", ["guidance_ellipse", "guidance_eight"])
+@pytest.mark.parametrize("name", PACED)
 def test_heading_is_along_the_path(name):
-    rows = follow(name, 80.0)
+    rows = follow(name, 60.0)[1:]
     course = np.arctan2(rows[:, 4], rows[:, 3])
     assert np.allclose(np.cos(course - rows[:, 2]), 1.0, atol=1e-12)
 
@@ -66,13 +81,154 @@ def test_eight_starts_and_runs_as_in_the_errata():
     assert speed.mean() == pytest.approx(0.14 * 0.16, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["guidance_ellipse", "guidance_eight"])
-def test_fault_of_the_experiment_runs_four_times_too_fast(name):
+@pytest.mark.parametrize("pulse", [0.0, 0.5])
+@pytest.mark.parametrize("name", PACED)
+def test_fault_of_the_experiment_runs_four_times_too_fast(name, pulse):
     """The target moves at four times the speed that its own derivative states."""
-    rows = follow(name, 10.0, calls=4.0)
+    rows = follow(name, 12.0, calls=4.0, pulse=pulse)[200:]
     moved = np.hypot(*np.diff(rows[:, :2], axis=0).T) / 0.01
-    stated = np.hypot(rows[1:, 3], rows[1:, 4])
-    assert moved / stated == pytest.approx(4.0, rel=1e-3)
+    stated = np.hypot(rows[:, 3], rows[:, 4])
+    assert moved == pytest.approx(4.0 * 0.5 * (stated[1:] + stated[:-1]), rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", PACED)
+def test_without_pulses_their_period_does_not_matter(name):
+    other = follow(name, 40.0, pulse_period=3.0, pulse_width=0.2, pulse_rise=0.1)
+    assert (other == follow(name, 40.0)).all()
+
+
+def test_pulsing_target_stands_still_and_goes_on_at_full_speed():
+    rows = follow("guidance_ellipse", 30.0, pulse=1.0)
+    t = 0.01 * np.arange(len(rows)) % 15.0
+    speed = np.hypot(rows[:, 3], rows[:, 4])
+    assert speed[(t > 2.0) & (t < 10.5)] == pytest.approx(0.08)
+    still = (t > 12.5 + 1e-6) & (t < 15.0 - 1e-6)
+    assert (rows[still, 3:] == 0.0).all()
+    assert np.ptp(rows[still & (np.arange(len(rows)) < 1500), 0]) < 1e-12
+    assert speed.min() == 0.0
+
+
+@pytest.mark.parametrize("h", [0.01, 0.7, 15.0])
+@pytest.mark.parametrize(("pulse", "width"), [(1.0, 0.7), (0.4, 0.25)])
+def test_mean_speed_of_pulses_is_exact_whatever_the_step(pulse, width, h):
+    rows = follow("guidance_eight", 105.0, h, pulse=pulse, pulse_width=width)
+    passed = 105.0 * (1.0 - pulse * (1.0 - width))
+    assert rows[-1, :3] == pytest.approx(follow("guidance_eight", passed, passed)[-1, :3], abs=1e-9)
+
+
+def test_zigzag_goes_along_its_course_and_returns_astern():
+    rows = follow("guidance_zigzag", 137.5)
+    x, y, psi = rows[:, :3].T
+    assert rows[0, :6] == pytest.approx([3.0, 0.5, 0.35, 0.0, 0.0, 0.0])
+    assert (x.min(), x.max()) == pytest.approx((3.0, 7.0), abs=1e-6)
+    assert (psi.min(), psi.max()) == pytest.approx((-0.35, 0.35), abs=1e-9)
+    assert y.max() - 0.5 == pytest.approx(0.5 - y.min(), abs=1e-6)
+    assert 0.05 < np.ptp(y) < 1.0
+    # Four legs of a metre on the way: the heading changes sides four times, and as often on the way back.
+    assert (np.diff(np.sign(psi[np.abs(psi) > 0.01])) != 0).sum() == 8
+    ahead = np.cos(psi) * rows[:, 3] + np.sin(psi) * rows[:, 4]
+    assert (ahead[50:6800] > 0.0).all()
+    assert (ahead[7000:13700] < 0.0).all()
+    speed = np.abs(rows[:, 3])
+    assert speed[(x > 3.4) & (x < 6.6)] == pytest.approx(0.06)
+    assert rows[-1, :6] == pytest.approx(rows[0, :6], abs=1e-6)
+
+
+def test_zigzag_lies_where_it_is_wanted():
+    """Another course turns the path about its start."""
+    north = follow("guidance_zigzag", 50.0, x_0=0.0, y_0=0.0)
+    turned = follow("guidance_zigzag", 50.0, x_0=2.0, y_0=-1.0, psi_c=1.1)
+    c, s = math.cos(1.1), math.sin(1.1)
+    for k in (0, 3, 6):
+        offset = ([2.0, -1.0], [0.0, 0.0], [0.0, 0.0])[k // 3]
+        expected = north[:, k : k + 2] @ np.array([[c, s], [-s, c]]) + offset
+        assert np.allclose(turned[:, k : k + 2], expected, atol=1e-12)
+    assert np.allclose(turned[:, 2], north[:, 2] + 1.1, atol=1e-12)
+
+
+def route(points, seconds, h=0.01, **parameters):
+    """Rows along a route, given as (x, y), (x, y, psi), ... or with names of further columns."""
+    for k, point in enumerate(points, 1):
+        parameters |= {f"x_{k}": float(point[0]), f"y_{k}": float(point[1])}
+    return follow("guidance_waypoints", seconds, h, count=float(len(points)), **parameters)
+
+
+SQUARE = [(0, 0), (4, 0), (4, 3), (0, 3)]
+
+
+def test_route_follows_its_legs_and_cuts_its_corners():
+    rows = route(SQUARE, 120.0, 0.05, loop=0.0, u_t=0.1, corner=0.5)
+    x, y = rows[:, :2].T
+    on_a_leg = (
+        ((np.abs(y) < 1e-9) & (x < 3.5 + 1e-9))
+        | ((np.abs(x - 4.0) < 1e-7) & (y > 0.5 - 1e-9) & (y < 2.5 + 1e-9))
+        | ((np.abs(y - 3.0) < 1e-7) & (x < 3.5 + 1e-9))
+    )
+    in_a_corner = np.hypot(x - 4.0, np.minimum(y, 3.0 - y)) < 0.5 + 1e-6
+    assert (on_a_leg | in_a_corner).all()
+    # The bend leaves out less than the chord would, and stays inside of the corner.
+    assert 0.05 < np.hypot(x - 4.0, y).min() < 0.5 / math.sqrt(2.0)
+    assert x.max() < 4.0 + 1e-7
+
+
+def test_route_keeps_its_speed_and_ends_at_rest():
+    rows = route(SQUARE, 130.0, loop=0.0, u_t=0.1, run_up=0.2)
+    speed = np.hypot(rows[:, 3], rows[:, 4])
+    assert rows[0, :6] == pytest.approx(np.zeros(6))
+    assert speed[200:9500] == pytest.approx(0.1)
+    moved = np.diff(rows[:, :2], axis=0) / 0.01
+    assert np.allclose(moved, 0.5 * (rows[1:, 3:5] + rows[:-1, 3:5]), atol=1e-5), "down to the end"
+    assert rows[-1] == pytest.approx([0.0, 3.0, math.pi, *np.zeros(6)], abs=1e-6)
+
+
+def test_loop_closes():
+    rows = route(SQUARE, 400.0, 0.02, u_t=0.1, corner=0.5)
+    assert rows[0, :2] == pytest.approx([0.5, 0.0])
+    later = rows[5000:]
+    again = np.hypot(*(later[:, :2] - rows[2500, :2]).T)
+    assert again.min() < 0.002
+    assert np.abs(np.diff(np.unwrap(rows[:, 2]))).max() < 0.02 * rows[:, 5].max() * 1.01
+    assert np.hypot(*np.diff(rows[:, :2], axis=0).T).max() == pytest.approx(0.002, rel=1e-4)
+    assert np.ptp(np.unwrap(rows[:, 2])) > 4.0 * math.pi
+
+
+def test_route_takes_speeds_and_headings_of_its_points():
+    given = {"u_given": 1.0, "u_1": 0.1, "u_2": 0.05, "u_3": 0.2, "psi_given": 1.0, "psi_2": 1.0}
+    rows = route(SQUARE, 200.0, 0.05, loop=0.0, corner=0.5, psi_3=-2.5, psi_4=-2.0, **given)
+    x, y, psi = rows[:, :3].T
+    speed = np.hypot(rows[:, 3], rows[:, 4])
+    legs = (
+        (x > 0.5) & (x < 3.49) & (y < 1.0),
+        (y > 0.51) & (y < 2.49),
+        (x > 0.51) & (x < 3.49) & (y > 2.0),
+    )
+    for leg, u, heading in zip(legs, (0.1, 0.05, 0.2), (0.0, 1.0, -2.5), strict=True):
+        assert speed[leg] == pytest.approx(u)
+        assert psi[leg] == pytest.approx(heading)
+    assert psi[-1] == pytest.approx(-2.0)
+    assert (speed < 0.2 + 1e-9).all()
+    # From 1 to -2.5 rad the shorter way crosses pi.
+    assert np.unwrap(psi)[-1] == pytest.approx(2.0 * math.pi - 2.0)
+
+
+@pytest.mark.parametrize("loop", [0.0, 1.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_any_route_is_gone_without_a_jump(seed, loop):
+    """Random points, some of them twice and some straight back on the leg before."""
+    rng = np.random.default_rng(seed)
+    points = rng.integers(-2, 3, (rng.integers(2, 21), 2)).tolist()
+    rows = route(points, 300.0, 0.05, u_t=0.3, loop=loop)
+    assert np.isfinite(rows).all()
+    moved = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    assert moved.max() <= 0.3 * 0.05 * (1.0 + 1e-3) + 1e-6
+    assert np.hypot(rows[:, 3], rows[:, 4]).max() <= 0.3 * (1.0 + 1e-9)
+    assert np.abs(rows[:, :2]).max() <= 2.0 + 1e-5
+
+
+@pytest.mark.parametrize("name", PACED)
+def test_path_hardly_depends_on_the_step(name):
+    fine, coarse = (follow(name, 60.0, h, pulse=0.6) for h in (0.01, 0.5))
+    assert np.allclose(fine[::50, :2], coarse[:, :2], atol=2e-4 if name == "guidance_ellipse" else 1e-9)
 
 
 def test_set_point_is_reached_smoothly_and_whatever_the_step():
@@ -111,3 +267,47 @@ def test_multisine_starts_from_rest_and_excites_everything():
     assert u.min() < -0.03 < 0.03 < u.max()
     assert v.min() < -0.03 < 0.03 < v.max()
     assert np.abs(np.corrcoef([u, v, r]) - np.eye(3)).max() < 0.5
+
+
+@pytest.mark.parametrize("name", GUIDANCE)
+def test_outputs_are_finite_for_all_parameters_in_their_ranges(name):
+    c = COMPONENTS[name]
+    rng = random.Random(name)
+    for _ in range(100):
+        values = []
+        for v in variables(c.params):
+            low = -1e3 if v.range.min is None else v.range.min
+            high = 1e3 if v.range.max is None else v.range.max
+            values.append(rng.choice([low, high, v.start, v.start, rng.uniform(low, high)]))
+        p = packer(c.params)(values)
+        s = c.init(c.inputs(), p)
+        for h in (0.0, 0.01, 1.0, 100.0, 0.001, 0.01):
+            s, target = c.step(s, c.inputs(), p, h)
+            assert all(map(math.isfinite, flatten(target) + flatten(s)))
+
+
+def test_routes_may_be_laid_out_many_at_once():
+    c = COMPONENTS["guidance_waypoints"]
+    names = [v.name for v in variables(c.params)]
+    rng = np.random.default_rng(3)
+    changes = {n: rng.uniform(-3.0, 3.0, 5) for n in ("x_1", "y_2", "x_4", "y_5")}
+    changes |= {
+        "count": np.array([2.0, 3.0, 4.0, 5.0, 20.0]),
+        "loop": np.array([0.0, 1.0, 0.0, 1.0, 1.0]),
+    }
+
+    def last(pick):
+        values = [
+            pick(changes[n]) if n in changes else x
+            for n, x in zip(names, flatten(c.params()), strict=True)
+        ]
+        p = packer(c.params)(values)
+        s = c.init(c.inputs(), p)
+        for _ in range(40):
+            s, target = c.step(s, c.inputs(), p, 1.0)
+        return flatten(target)
+
+    together = last(lambda column: column)
+    for k in range(5):
+        alone = last(lambda column, k=k: float(column[k]))
+        assert [float(np.broadcast_to(x, 5)[k]) for x in together] == pytest.approx(alone, abs=1e-12)

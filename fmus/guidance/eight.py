@@ -1,7 +1,7 @@
 """Guidance along a figure of eight, (4.41)-(4.42); no inputs.
 
-The path parameter runs at a constant rate, so the speed is not constant: with u_t = 0.16 it is 0.01 to
-0.03 m/s and a round takes 422 s.
+The path parameter runs at a constant rate, or in pulses, so the speed is not constant: with
+u_t = 0.16 it is 0.01 to 0.03 m/s and a round takes 422 s.
 """
 
 import math
@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 from ..declare import Component, Range
 from ..ops import Number, cos, sin
 from ..signals import Nothing, Target
+from .pace import Clock, Pace, tick
 from .path import Course, PathPoint, target
 
 # 5.33 deg/s of path parameter for each m/s of u_t.
@@ -21,10 +22,12 @@ class Params(NamedTuple):
     a_x: Annotated[float, "m", "half length to the north", Range(min=0.01)] = 1.0
     a_y: Annotated[float, "m", "half width to the east", Range(min=0.01)] = 1.0
     course: Course = Course()
+    pace: Pace = Pace()
 
 
 class State(NamedTuple):
     theta: float = 0.0
+    clock: Clock = Clock()
 
 
 def init(i: Nothing, p: Params) -> State:
@@ -32,8 +35,9 @@ def init(i: Nothing, p: Params) -> State:
 
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
+    clock, beat = tick(s.clock, p.pace, h)
     theta_dot = RATE * p.u_t
-    theta = s.theta + h * p.course.calls * theta_dot
+    theta = s.theta + beat.passed * theta_dot
     n, e = sin(theta), cos(theta)
     n2, e2 = 2.0 * n * e, e * e - n * n
     point = PathPoint(
@@ -46,7 +50,7 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
         p.a_x * n,
         8.0 * p.a_y * e2,
     )
-    return State(theta), target(point, theta_dot, 0.0)
+    return State(theta, clock), target(point, *beat.rates(theta_dot, 0.0))
 
 
 COMPONENT = Component(

@@ -1,10 +1,11 @@
-"""Guidance along an ellipse at constant speed, (4.39)-(4.40); no inputs."""
+"""Guidance along an ellipse at constant or pulsing speed, (4.39)-(4.40); no inputs."""
 
 from typing import Annotated, NamedTuple
 
 from ..declare import Component, Range
 from ..ops import Number, cos, sin, sqrt
 from ..signals import Nothing, Target
+from .pace import Clock, Pace, tick
 from .path import Course, PathPoint, target
 
 
@@ -13,10 +14,12 @@ class Params(NamedTuple):
     a_x: Annotated[float, "m", "semi-axis to the north", Range(min=0.01)] = 1.0
     a_y: Annotated[float, "m", "semi-axis to the east", Range(min=0.01)] = 1.5
     course: Course = Course()
+    pace: Pace = Pace()
 
 
 class State(NamedTuple):
     theta: float = 0.0
+    clock: Clock = Clock()
 
 
 def rates(theta: Number, p: Params) -> tuple[Number, Number]:
@@ -33,9 +36,10 @@ def init(i: Nothing, p: Params) -> State:
 
 
 def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
+    clock, beat = tick(s.clock, p.pace, h)
     half, _ = rates(s.theta, p)
-    middle, _ = rates(s.theta + 0.5 * h * p.course.calls * half, p)
-    theta = s.theta + h * p.course.calls * middle
+    middle, _ = rates(s.theta + 0.5 * beat.passed * half, p)
+    theta = s.theta + beat.passed * middle
     theta_dot, theta_ddot = rates(theta, p)
     n, e = sin(theta), cos(theta)
     point = PathPoint(
@@ -48,7 +52,7 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
         -p.a_x * e,
         p.a_y * n,
     )
-    return State(theta), target(point, theta_dot, theta_ddot)
+    return State(theta, clock), target(point, *beat.rates(theta_dot, theta_ddot))
 
 
 COMPONENT = Component(

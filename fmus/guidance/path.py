@@ -2,23 +2,17 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Range
+from ..declare import FIXED
 from ..ops import Number, atan2
 from ..signals import Target
 
 
 class Course(NamedTuple):
-    """What all closed paths have: where they lie, where they start, and how they can go wrong.
-
-    With ``calls`` = 4 a path repeats the fault of the thesis' experiments: the path parameter is
-    advanced four times in every step while each call believes that one step has passed, so the target
-    runs at four times the speed that its own derivatives state.
-    """
+    """What all closed paths have: where they lie and where they start."""
 
     x_c: Annotated[float, "m", "north position of the centre"] = 5.0
     y_c: Annotated[float, "m", "east position of the centre"] = 0.5
     theta_0: Annotated[float, "rad", "path parameter at the start", FIXED] = 0.0
-    calls: Annotated[float, "1", "times the path is advanced each step", Range(0.0, 100.0)] = 1.0
 
 
 class PathPoint(NamedTuple):
