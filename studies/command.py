@@ -1,12 +1,17 @@
 """The command line that the studies share."""
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import cosim
+from cosim.command import BAD_INPUT, FAILED, run_command
 
 
 def _count(text: str) -> int:
@@ -51,3 +56,20 @@ def progress(total: int, what: str) -> Iterator[Callable[[], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=total)
         yield lambda: bar.advance(task)
+
+
+def run_study(study: Callable[[], Path]) -> NoReturn:
+    """Run a study, print the path of its report, and leave with an exit code."""
+
+    def work() -> int:
+        try:
+            print(study())
+        except cosim.InputError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return BAD_INPUT
+        except cosim.SimulationError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return FAILED
+        return 0
+
+    run_command(work)
