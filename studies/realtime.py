@@ -99,8 +99,8 @@ def study(out: Path, seconds: float, factors: Sequence[float], controllers: Sequ
     report.figure("pace", picture(runs, ellipse["step"]), "Lateness against the deadline.")
     report.text(
         "The operating system is an ordinary one: what else the machine does shows as single late "
-        "steps, and the next run of this study gives other numbers. What the pacing may never change is the "
-        "simulation itself; the last column compares the logs to the byte."
+        "steps, and the next run of this study gives other numbers. What the pacing may never change is "
+        "the simulation itself; the last column compares the logs to the byte."
     )
     report.result("runs", runs)
     return report.write()
