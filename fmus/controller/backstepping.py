@@ -5,6 +5,7 @@ omega_hat is what the law compensates for. Every heading difference is wrapped.
 """
 
 from collections import namedtuple
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from ..frames import rotate_to_body
@@ -72,6 +73,14 @@ def joined(typename: str, base: type[Any], **groups: Any) -> type[Any]:
         **{name: type(group) for name, group in groups.items()},
     }
     return made
+
+
+def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
+    """A group of parameters in a class of its own, with other start values for those that are named."""
+    values = {**base._field_defaults, **{k: x for k, x in starts.items() if k in base._fields}}
+    made = namedtuple(base.__name__, list(values), defaults=list(values.values()))
+    made.__annotations__ = base.__annotations__
+    return made()
 
 
 def outputs(model: Parametrisation, learning: Any = Nothing()) -> type[Any]:  # noqa: B008 - immutable

@@ -1,13 +1,13 @@
 """Improved concurrent learning, 7.2.2: surge and losses of thrust are learned too, spikes are kept out.
 
-The thresholds lie above what the ship does on the ellipse and in the eight; 3 N is what the thrusters
-of CyberShip Enterprise 1 can give.
+Samples are smoothed over two seconds (chapter 8): with a force among the regressors, the lag of an
+observer's acceleration would otherwise be taken for a loss of thrust. The thresholds lie above what the
+ship does on the ellipse; 3 N is what its thrusters give.
 """
 
-from .blocker import BlockerOptions
 from .concurrent import concurrent
 from .models import SURGE
-from .store import StoreOptions, window
+from .store import window
 
 COMPONENT = concurrent(
     name="controller_cl_improved",
@@ -15,6 +15,9 @@ COMPONENT = concurrent(
     model=SURGE,
     storage=window,
     by_eps=True,
-    store=StoreOptions(store_change=0.1),
-    blocker=BlockerOptions(nu_dot_max=0.5, nu_max=1.0, tau_max=3.0),
+    store_change=0.1,
+    smoothing=2.0,
+    nu_dot_max=0.2,
+    nu_max=1.0,
+    tau_max=3.0,
 )

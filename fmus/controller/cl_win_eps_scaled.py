@@ -2,7 +2,7 @@
 
 from .concurrent import concurrent
 from .models import SCALED
-from .store import StoreOptions, window
+from .store import window
 
 COMPONENT = concurrent(
     name="controller_cl_win_eps_scaled",
@@ -10,5 +10,5 @@ COMPONENT = concurrent(
     model=SCALED,
     storage=window,
     by_eps=True,
-    store=StoreOptions(store_change=0.1),
+    store_change=0.2,
 )

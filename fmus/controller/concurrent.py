@@ -7,12 +7,12 @@ infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Component
+from ..declare import POSITIVE, Component, DeclarationError
 from ..hull import Triple
 from ..ops import Number, choose, sqrt, when, where
 from ..signals import Force
 from .adaptive import attentive, energy, parameters, to_body
-from .backstepping import Inputs, control, control_errors, outputs
+from .backstepping import Inputs, control, control_errors, outputs, starting
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
 from .learning import Drive, Memory, integrated, learned
@@ -21,7 +21,7 @@ from .smoothing import Register, Sample, Tap, shifted
 from .store import Row, Storage, Store, StoreOptions, empty_store, offer, times
 
 
-class Options(NamedTuple):
+class SampleOptions(NamedTuple):
     """How omega_n is learned, and where samples come from."""
 
     rho: Annotated[float, "1/s", "omega_n by the integral (4.35); 0: by the store", POSITIVE] = 0.1
@@ -84,8 +84,7 @@ def concurrent(
     model: Parametrisation,
     storage: Storage,
     by_eps: bool,
-    store: StoreOptions = StoreOptions(),  # noqa: B008 - immutable
-    blocker: BlockerOptions = BlockerOptions(),  # noqa: B008 - immutable
+    **starts: float,
 ) -> Component:
     """A component that tracks, and learns a model by its past.
 
@@ -95,12 +94,17 @@ def concurrent(
         model: what is known and what is learned.
         storage: which samples are kept.
         by_eps: the instantaneous error is eps, else z2.
-        store, blocker: defaults of these parameters.
+        starts: start values of the parameters of store, blocker and samples that differ from the usual.
 
     Returns:
         The component.
     """
-    Params = parameters(model, store=store, blocker=blocker, options=Options())
+    options = {"store": StoreOptions, "blocker": BlockerOptions, "samples": SampleOptions}
+    groups = {name: starting(group, starts) for name, group in options.items()}
+    unknown = starts.keys() - {field for group in groups.values() for field in group._fields}
+    if unknown:
+        raise DeclarationError(f"{name} has no {', '.join(sorted(unknown))} to start differently")
+    Params = parameters(model, **groups)
     Outputs = outputs(model, Learning())
     still: Triple = (0.0, 0.0, 0.0)
     beginning = empty_store(model)
@@ -125,7 +129,7 @@ def concurrent(
         now = Sample(time, e.psi_hat, nu, nu_dot, s.tau)
         register, sample, counts, fresh = when(
             h > 0.0,
-            lambda: present(s.register, now, p.options.smoothing, learns),
+            lambda: present(s.register, now, p.samples.smoothing, learns),
             lambda: Present(s.register, now, 0.0, False),
         )
         F_sample, y, eps = explained(model, sample, s, p.belief)
@@ -135,14 +139,14 @@ def concurrent(
         row = Row(1.0, sample.time, sample.psi, target, F_sample)
         kept = offer(model, storage, s.store, row, fresh, time, p.store, omega_on)
         integral = when(
-            omega_on & (p.options.rho > 0.0),
+            omega_on & (p.samples.rho > 0.0),
             lambda: integrated(model, s.integral, row, dt * counts),
             lambda: s.integral,
         )
         sums = s.store.sums
         memory = when(
-            p.options.rho > 0.0,
-            lambda: times(p.options.rho, integral),
+            p.samples.rho > 0.0,
+            lambda: times(p.samples.rho, integral),
             lambda: Memory(sums.count, sums.turned, sums.cross),
         )
         if by_eps:

@@ -53,16 +53,17 @@ def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
     return (abs(u) * u, u, abs(u) * r, -tau[0]), (*f, -tau[1]), (*f, -tau[2])
 
 
-# (7.1)-(7.5). The surge coefficients add to g(nu).
+# (7.1)-(7.5). The surge coefficients add to g(nu). The gains of the losses are small because a force is
+# some ten times as large as the other regressors.
 SURGE = Parametrisation(
     coefficients=(
         Coefficient("X_absu_u, added", "N.s2/m2", "surge force, |u|u", 0.0, 8.0),
         Coefficient("X_u, added", "N.s/m", "surge force, u", 0.0, 4.0),
         Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
         *_ROTATIONAL,
-        Coefficient("delta_X", "1", "loss of thrust in surge", 0.0, 1.0),
-        Coefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 1.0),
-        Coefficient("delta_N", "1", "loss of moment in yaw", 0.0, 1.0),
+        Coefficient("delta_X", "1", "loss of thrust in surge", 0.0, 0.1),
+        Coefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 0.1),
+        Coefficient("delta_N", "1", "loss of moment in yaw", 0.0, 0.1),
     ),
     pattern=((0, 1, 2, 11), (3, 4, 5, 6, 12), (7, 8, 9, 10, 13)),
     regressors=_surge,

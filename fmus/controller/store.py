@@ -22,7 +22,7 @@ NEVER = 1e300
 class StoreOptions(NamedTuple):
     """What is stored, and how stored errors are used."""
 
-    store_change: Annotated[float, "1", "change of Phi between stored samples, delta", POSITIVE] = 0.03
+    store_change: Annotated[float, "1", "change of Phi between stored samples, delta", POSITIVE] = 0.015
     age_limit: Annotated[float, "s", "samples are forgotten after this time; 0: never", POSITIVE] = 0.0
     stale: Annotated[float, "1", "1: errors as they were when stored", FIXED, Range(0.0, 1.0)] = 0.0
     rank_tolerance: Annotated[float, "1", "rank is met above this singular value", POSITIVE] = 0.01
