@@ -75,10 +75,28 @@ def where(condition: Number, a: Number, b: Number) -> Number:
 
 
 def choose(condition: Number, a: Any, b: Any) -> Any:
-    """:func:`where` for two tuples of numbers of the same class."""
+    """:func:`where` for two numbers, or two nested tuples of numbers of the same shape."""
     if condition.__class__ is bool:
         return a if condition else b
-    return type(a)._make([where(condition, x, y) for x, y in zip(a, b, strict=True)])
+    if not isinstance(a, tuple):
+        return a if a is b else where(condition, a, b)
+    items = [choose(condition, x, y) for x, y in zip(a, b, strict=True)]
+    return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
+
+
+def when(condition: Number, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
+    """What ``a`` gives where the condition holds, else what ``b`` gives: for rare, costly work.
+
+    Both give numbers in the same nested tuples. On a bool only the one that counts is called.
+    """
+    if condition.__class__ is bool:
+        return a() if condition else b()
+    return choose(condition, a(), b())
+
+
+def put(rows: tuple[Any, ...], index: Number, row: Any) -> tuple[Any, ...]:
+    """The rows with another one at a place that may be a number; -1 is nowhere."""
+    return tuple([choose(index == float(k), row, old) for k, old in enumerate(rows)])
 
 
 def when(condition: Number, a: Callable[[], Any], b: Callable[[], Any]) -> Any:

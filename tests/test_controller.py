@@ -5,13 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from fmus.controller import abs as adaptive
-from fmus.controller import backstepping, bs
-from fmus.controller.backstepping import Gains, Inputs, PhiStart, control_errors
+from fmus.controller import abs as abs_module
+from fmus.controller import bs
+from fmus.controller.adaptive import Disturbance
+from fmus.controller.backstepping import Gains, Inputs, control_errors
+from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
+from fmus.frames import rotate_to_body
 from fmus.hull import Damping, Inertia, RotationalDamping, mass_matrix
 from fmus.signals import Estimate, Force, Target
 from fmus.vessel import vessel
 
+ABS = abs_module.COMPONENT
+Params = ABS.params
 TRUE_PHI = RotationalDamping()
 H = 0.002
 
@@ -59,7 +64,7 @@ def lyapunov(i, gains):
 def test_lyapunov_function_decays_with_perfect_knowledge(seed):
     rng = np.random.default_rng(seed)
     start = vessel.State(*map(float, rng.uniform(-0.5, 0.5, 6)))
-    params = bs.Params(phi=PhiStart(*TRUE_PHI))
+    params = bs.Params(phi=ROTATIONAL.start(*TRUE_PHI))
     history = [
         (t, lyapunov(i, params.gains))
         for t, _, _, i, _ in closed_loop(bs.COMPONENT, params, 20.0, start=start)
@@ -72,7 +77,7 @@ def test_lyapunov_function_decays_with_perfect_knowledge(seed):
 
 def test_decay_rate_is_that_of_the_gains():
     """V2_dot = -z1' Kp z1 - z2' Kd z2, (4.13), at one instant."""
-    params = bs.Params(phi=PhiStart(*TRUE_PHI))
+    params = bs.Params(phi=ROTATIONAL.start(*TRUE_PHI))
     start = vessel.State(0.3, -0.2, 0.4, 0.1, -0.05, 0.2)
     h = 1e-5
     loop = closed_loop(bs.COMPONENT, params, 2 * h, h, start)
@@ -85,10 +90,10 @@ def test_decay_rate_is_that_of_the_gains():
 
 def test_adaptation_recovers_known_parameters_under_rich_motion():
     """Y_r and N_r unknown, the rest known: both are found."""
-    phi = PhiStart(*TRUE_PHI)._replace(phi_0_2=0.0, phi_0_6=0.0)
-    gamma = adaptive.Gamma(0.0, 400.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0)
-    params = adaptive.Params(phi=phi, gamma=gamma)
-    *_, (_, _, state, _, _) = closed_loop(adaptive.COMPONENT, params, 200.0, 0.01)
+    phi = ROTATIONAL.start(*TRUE_PHI)._replace(phi_0_2=0.0, phi_0_6=0.0)
+    gamma = ROTATIONAL.gamma(0.0, 400.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0)
+    params = Params(phi=phi, gamma=gamma)
+    *_, (_, _, state, _, _) = closed_loop(ABS, params, 200.0, 0.01)
     assert list(state.phi_hat) == pytest.approx(list(TRUE_PHI), rel=0.02)
 
 
@@ -97,20 +102,18 @@ def test_adaptation_approaches_four_unknown_parameters():
     """r and |r|r are alike at the same yaw rates, so this takes long: the error falls to a seventh."""
     only = RotationalDamping(Y_absr_v=0.0, Y_absv_r=0.0, N_absr_v=0.0, N_absv_r=0.0)
     plant = vessel.Params(damping=Damping(rotational=only))
-    gamma = adaptive.Gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
-    params = adaptive.Params(gamma=gamma)
-    *_, (_, _, state, _, _) = closed_loop(adaptive.COMPONENT, params, 600.0, 0.01, plant=plant)
+    gamma = ROTATIONAL.gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
+    params = Params(gamma=gamma)
+    *_, (_, _, state, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)
     error = np.linalg.norm(np.subtract(state.phi_hat, only))
     assert error < np.linalg.norm(only) / 7.0
 
 
 def test_lyapunov_function_with_adaptation_does_not_grow():
-    gamma = np.array(adaptive.GAMMA)
-    params = adaptive.Params()
+    gamma = np.array(ROTATIONAL_GAINS)
+    params = Params()
     values = []
-    for _, _, cs, i, _ in closed_loop(
-        adaptive.COMPONENT, params, 20.0, start=vessel.State(x=0.3, r=0.2)
-    ):
+    for _, _, cs, i, _ in closed_loop(ABS, params, 20.0, start=vessel.State(x=0.3, r=0.2)):
         error = np.array(TRUE_PHI) - np.array(cs.phi_hat)
         values.append(lyapunov(i, params.gains) + 0.5 * error @ (error / gamma))
     growth = np.diff(values)
@@ -119,23 +122,23 @@ def test_lyapunov_function_with_adaptation_does_not_grow():
 
 
 def test_earth_fixed_force_is_found():
-    disturbance = adaptive.Disturbance(2.0, 2.0, 1.0)
-    params = adaptive.Params(
-        phi=PhiStart(*TRUE_PHI), gamma=adaptive.Gamma(*[0.0] * 8), disturbance=disturbance
+    disturbance = Disturbance(2.0, 2.0, 1.0)
+    params = Params(
+        phi=ROTATIONAL.start(*TRUE_PHI), gamma=ROTATIONAL.gamma(*[0.0] * 8), disturbance=disturbance
     )
     north, east, h = 0.2, -0.1, 0.01
     s, b = vessel.State(), vessel.hull(vessel.Params())
-    cs = adaptive.COMPONENT.init(None, params)
+    cs = ABS.init(None, params)
     for k in range(20000):
-        cs, out = adaptive.COMPONENT.step(cs, Inputs(true_estimate(s), rich_target(k * h)), params, h)
-        X, Y = backstepping.rotate_to_body(s.psi, north, east)
+        cs, out = ABS.step(cs, Inputs(true_estimate(s), rich_target(k * h)), params, h)
+        X, Y = rotate_to_body(s.psi, north, east)
         s = vessel.integrate(s, Force(out.tau[0] + X, out.tau[1] + Y, out.tau[2]), b, h)
-    assert (cs.omega_x, cs.omega_y) == pytest.approx((north, east), abs=0.02)
+    assert cs.omega[:2] == pytest.approx((north, east), abs=0.02)
 
 
 def test_force_is_the_sum_of_its_parts_and_omega_hat_is_the_models():
     s = vessel.State(0.1, 0.2, 0.3, 0.1, 0.05, -0.2)
-    params = bs.Params(phi=PhiStart(*TRUE_PHI))
+    params = bs.Params(phi=ROTATIONAL.start(*TRUE_PHI))
     _, out = bs.COMPONENT.step(bs.State(), Inputs(true_estimate(s), rich_target(3.0)), params, H)
     linear = (out.tau_lin_X, out.tau_lin_Y, out.tau_lin_N)
     nonlinear = (out.tau_nonlin_X, out.tau_nonlin_Y, out.tau_nonlin_N)
@@ -155,11 +158,11 @@ def test_whole_turns_of_heading_change_nothing(turns):
 
 
 def test_without_gains_adaptive_is_plain_backstepping():
-    gamma = adaptive.Gamma(*[0.0] * 8)
+    gamma = ROTATIONAL.gamma(*[0.0] * 8)
     s = vessel.State(0.1, 0.2, 0.3, 0.1, 0.05, -0.2)
     i = Inputs(true_estimate(s), rich_target(1.0))
-    state = adaptive.COMPONENT.init(i, adaptive.Params())
-    _, a = adaptive.COMPONENT.step(state, i, adaptive.Params(gamma=gamma), H)
+    state = ABS.init(i, Params())
+    _, a = ABS.step(state, i, Params(gamma=gamma), H)
     _, b = bs.COMPONENT.step(bs.State(), i, bs.Params(), H)
     assert a == b
 
@@ -168,11 +171,11 @@ def test_nothing_is_learned_while_frozen_if_so_chosen():
     s = vessel.State(v=0.1, r=0.2)
     frozen = Inputs(true_estimate(s)._replace(frozen=1.0), rich_target(0.0))
     for hold, learns in ((0.0, True), (1.0, False)):
-        params = adaptive.Params(hold_frozen=hold)
-        state, _ = adaptive.COMPONENT.step(adaptive.COMPONENT.init(None, params), frozen, params, H)
+        params = Params(hold_frozen=hold)
+        state, _ = ABS.step(ABS.init(None, params), frozen, params, H)
         assert any(state.phi_hat) == learns
 
 
 def test_gains_default_to_table_5_1():
     assert tuple(Gains()) == (0.4, 1.0, 0.2, 1.0, 5.0, 1.0)
-    assert adaptive.GAMMA == (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)
+    assert ROTATIONAL_GAINS == (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)

@@ -4,24 +4,15 @@ Convention: omega = -Phi(nu) phi + R^T omega_n is the model error, a force on th
 omega_hat is what the law compensates for. Every heading difference is wrapped.
 """
 
+from collections import namedtuple
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Range, variables, vector
 from ..frames import rotate_to_body
-from ..hull import (
-    Inertia,
-    RotationalDamping,
-    TowedDamping,
-    Triple,
-    coriolis_force,
-    inertia_force,
-    rotational_damping_force,
-    towed_damping_force,
-)
+from ..hull import Inertia, Triple, inertia_force
 from ..ops import wrap
-from ..signals import Estimate, Force, Target
-
-GAIN = Range(0.0, 1000.0)
+from ..signals import Estimate, Force, Nothing, Target
+from .parametrisation import GAIN, Parametrisation, Regressors
 
 
 class Gains(NamedTuple):
@@ -33,28 +24,6 @@ class Gains(NamedTuple):
     K_d_u: Annotated[float, "N.s/m", "velocity gain, surge", GAIN] = 1.0
     K_d_v: Annotated[float, "N.s/m", "velocity gain, sway", GAIN] = 5.0
     K_d_r: Annotated[float, "N.m.s/rad", "velocity gain, yaw", GAIN] = 1.0
-
-
-class Belief(NamedTuple):
-    """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
-
-    inertia: Inertia = Inertia()
-    towed: TowedDamping = TowedDamping()
-
-
-_COEFFICIENTS = variables(RotationalDamping)
-
-PhiStart = vector(
-    "PhiStart",
-    [
-        (f"phi_0_{k}", c.unit, f"estimate of {c.name} at the start", 0.0)
-        for k, c in enumerate(_COEFFICIENTS, 1)
-    ],
-)
-PhiHat = vector(
-    "PhiHat",
-    [(f"phi_hat_{k}", c.unit, f"estimate of {c.name}", 0.0) for k, c in enumerate(_COEFFICIENTS, 1)],
-)
 
 
 class Inputs(NamedTuple):
@@ -73,8 +42,8 @@ class Errors(NamedTuple):
     z2_r: Annotated[float, "rad/s", "velocity error, yaw"] = 0.0
 
 
-class Outputs(NamedTuple):
-    """What every controller shows."""
+class Demand(NamedTuple):
+    """The force that a controller asks for, and what it is made of."""
 
     tau: Force = Force()
     tau_lin_X: Annotated[float, "N", "linear part of the surge force, (5.1)"] = 0.0
@@ -87,7 +56,36 @@ class Outputs(NamedTuple):
     omega_hat_X: Annotated[float, "N", "estimated model error in surge"] = 0.0
     omega_hat_Y: Annotated[float, "N", "estimated model error in sway"] = 0.0
     omega_hat_N: Annotated[float, "N.m", "estimated model error in yaw"] = 0.0
-    phi_hat: Any = PhiHat()
+
+
+class Energy(NamedTuple):
+    """The Lyapunov function."""
+
+    lyapunov: Annotated[float, "1", "Lyapunov function of errors and estimates, (4.14)"] = 0.0
+
+
+def joined(typename: str, base: type[Any], **groups: Any) -> type[Any]:
+    """A NamedTuple class with the fields of another and then groups of scalars."""
+    starts = {**base._field_defaults, **groups}
+    made = namedtuple(typename, list(starts), defaults=list(starts.values()))
+    made.__annotations__ = {
+        **base.__annotations__,
+        **{name: type(group) for name, group in groups.items()},
+    }
+    return made
+
+
+def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
+    """A group of parameters in a class of its own, with other start values for those that are named."""
+    values = {**base._field_defaults, **{k: x for k, x in starts.items() if k in base._fields}}
+    made = namedtuple(base.__name__, list(values), defaults=list(values.values()))
+    made.__annotations__ = base.__annotations__
+    return made()
+
+
+def outputs(model: Parametrisation, learning: Any = Nothing()) -> type[Any]:  # noqa: B008 - immutable
+    """The outputs of a controller with this parametrisation, and what its way of learning shows."""
+    return joined("Outputs", Demand, phi_hat=model.hat(), energy=Energy(), learning=learning)
 
 
 def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
@@ -128,29 +126,55 @@ def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
 
 
 def control(
-    e: Estimate, z: Errors, alpha_dot: Triple, k: Gains, b: Belief, phi_hat: Any, w: Triple
-) -> Outputs:
+    model: Parametrisation,
+    nu: Triple,
+    errors: tuple[Errors, Triple],
+    k: Gains,
+    belief: Any,
+    F: Regressors,
+    phi: Any,
+    w: Triple,
+) -> Demand:
     """The force of Table 4.2, split into its linear and nonlinear part, (5.1).
 
+    Where a loss of thrust is learned, the wanted force is divided by what is left of it, (7.6).
+
     Args:
-        e: estimated state.
-        z, alpha_dot: from :func:`control_errors`.
+        model: what is known and what is learned.
+        nu: velocity [m/s, m/s, rad/s].
+        errors: z1, z2 and alpha_dot from :func:`control_errors`.
         k: feedback gains.
-        b: belief about the hull.
-        phi_hat: estimated rotational damping coefficients, (2.31).
+        belief: about the hull.
+        F: regressors at this velocity and at alpha_dot.
+        phi: estimated parameters.
         w: body-fixed part R^T omega_n_hat of the estimated model error [N, N, N m].
 
     Returns:
-        All outputs of a controller.
+        The force and its parts.
     """
-    u, v, r = e.u_hat, e.v_hat, e.r_hat
-    MX, MY, MN = inertia_force(*alpha_dot, b.inertia)
-    CX, CY, CN = coriolis_force(u, v, r, b.inertia)
-    GX, GY, GN = towed_damping_force(u, v, b.towed)
-    PX, PY, PN = rotational_damping_force(v, r, phi_hat)
+    z, alpha_dot = errors
+    MX, MY, MN = inertia_force(*alpha_dot, belief.inertia)
+    KX, KY, KN = model.known(*nu, belief)
+    PX, PY, PN = model.force(F, model.without_loss(phi))
     oX, oY, oN = PX + w[0], PY + w[1], PN + w[2]
     lX = -z.z1_x - k.K_d_u * z.z2_u + MX
     lY = -z.z1_y - k.K_d_v * z.z2_v + MY
     lN = -z.z1_psi - k.K_d_r * z.z2_r + MN
-    nX, nY, nN = CX - GX - oX, CY - GY - oY, CN - GN - oN
-    return Outputs(Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN, phi_hat)
+    nX, nY, nN = 0.0 - KX - oX, 0.0 - KY - oY, 0.0 - KN - oN  # no -0 at rest
+    losses = model.losses(phi)
+    if losses is not None:
+        left = [1.0 - loss for loss in losses]
+        lX, lY, lN = lX / left[0], lY / left[1], lN / left[2]
+        nX, nY, nN = nX / left[0], nY / left[1], nN / left[2]
+        oX = oX - losses[0] * (lX + nX)
+        oY = oY - losses[1] * (lY + nY)
+        oN = oN - losses[2] * (lN + nN)
+    return Demand(Force(lX + nX, lY + nY, lN + nN), lX, lY, lN, nX, nY, nN, z, oX, oY, oN)
+
+
+def tracking_energy(z: Errors, inertia: Inertia) -> Any:
+    """V2 = 1/2 z1^T z1 + 1/2 z2^T M z2, (4.8)."""
+    MX, MY, MN = inertia_force(z.z2_u, z.z2_v, z.z2_r, inertia)
+    return 0.5 * (
+        z.z1_x * z.z1_x + z.z1_y * z.z1_y + z.z1_psi * z.z1_psi + z.z2_u * MX + z.z2_v * MY + z.z2_r * MN
+    )

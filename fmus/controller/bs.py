@@ -7,13 +7,17 @@ from typing import Any, NamedTuple
 
 from ..declare import Component
 from ..ops import Number
-from .backstepping import Belief, Gains, Inputs, Outputs, PhiHat, PhiStart, control, control_errors
+from .backstepping import Energy, Gains, Inputs, control, control_errors, outputs, tracking_energy
+from .models import ROTATIONAL
+from .parametrisation import Belief
+
+Outputs = outputs(ROTATIONAL)
 
 
 class Params(NamedTuple):
     gains: Gains = Gains()
     belief: Belief = Belief()
-    phi: Any = PhiStart()
+    phi: Any = ROTATIONAL.start()
 
 
 class State(NamedTuple):
@@ -24,10 +28,15 @@ def init(i: Inputs, p: Params) -> State:
     return State()
 
 
-def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
-    errors, alpha_dot = control_errors(i.estimate, i.target, p.gains)
-    phi = PhiHat._make(p.phi)
-    return s, control(i.estimate, errors, alpha_dot, p.gains, p.belief, phi, (0.0, 0.0, 0.0))
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Any]:
+    e = i.estimate
+    nu = (e.u_hat, e.v_hat, e.r_hat)
+    errors = control_errors(e, i.target, p.gains)
+    rest = (0.0, 0.0, 0.0)
+    F = ROTATIONAL.regressors(nu, errors[1], rest, p.belief)
+    demand = control(ROTATIONAL, nu, errors, p.gains, p.belief, F, p.phi, rest)
+    energy = Energy(tracking_energy(errors[0], p.belief.inertia))
+    return s, Outputs(*demand, ROTATIONAL.hat._make(p.phi), energy)
 
 
 COMPONENT = Component(

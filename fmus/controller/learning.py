@@ -1,0 +1,122 @@
+"""How fast concurrent learning moves its estimates, 4.1.2-4.1.5, corrected.
+
+    phi_hat'     = Gamma (F^T e + sum_j F_j^T eps_j)
+    omega_n_hat' = Gamma_omega (R e + sum_j R_j eps_j), or (4.35) with rho > 0
+
+where F = -Phi and e is z2 or eps. The errors eps_j are formed anew with today's estimates; ``stale`` = 1
+uses them as they were when stored, as printed.
+
+The part driven by eps is a linear feedback with the information matrix Q. Explicit Euler is unstable
+where h Gamma lambda_max(Q) > 2, so that part goes slower where h times the trace of Gamma Q exceeds 1.
+With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n each.
+"""
+
+from typing import Any, NamedTuple
+
+from ..hull import Triple
+from ..ops import Number, fmax, when, where
+from .adaptive import Disturbance, climb, to_earth
+from .eigen import dot
+from .parametrisation import Parametrisation, Regressors
+from .store import Row, Sums, plus, times
+
+
+class Memory(NamedTuple):
+    """Sum or integral over samples: weight, R target, and F^T R^T."""
+
+    weight: Any
+    turned: Triple
+    cross: tuple[Triple, ...]
+
+
+def stored_slopes(
+    model: Parametrisation, sums: Sums, phi: Any, omega: Triple, stale: Number
+) -> tuple[Any, ...]:
+    """sum_j F_j^T eps_j, from the sums over the store."""
+    explained: list[Any] = [dot(row, omega) for row in sums.cross]
+    for indices, gram in zip(model.pattern, sums.grams, strict=True):
+        own = [phi[k] for k in indices]
+        for k, line in zip(indices, gram, strict=True):
+            explained[k] = explained[k] + dot(line, own)
+    fresh = where(stale > 0.5, 0.0, 1.0)
+    return tuple([b - fresh * x for b, x in zip(sums.projected, explained, strict=True)])
+
+
+def earth_slopes(memory: Memory, phi: Any, omega: Triple, stale: Number) -> Triple:
+    """sum_j R_j eps_j, or its integral."""
+    fresh = where(stale > 0.5, 0.0, 1.0)
+    a, b, c = (
+        turned - fresh * (dot(column, phi) + memory.weight * x)
+        for turned, column, x in zip(memory.turned, zip(*memory.cross, strict=True), omega, strict=True)
+    )
+    return a, b, c
+
+
+def information(model: Parametrisation, gamma: Any, sums: Sums, F: Regressors, own: Number) -> Any:
+    """Trace of Gamma Q, of the store and of ``own`` times the present sample."""
+    total = 0.0
+    for indices, gram, row in zip(model.pattern, sums.grams, F, strict=True):
+        for position, k in enumerate(indices):
+            f = row[position]
+            total = total + gamma[k] * (gram[position][position] + own * f * f)
+    return total
+
+
+def integrated(model: Parametrisation, s: Memory, row: Row, dt: Number) -> Memory:
+    """The integral of (4.35) after dt [s]."""
+    now = Memory(1.0, to_earth(row.psi, row.target), model.turned(row.F, row.psi))
+    return Memory._make(plus(s, times(dt, now)))
+
+
+class Drive(NamedTuple):
+    """An instantaneous error, z2 or eps, with its regressors and heading."""
+
+    F: Regressors
+    psi: Any
+    error: Triple
+
+
+def learned(
+    model: Parametrisation,
+    estimates: tuple[Any, Triple],
+    gains: tuple[Any, Disturbance],
+    drive: Drive,
+    by_eps: Number,
+    sums: Sums,
+    memory: Memory,
+    stale: Number,
+    dt: Number,
+) -> tuple[Any, Triple]:
+    """The estimates after dt [s].
+
+    Args:
+        model: what is learned.
+        estimates: phi_hat and omega_n_hat.
+        gains: diagonals of Gamma and Gamma_omega.
+        drive: the instantaneous error.
+        by_eps: 1 where that is eps, and so belongs to the guarded part, else 0.
+        sums: over the store.
+        memory: what omega_n learns by.
+        stale: 1 for errors as they were when stored.
+        dt: 0 where nothing is learned.
+
+    Returns:
+        phi_hat and omega_n_hat.
+    """
+    phi, omega = estimates
+    gamma, gamma_omega = gains
+    on = dot(gamma_omega, (1.0, 1.0, 1.0))
+    trace = information(model, gamma, sums, drive.F, by_eps) + on * (memory.weight + by_eps)
+    guarded = dt / fmax(1.0, dt * trace)
+    pace = where(by_eps > 0.5, guarded, dt)
+    slopes = stored_slopes(model, sums, phi, omega, stale)
+    earth = when(
+        on > 0.0,
+        lambda: earth_slopes(memory, phi, omega, stale),
+        lambda: (0.0, 0.0, 0.0),
+    )
+    phi = climb(climb(phi, gamma, slopes, guarded), gamma, model.project(drive.F, drive.error), pace)
+    a, b, c = climb(
+        climb(omega, gamma_omega, earth, guarded), gamma_omega, to_earth(drive.psi, drive.error), pace
+    )
+    return model.hat._make(phi), (a, b, c)

@@ -1,0 +1,167 @@
+"""The parametrisations of the thesis, 2.2 and (7.1): each one object, which any law can learn by."""
+
+from typing import Any, NamedTuple
+
+from ..declare import variables
+from ..hull import (
+    Inertia,
+    RotationalDamping,
+    TowedDamping,
+    Triple,
+    coriolis_force,
+    inertia_force,
+    rotational_damping_force,
+    rotational_regressors,
+    towed_damping_force,
+)
+from ..ops import Number
+from .parametrisation import Belief, Coefficient, Parametrisation, Regressors
+
+# Table 5.1, in the order of (2.31).
+ROTATIONAL_GAINS = (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)
+_ROTATIONAL = tuple(
+    Coefficient(c.name, c.unit, c.description, c.start, gain)
+    for c, gain in zip(variables(RotationalDamping), ROTATIONAL_GAINS, strict=True)
+)
+
+
+def towed_and_coriolis(u: Number, v: Number, r: Number, b: Belief) -> Triple:
+    """-C(nu) nu - g(nu), (2.27)."""
+    CX, CY, CN = coriolis_force(u, v, r, b.inertia)
+    X, Y, N = towed_damping_force(u, v, b.towed)
+    return X - CX, Y - CY, N - CN
+
+
+def _rotational(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+    f = rotational_regressors(nu[1], nu[2])
+    return (), f, f
+
+
+# (2.27)-(2.32). Sway and yaw have the same regressors, so one block stands for both.
+ROTATIONAL = Parametrisation(
+    coefficients=_ROTATIONAL,
+    pattern=((), (0, 1, 2, 3), (4, 5, 6, 7)),
+    regressors=_rotational,
+    known=towed_and_coriolis,
+    blocks=((1,),),
+)
+
+
+def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+    u, v, r = nu
+    f = rotational_regressors(v, r)
+    return (abs(u) * u, u, abs(u) * r, -tau[0]), (*f, -tau[1]), (*f, -tau[2])
+
+
+# (7.1)-(7.5). The surge coefficients add to g(nu). The gains of the losses are small because a force is
+# some ten times as large as the other regressors.
+SURGE = Parametrisation(
+    coefficients=(
+        Coefficient("X_absu_u, added", "N.s2/m2", "surge force, |u|u", 0.0, 8.0),
+        Coefficient("X_u, added", "N.s/m", "surge force, u", 0.0, 4.0),
+        Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
+        *_ROTATIONAL,
+        Coefficient("delta_X", "1", "loss of thrust in surge", 0.0, 0.1),
+        Coefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 0.1),
+        Coefficient("delta_N", "1", "loss of moment in yaw", 0.0, 0.1),
+    ),
+    pattern=((0, 1, 2, 11), (3, 4, 5, 6, 12), (7, 8, 9, 10, 13)),
+    regressors=_surge,
+    known=towed_and_coriolis,
+    blocks=((0,), (1,), (2,)),
+    loss=(11, 12, 13),
+)
+
+
+class InertiaOnly(NamedTuple):
+    """A controller that knows M and nothing else."""
+
+    inertia: Inertia = Inertia()
+
+
+def nothing(u: Number, v: Number, r: Number, b: InertiaOnly) -> Triple:
+    return 0.0, 0.0, 0.0
+
+
+def _all(nu: Triple, nu_dot: Triple, tau: Triple, b: InertiaOnly) -> Regressors:
+    u, v, r = nu
+    av, uv, vv = abs(v), u * v, v * v
+    f = rotational_regressors(v, r)
+    return (
+        (-r * r, -v * r, u, abs(u) * u, u * u * u, vv),
+        (-u * r, v, av * v, vv * v, *f),
+        (r * u, uv, uv, v, av * v, *f),
+    )
+
+
+_I = Inertia()
+
+# (2.24)-(2.26), corrected: c1, c2, c3 of C(nu), and all damping of Table 2.1.
+ALL_UNKNOWN = Parametrisation(
+    coefficients=(
+        Coefficient("c1", "kg.m", "Y_rdot - m x_g of C(nu)", _I.Y_rdot - _I.m * _I.x_g, 8.0),
+        Coefficient("c2", "kg", "Y_vdot - m of C(nu)", _I.Y_vdot - _I.m, 8.0),
+        Coefficient("c3", "kg", "m - X_udot of C(nu)", _I.m - _I.X_udot, 8.0),
+        *(Coefficient(c.name, c.unit, c.description, c.start, 8.0) for c in variables(TowedDamping)),
+        *_ROTATIONAL,
+    ),
+    pattern=(
+        (0, 1, 3, 4, 5, 6),
+        (2, 7, 8, 9, 12, 13, 14, 15),
+        (0, 1, 2, 10, 11, 16, 17, 18, 19),
+    ),
+    regressors=_all,
+    known=nothing,
+    blocks=((0, 1, 2),),
+    belief=InertiaOnly(),
+)
+
+
+class FullBelief(NamedTuple):
+    """The whole hull, right up to two factors."""
+
+    inertia: Inertia = Inertia()
+    towed: TowedDamping = TowedDamping()
+    rotational: RotationalDamping = RotationalDamping()
+
+
+def _damping(u: Number, v: Number, r: Number, b: FullBelief) -> Triple:
+    X1, Y1, N1 = towed_damping_force(u, v, b.towed)
+    X2, Y2, N2 = rotational_damping_force(v, r, b.rotational)
+    return X1 + X2, Y1 + Y2, N1 + N2
+
+
+def everything(u: Number, v: Number, r: Number, b: FullBelief) -> Triple:
+    """-C(nu) nu - D(nu) nu."""
+    CX, CY, CN = coriolis_force(u, v, r, b.inertia)
+    X, Y, N = _damping(u, v, r, b)
+    return X - CX, Y - CY, N - CN
+
+
+def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullBelief) -> Regressors:
+    MX, MY, MN = inertia_force(*nu_dot, b.inertia)
+    CX, CY, CN = coriolis_force(*nu, b.inertia)
+    X, Y, N = _damping(*nu, b)
+    return (-MX - CX, X), (-MY - CY, Y), (-MN - CN, N)
+
+
+# (2.20)-(2.22): phi is what the factors of inertia and damping exceed 1 by.
+SCALED = Parametrisation(
+    coefficients=(
+        Coefficient("delta_M - 1", "1", "excess of the inertia's factor", 0.0, 1.0),
+        Coefficient("delta_D - 1", "1", "excess of the damping's factor", 0.0, 1.0),
+    ),
+    pattern=((0, 1), (0, 1), (0, 1)),
+    regressors=_scaled,
+    known=everything,
+    blocks=((0, 1, 2),),
+    belief=FullBelief(),
+    by_acceleration=True,
+)
+
+PARAMETRISATIONS: dict[str, Any] = {
+    "rotational": ROTATIONAL,
+    "surge": SURGE,
+    "all": ALL_UNKNOWN,
+    "scaled": SCALED,
+}

@@ -1,0 +1,144 @@
+"""What of the hull's dynamics a controller knows, and what it learns, 2.2.
+
+The force on the hull is known + F phi + R^T omega_n + tau = M nu_dot: F = -Phi holds the regressors.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from ..declare import Range, vector
+from ..hull import Inertia, TowedDamping, Triple, inertia_force
+from ..ops import Number, clip, cos, sin
+
+GAIN = Range(0.0, 1000.0)
+# A thruster loss beyond these is not compensated for.
+LOSS = (-1.0, 0.8)
+
+# One tuple of regressors for each axis, aligned with the pattern.
+Regressors = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+
+
+class Coefficient(NamedTuple):
+    """A parameter that is learned: its true value for the default vessel, and an adaptation gain."""
+
+    name: str
+    unit: str
+    description: str
+    value: float
+    gain: float
+
+
+class Belief(NamedTuple):
+    """What the controller believes of the hull: M, C(nu) and g(nu) of (2.27)."""
+
+    inertia: Inertia = Inertia()
+    towed: TowedDamping = TowedDamping()
+
+
+@dataclass(frozen=True, eq=False)
+class Parametrisation:
+    """A model M nu_dot = tau + known + F phi.
+
+    Attributes:
+        coefficients: the n parameters phi.
+        pattern: for surge, sway and yaw the indices of the parameters that act there.
+        regressors: (velocity, acceleration, tau, belief) -> F: force on the hull by each parameter.
+        known: (u, v, r, belief) -> known force on the hull [N, N, N m].
+        blocks: groups of axes that share parameters; of equal groups one is enough.
+        belief: what is believed beforehand; has a field ``inertia``.
+        loss: index of the thruster loss of each axis, where it is learned.
+        by_acceleration: True where F depends on the acceleration.
+    """
+
+    coefficients: Sequence[Coefficient]
+    pattern: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+    regressors: Callable[[Triple, Triple, Triple, Any], Regressors]
+    known: Callable[[Number, Number, Number, Any], Triple]
+    blocks: tuple[tuple[int, ...], ...]
+    belief: Any = field(default_factory=Belief)
+    loss: tuple[int, int, int] | None = None
+    by_acceleration: bool = False
+
+    def _vector(self, stem: str, text: str, start: Callable[[Coefficient], float]) -> type[Any]:
+        """A NamedTuple class with one scalar for each parameter."""
+        name = stem.title().replace("_", "")
+        fields = enumerate(self.coefficients, 1)
+        return vector(name, [(f"{stem}_{k}", c.unit, f"{text} {c.name}", start(c)) for k, c in fields])
+
+    @cached_property
+    def start(self) -> type[Any]:
+        return self._vector("phi_0", "estimate at the start of", lambda c: 0.0)
+
+    @cached_property
+    def hat(self) -> type[Any]:
+        return self._vector("phi_hat", "estimate of", lambda c: 0.0)
+
+    @cached_property
+    def truth(self) -> type[Any]:
+        return self._vector("phi_true", "for the output lyapunov only: true", lambda c: c.value)
+
+    @cached_property
+    def gamma(self) -> type[Any]:
+        fields = [
+            (f"gamma_{k}", "1", f"adaptation gain of {c.name}", c.gain)
+            for k, c in enumerate(self.coefficients, 1)
+        ]
+        return vector("Gamma", fields, [GAIN])
+
+    def force(self, F: Regressors, phi: Sequence[Any]) -> Triple:
+        """F phi [N, N, N m]."""
+        forces = []
+        for indices, row in zip(self.pattern, F, strict=True):
+            total = 0.0
+            for k, f in zip(indices, row, strict=True):
+                total = total + phi[k] * f
+            forces.append(total)
+        return forces[0], forces[1], forces[2]
+
+    def project(self, F: Regressors, e: Triple) -> tuple[Any, ...]:
+        """F^T e, one entry for each parameter."""
+        sums: list[Any] = [0.0] * len(self.coefficients)
+        for indices, row, x in zip(self.pattern, F, e, strict=True):
+            for k, f in zip(indices, row, strict=True):
+                sums[k] = sums[k] + f * x
+        return tuple(sums)
+
+    def turned(self, F: Regressors, psi: Number) -> tuple[Triple, ...]:
+        """F^T R^T(psi), one row for each parameter: its force in the earth-fixed frame."""
+        c, s = cos(psi), sin(psi)
+        columns = [self.project(F, x) for x in ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))]
+        return tuple(zip(*columns, strict=True))
+
+    def error(self, nu: Triple, nu_dot: Triple, tau: Triple, belief: Any) -> Triple:
+        """y = M nu_dot - known - tau [N, N, N m], (2.36): what F phi + R^T omega_n has to explain."""
+        MX, MY, MN = inertia_force(*nu_dot, belief.inertia)
+        X, Y, N = self.known(*nu, belief)
+        return MX - X - tau[0], MY - Y - tau[1], MN - N - tau[2]
+
+    def losses(self, phi: Sequence[Any]) -> Triple | None:
+        """The limited thruster losses, tau_act = (1 - delta) tau, (7.6); None where not learned."""
+        if self.loss is None:
+            return None
+        a, b, c = (clip(phi[k], *LOSS) for k in self.loss)
+        return a, b, c
+
+    def without_loss(self, phi: Sequence[Any]) -> Sequence[Any]:
+        """The parameters with thruster losses of zero."""
+        lost = self.loss or ()
+        return [0.0 if k in lost else x for k, x in enumerate(phi)] if lost else phi
+
+    def matrices(self, grams: Sequence[Any]) -> list[list[list[Any]]]:
+        """The information matrix (F^T F summed up) of each block, from that of each axis."""
+        found = []
+        for axes in self.blocks:
+            members = sorted({k for axis in axes for k in self.pattern[axis]})
+            place = {k: position for position, k in enumerate(members)}
+            matrix: list[list[Any]] = [[0.0] * len(members) for _ in members]
+            for axis in axes:
+                for i, row in zip(self.pattern[axis], grams[axis], strict=True):
+                    for j, x in zip(self.pattern[axis], row, strict=True):
+                        matrix[place[i]][place[j]] = matrix[place[i]][place[j]] + x
+            found.append(matrix)
+        return found
