@@ -1,7 +1,7 @@
 """What does the memory of concurrent learning cost? ``python -m benchmarks.storage``.
 
-Runs scenarios/ellipse.json with each controller that stores samples, then gives what the controller saw to
-its plain function again and times the storage alone: the gate, the choice of a row, and the sums.
+Runs scenarios/ellipse.json with each controller that stores samples, then gives what the controller saw
+to its plain function again and times the storage alone: the gate, the choice of a row, and the sums.
 """
 
 import argparse

@@ -99,32 +99,13 @@ def put(rows: tuple[Any, ...], index: Number, row: Any) -> tuple[Any, ...]:
     return tuple([choose(index == float(k), row, old) for k, old in enumerate(rows)])
 
 
-def when(condition: Number, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
-    """What ``a()`` gives where the condition holds, else ``b()``: numbers or equal nested tuples.
-
-    On floats only the one that is needed runs, which makes this the lazy :func:`where` for work that
-    is costly and seldom needed.
-    """
-    if condition.__class__ is bool:
-        return a() if condition else b()
-    return _joined(condition, a(), b())
-
-
-def _joined(condition: Number, a: Any, b: Any) -> Any:
-    """:func:`where` on every leaf of two nested tuples."""
-    if not isinstance(a, tuple):
-        return where(condition, a, b)
-    items = [_joined(condition, x, y) for x, y in zip(a, b, strict=True)]
-    return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
-
-
 def pick(rows: Sequence[Any], index: Number) -> Any:
     """The row whose place is nearest to ``index``; the first or last one beyond the ends."""
     if index.__class__ is float:
         return rows[min(max(int(index + 0.5), 0), len(rows) - 1)]
     found = rows[0]
     for k in range(1, len(rows)):
-        found = _joined(index >= k - 0.5, rows[k], found)
+        found = choose(index >= k - 0.5, rows[k], found)
     return found
 
 
