@@ -1,7 +1,8 @@
 """What does the memory of concurrent learning cost? ``python -m benchmarks.storage``.
 
-Runs scenarios/ellipse.json with each controller that stores samples, then gives what the controller saw
-to its plain function again and times the storage alone: the gate, the choice of a row, and the sums.
+Runs scenarios/ellipse.json with each controller that stores samples, then gives what the controller
+saw to its plain function again and times the storage alone: the gate, the choice of a row, and the sums.
+All times are processor time.
 """
 
 import argparse
@@ -10,7 +11,7 @@ import platform
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import process_time
 
 import cosim
 from fmus.controller import concurrent
@@ -24,9 +25,9 @@ def run(controller, stop, folder):
     content = json.loads(SCENARIO.read_text())
     content["stop"], content["metrics"] = stop, {}
     content["fmus"]["controller"] = {"path": f"{controller}.fmu"}
-    started = perf_counter()
+    started = process_time()
     result = cosim.simulate(cosim.load_scenario(content), folder)
-    return result, perf_counter() - started
+    return result, process_time() - started
 
 
 def seen(component, folder):
@@ -45,9 +46,9 @@ def storage_times(component, rows, step):
 
     def timed(*args):
         nonlocal changes
-        started = perf_counter()
+        started = process_time()
         store = plain(*args)
-        times.append(perf_counter() - started)
+        times.append(process_time() - started)
         changes += store is not args[2]
         return store
 

@@ -15,7 +15,7 @@ class BlockerOptions(NamedTuple):
 
     nu_dot_max: Annotated[float, "1", "norm of the acceleration that blocks", POSITIVE] = OFF
     nu_max: Annotated[float, "1", "norm of the velocity that blocks", POSITIVE] = OFF
-    tau_max: Annotated[float, "1", "norm of the force that blocks", POSITIVE] = OFF
+    tau_max: Annotated[float, "1", "norm of the force that blocks", POSITIVE] = 2.0
     block_time: Annotated[float, "s", "quiet time until learning goes on", POSITIVE] = 1.0
 
 

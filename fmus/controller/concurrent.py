@@ -15,7 +15,7 @@ from .adaptive import attentive, energy, parameters, to_body
 from .backstepping import Inputs, control, control_errors, outputs, starting
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
-from .learning import Drive, Memory, integrated, learned
+from .learning import Drive, Memory, integrated, learned, remembered
 from .parametrisation import Parametrisation
 from .smoothing import Register, Sample, Tap, shifted
 from .store import Row, Storage, Store, StoreOptions, empty_store, offer, times
@@ -145,9 +145,9 @@ def concurrent(
         )
         sums = s.store.sums
         memory = when(
-            p.samples.rho > 0.0,
-            lambda: times(p.samples.rho, integral),
-            lambda: Memory(sums.count, sums.turned, sums.cross),
+            omega_on,
+            lambda: remembered(sums, integral, p.samples.rho),
+            lambda: no_integral,
         )
         if by_eps:
             drive = Drive(F_sample, sample.psi, times(counts, eps))

@@ -29,17 +29,35 @@ class Memory(NamedTuple):
     cross: tuple[Triple, ...]
 
 
+def remembered(sums: Sums, integral: Memory, rho: Number) -> Memory:
+    """What omega_n learns by: rho times the integral, or with rho = 0 the store."""
+    return when(
+        rho > 0.0,
+        lambda: times(rho, integral),
+        lambda: Memory(sums.count, sums.turned, sums.cross),
+    )
+
+
 def stored_slopes(
-    model: Parametrisation, sums: Sums, phi: Any, omega: Triple, stale: Number
+    model: Parametrisation, sums: Sums, phi: Any, omega: Triple, omega_on: Number, stale: Number
 ) -> tuple[Any, ...]:
     """sum_j F_j^T eps_j, from the sums over the store."""
-    explained: list[Any] = [dot(row, omega) for row in sums.cross]
-    for indices, gram in zip(model.pattern, sums.grams, strict=True):
-        own = [phi[k] for k in indices]
-        for k, line in zip(indices, gram, strict=True):
-            explained[k] = explained[k] + dot(line, own)
-    fresh = where(stale > 0.5, 0.0, 1.0)
-    return tuple([b - fresh * x for b, x in zip(sums.projected, explained, strict=True)])
+
+    def explained() -> tuple[Any, ...]:
+        parts = list(
+            when(
+                omega_on,
+                lambda: tuple([dot(row, omega) for row in sums.cross]),
+                lambda: (0.0,) * len(sums.cross),
+            )
+        )
+        for indices, gram in zip(model.pattern, sums.grams, strict=True):
+            own = [phi[k] for k in indices]
+            for k, line in zip(indices, gram, strict=True):
+                parts[k] = parts[k] + dot(line, own)
+        return tuple([b - x for b, x in zip(sums.projected, parts, strict=True)])
+
+    return when(stale > 0.5, lambda: sums.projected, explained)
 
 
 def earth_slopes(memory: Memory, phi: Any, omega: Triple, stale: Number) -> Triple:
@@ -109,7 +127,7 @@ def learned(
     trace = information(model, gamma, sums, drive.F, by_eps) + on * (memory.weight + by_eps)
     guarded = dt / fmax(1.0, dt * trace)
     pace = where(by_eps > 0.5, guarded, dt)
-    slopes = stored_slopes(model, sums, phi, omega, stale)
+    slopes = stored_slopes(model, sums, phi, omega, on > 0.0, stale)
     earth = when(
         on > 0.0,
         lambda: earth_slopes(memory, phi, omega, stale),
