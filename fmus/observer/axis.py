@@ -24,9 +24,9 @@ SCATTER = 8.0
 class Learning(NamedTuple):
     """How the noise of the disturbance is learnt."""
 
-    change_time: Annotated[float, "s", "in which a disturbance changes", Range(0.1)] = 15.0
+    change_time: Annotated[float, "s", "in which a disturbance changes", Range(0.1)] = 20.0
     memory_time: Annotated[float, "s", "over which its variation is learnt", Range(0.1)] = 3.0
-    alert: Annotated[float, "1/s", "growth of the covariance in doubt", Range(0.0, 100.0)] = 30.0
+    alert: Annotated[float, "1/s", "growth of the covariance in doubt", Range(0.0, 100.0)] = 10.0
     alert_time: Annotated[float, "s", "over which innovations are averaged", Range(0.01)] = 0.1
 
 
