@@ -144,8 +144,8 @@ class Interval(NamedTuple):
 
     def __str__(self) -> str:
         if not all(map(math.isfinite, self)):
-            return f"{self.mean:.4g}"
-        return f"{self.mean:.4g} [{self.low:.4g}, {self.high:.4g}]"
+            return f"{self.mean:.3g}"
+        return f"{self.mean:.3g} [{self.low:.3g}, {self.high:.3g}]"
 
 
 def interval(values: Sequence[float], level: float = 0.95) -> Interval:

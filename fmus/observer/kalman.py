@@ -1,0 +1,206 @@
+"""Kalman filter with the model of the hull: velocity and acceleration without differentiating.
+
+Estimated are eta, nu and on each body axis a disturbance of the acceleration: what the model does not
+explain, from a wrong damping coefficient to thrust that never came. The acceleration follows from the
+model, (2.2), and the disturbance. The innovation is turned into the body frame, where the axes part (see
+:mod:`.axis`); their covariances grow while the measurement is frozen or lost (see :mod:`.screen`), so
+that the first sample thereafter counts for more.
+
+A sample far off is a spike and left out, until so many follow that the ship must really be there. Lost
+for longer than ``rest_time``, the model is left too and the velocity fades, because the nominal hull is
+unstable above 0.04 m/s. A force that is NaN or infinite counts as zero.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import Component, Range, flatten, rebuild
+from ..frames import rotate_to_body, rotate_to_earth
+from ..hull import Damping, Hull, Inertia, inverse_mass, motion
+from ..ops import Number, choose, clip, exp, finite, fmax, where
+from ..signals import Estimate, Force
+from .axis import MOST, Axis, Learning, Rates, later, rates, taken
+from .correction import Motion, moved
+from .derivative import Acceleration
+from .screen import Inputs, Sample, Screening, Seen, first_look, look
+
+STD = Range(1e-6, 1.0)
+MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
+
+
+class Noise(NamedTuple):
+    """Noise of the measurement, and what a disturbance gains in a second at least."""
+
+    position_std: Annotated[float, "m", "standard deviation of a measured position", STD] = 0.0002
+    heading_std: Annotated[float, "rad", "standard deviation of a measured heading", STD] = 0.0003
+    drift_u: Annotated[float, "m/s2", "growth of the surge disturbance in 1 s", STD] = 0.00007
+    drift_v: Annotated[float, "m/s2", "growth of the sway disturbance in 1 s", STD] = 0.00007
+    drift_r: Annotated[float, "rad/s2", "growth of the yaw disturbance in 1 s", STD] = 0.00015
+
+
+class Doubt(NamedTuple):
+    """What is not believed, and what is done without measurements."""
+
+    gate: Annotated[float, "1", "standard deviations beyond which a sample is a spike", Range(1.0)] = 5.0
+    position_slack: Annotated[float, "m", "standard deviation added before that", STD] = 0.005
+    heading_slack: Annotated[float, "rad", "standard deviation added before that", STD] = 0.01
+    jump_time: Annotated[float, "s", "spikes for longer are a new place", Range(0.0)] = 0.3
+    fade_time: Annotated[float, "s", "time constant of a velocity long lost", Range(0.01)] = 0.2
+
+
+class Params(NamedTuple):
+    noise: Noise = Noise()
+    learning: Learning = Learning()
+    doubt: Doubt = Doubt()
+    screening: Screening = Screening()
+    inertia: Inertia = Inertia()
+    damping: Damping = Damping()
+
+
+class Belief(NamedTuple):
+    """Pose and velocity, and what is known on each body axis."""
+
+    motion: Motion = Motion()
+    surge: Axis = Axis()
+    sway: Axis = Axis()
+    yaw: Axis = Axis()
+
+
+class State(NamedTuple):
+    seen: Seen = Seen()
+    belief: Belief = Belief()
+    acceleration: Acceleration = Acceleration()
+    refused: Any = 0.0
+
+
+def acceleration(m: Motion, b: Belief, tau: Force, hull: Hull) -> Acceleration:
+    """nu_dot at a motion, by the model and the disturbances."""
+    u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, tau, hull)
+    return Acceleration(u_dot + b.surge.d, v_dot + b.sway.d, r_dot + b.yaw.d)
+
+
+def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> Motion:
+    """Pose and velocity after h [s] of a force: the midpoint method, halfway by the old acceleration.
+
+    Where only a share of the velocity is kept, nothing is known of its change.
+    """
+    b, (u_dot, v_dot, r_dot) = s.belief, s.acceleration
+    x, y, psi, u, v, r = b.motion
+    half = 0.5 * h
+    middle = Motion(x, y, psi + half * r, u + half * u_dot, v + half * v_dot, r + half * r_dot)
+    u_dot, v_dot, r_dot = acceleration(middle, b, tau, hull)
+    there = moved(middle, h)
+    h = where(keep < 1.0, 0.0, h)
+    return Motion(
+        there.x,
+        there.y,
+        there.psi - half * r,
+        clip(keep * u + h * u_dot, -MOST, MOST),
+        clip(keep * v + h * v_dot, -MOST, MOST),
+        clip(keep * r + h * r_dot, -MOST, MOST),
+    )
+
+
+def believed(s: State, tau: Force, hull: Hull, p: Params, k: Rates, h: Number) -> Belief:
+    """What is believed after h [s], before the sample of that instant."""
+    _, surge, sway, yaw = s.belief
+    n = p.noise
+    lost = s.seen.age > p.screening.rest_time
+    keep = where(lost, exp(-h / p.doubt.fade_time), 1.0)
+    going = Belief(
+        predicted(s, tau, hull, keep, h),
+        later(surge, n.drift_u, k, h),
+        later(sway, n.drift_v, k, h),
+        later(yaw, n.drift_r, k, h),
+    )
+    # Long lost, nothing is known any more but that a ship comes to rest.
+    unknown = Belief(going.motion, Axis(keep * surge.d), Axis(keep * sway.d), Axis(keep * yaw.d))
+    return either(lost, unknown, going)
+
+
+def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number]:
+    """The belief after a sample, and whether the sample fits to what was believed."""
+    m, n, doubt = b.motion, p.noise, p.doubt
+    ahead, aside = rotate_to_body(m.psi, s.x - m.x, s.y - m.y)
+    turn = s.psi - m.psi
+    position, heading = n.position_std * n.position_std, n.heading_std * n.heading_std
+    surge, dx, du = taken(b.surge, ahead, position, k)
+    sway, dy, dv = taken(b.sway, aside, position, k)
+    yaw, dpsi, dr = taken(b.yaw, turn, heading, k)
+    x, y = rotate_to_earth(m.psi, dx, dy)
+    after = Motion(
+        m.x + x,
+        m.y + y,
+        m.psi + dpsi,
+        clip(m.u + du, -MOST, MOST),
+        clip(m.v + dv, -MOST, MOST),
+        clip(m.r + dr, -MOST, MOST),
+    )
+    slack = position + doubt.position_slack * doubt.position_slack
+    distance = (
+        ahead * ahead / (slack + b.surge.covariance.pp)
+        + aside * aside / (slack + b.sway.covariance.pp)
+        + turn * turn / (heading + doubt.heading_slack * doubt.heading_slack + b.yaw.covariance.pp)
+    )
+    return Belief(after, surge, sway, yaw), distance <= doubt.gate * doubt.gate
+
+
+def either(condition: Number, a: Any, b: Any) -> Any:
+    """:func:`fmus.ops.choose` for nested tuples."""
+    if condition.__class__ is bool:
+        return a if condition else b
+    return rebuild(a, [where(condition, x, y) for x, y in zip(flatten(a), flatten(b), strict=True)])
+
+
+def limited(tau: Force) -> Force:
+    """A force as far as it can be true."""
+    X, Y, N = tau
+    return Force(
+        clip(finite(X, 0.0), -MOST_FORCE, MOST_FORCE),
+        clip(finite(Y, 0.0), -MOST_FORCE, MOST_FORCE),
+        clip(finite(N, 0.0), -MOST_FORCE, MOST_FORCE),
+    )
+
+
+def init(i: Inputs, p: Params) -> State:
+    seen = first_look(i.measurement)
+    return State(seen, Belief(Motion(seen.x_m, seen.y_m, seen.psi_m)))
+
+
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
+    tau = limited(i.tau)
+    hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
+    period = p.screening.measurement_period
+    k = rates(p.learning, period, h)
+    before = believed(s, tau, hull, p, k, h)
+    seen, sample = look(s.seen, i.measurement, before.motion.psi, p.screening, h)
+    # A sample that is held until the next measurement tells nothing new.
+    new = sample.good & ((seen.age <= 0.0) | sample.overdue) & (h > 0.0)
+    after, fitting = corrected(before, sample, p, k)
+    fits = new & fitting
+    refused = where(fits, 0.0, where(new, s.refused + fmax(h, period), s.refused))
+    elsewhere = sample.first | (refused > p.doubt.jump_time)
+    there = Belief(Motion(sample.x, sample.y, finite(sample.psi, 0.0)))
+    belief = either(elsewhere, there, either(fits, after, before))
+    m = belief.motion
+    u_dot, v_dot, r_dot = acceleration(m, belief, tau, hull)
+    known = Acceleration(
+        where(sample.overdue, 0.0, u_dot),
+        where(sample.overdue, 0.0, v_dot),
+        where(sample.overdue, 0.0, r_dot),
+    )
+    state = State(seen, belief, choose(h > 0.0, known, s.acceleration), where(elsewhere, 0.0, refused))
+    frozen = where(sample.good, 0.0, 1.0)
+    return state, Estimate(m.x, m.y, m.psi, m.u, m.v, m.r, *known, frozen)
+
+
+COMPONENT = Component(
+    name="observer_kalman",
+    description="Kalman filter with the model of the hull and a disturbance that it learns",
+    params=Params,
+    state=State,
+    inputs=Inputs,
+    outputs=Estimate,
+    init=init,
+    step=step,
+    hold_nonfinite=False,
+)

@@ -1,0 +1,254 @@
+"""The Kalman observer: better than the other observers, right about forces, and never lost for good."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+from conftest import COMPONENTS
+
+import cosim
+from fmus.declare import flatten, packer, variables
+from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
+from fmus.observer.axis import MOST, Axis, Covariance, Learning, later, rates, taken
+from fmus.signals import Force
+from studies.replay import LOGGED, OBSERVERS, SIGNALS, errors, observer, replay
+from studies.runs import shipped, vary
+
+KALMAN = COMPONENTS["observer_kalman"]
+NAN = math.nan
+HIDDEN = {
+    "exact": {},
+    "drag": {"vessel.delta_X_u": -4.0},
+    "yaw damping": {"vessel.delta_N_r": -2.0, "vessel.delta_Y_v": -5.0},
+    "rotational damping": {"vessel.delta_Y_r": 7.25, "vessel.delta_N_r": 1.0},
+    "weak thrusters": {"thrusters.plant_F_vsp": 0.8, "thrusters.plant_F_bow": 1.8},
+}
+
+
+def params(**changes):
+    named = variables(KALMAN.params)
+    assert set(changes) <= {v.name for v in named}
+    return packer(KALMAN.params)([changes.get(v.name, v.start) for v in named])
+
+
+def log_of(scenario, folder, stop, **parameters):
+    content = vary(
+        shipped(scenario), parameters=parameters, stop=stop, log={"signals": LOGGED}, metrics={}
+    )
+    assert cosim.simulate(cosim.load_scenario(content), folder).status == "done"
+    return cosim.read_log(folder)
+
+
+def run(rows, p=None, h=0.01):
+    """Estimates for rows of x_m, y_m, psi_m, tau_X, tau_Y, tau_N."""
+    p, pack = p or params(), packer(KALMAN.inputs)
+    state, found = KALMAN.init(pack(rows[0]), p), []
+    for row in rows[1:]:
+        state, estimate = KALMAN.step(state, pack(row), p, h)
+        found.append(estimate)
+    return found
+
+
+def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
+    """Measurements, true velocities and true accelerations of the nominal hull.
+
+    ``tau`` is a function of time, known to the observer; ``extra`` a force that it is not told.
+    """
+    rng = random.Random(seed)
+    vessel = COMPONENTS["vessel"]
+    p = vessel.params()
+    state = vessel.init(Force(), p)
+    rows, nu, nu_dot = [], [], []
+    for k in range(round(seconds / h)):
+        known = tau(k * h)
+        state, out = vessel.step(state, Force(*map(sum, zip(known, extra, strict=True))), p, h)
+        x, y, psi = out.pose
+        psi = math.remainder(psi + rng.gauss(0, 1.5 * noise), math.tau)
+        rows.append([x + rng.gauss(0, noise), y + rng.gauss(0, noise), psi, *known])
+        nu.append(out.velocity)
+        nu_dot.append((out.u_dot, out.v_dot, out.r_dot))
+    return rows, np.array(nu), np.array(nu_dot)
+
+
+def pushes(t):
+    """A force that keeps the ship moving on all axes."""
+    return 0.4 + 0.4 * math.sin(0.5 * t), 0.3 * math.sin(0.37 * t), 0.05 * math.cos(0.9 * t)
+
+
+def velocity_error(estimates, nu, rows=slice(None)):
+    found = np.array([e[3:6] for e in estimates])
+    return float(np.abs(found - nu[1 : len(found) + 1])[rows].max())
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_best_of_all_observers_on_the_same_log(hidden, tmp_path):
+    """Rich motion with noise and freezes: every velocity and acceleration, model right or wrong."""
+    log = log_of("rich", tmp_path, 120.0, **HIDDEN[hidden])
+    found = {name: errors(log, replay(observer(name), log)) for name in OBSERVERS}
+    ours = found.pop("kalman")
+    for signal in SIGNALS:
+        best = min(error[signal] for error in found.values())
+        assert ours[signal] < (0.8 if signal.endswith("dot") else 1.0) * best, signal
+
+
+@pytest.mark.parametrize("scenario", ["ellipse", "eight"])
+def test_as_good_as_the_model_where_the_model_is_right(scenario, tmp_path):
+    """Gentle motion, where all is noise: nothing is lost by not trusting the model."""
+    log = log_of(scenario, tmp_path, 60.0)
+    ours, model = (errors(log, replay(observer(name), log)) for name in ("kalman", "luenberger"))
+    for signal in SIGNALS:
+        assert ours[signal] < (0.5 if signal.endswith("dot") else 1.0) * model[signal], signal
+
+
+def test_unknown_force_is_found_as_a_disturbance():
+    """Its acceleration, M^-1 times the force, is in nu_dot from then on."""
+    extra = (0.3, -0.2, 0.02)
+    rows, nu, nu_dot = ship(20.0, lambda t: (0.5, 0.0, 0.0), extra)
+    last = run(rows)[-1]
+    assert last[6:9] == pytest.approx(nu_dot[-1], abs=2e-3)
+    without = motion(
+        *last[3:6], Force(0.5, 0.0, 0.0), Hull(Inertia(), inverse_mass(Inertia()), Damping())
+    )
+    assert np.abs(np.subtract(nu_dot[-1], without)).max() > 0.015
+    assert last[3:6] == pytest.approx(nu[-1], abs=1e-3)
+
+
+def test_without_measurement_it_is_the_model_and_then_a_ship_at_rest():
+    rows, nu, _ = ship(40.0, pushes, noise=1e-6)
+    lost = [row if k < 1000 else [NAN, NAN, NAN, *row[3:]] for k, row in enumerate(rows)]
+    estimates = run(lost)
+    assert estimates[1200].frozen == 1.0
+    assert velocity_error(estimates, nu, slice(1000, 1250)) < 0.005
+    assert max(map(abs, estimates[-1][3:9])) < 1e-3, "the model alone is unstable"
+    assert math.dist(estimates[-1][:2], estimates[999][:2]) < 1.0
+
+
+def test_measurement_that_comes_back_is_believed_at_once():
+    rows, nu, _ = ship(30.0, pushes)
+    lost = [[NAN, NAN, NAN, *row[3:]] if 800 <= k < 2000 else row for k, row in enumerate(rows)]
+    estimates = run(lost)
+    assert estimates[2000][:2] == pytest.approx(rows[2001][:2], abs=0.005)
+    assert velocity_error(estimates, nu, slice(2300, None)) < 0.005
+
+
+def test_spike_is_left_out_and_a_new_place_is_believed():
+    rows, nu, _ = ship(20.0, pushes)
+    calm = run(rows)
+    spiked = [list(row) for row in rows]
+    for k in (900, 1100, 1101, 1102):
+        spiked[k][0] += 0.3
+    estimates = run(spiked)
+    assert max(abs(a.u_hat - b.u_hat) for a, b in zip(estimates, calm, strict=True)) < 1e-3
+    moved = [[row[0] + (2.0 if k >= 1000 else 0.0), *row[1:]] for k, row in enumerate(rows)]
+    estimates = run(moved)
+    assert estimates[1010].x_hat == pytest.approx(rows[1011][0], abs=0.01)
+    assert estimates[1040].x_hat == pytest.approx(rows[1041][0] + 2.0, abs=0.01)
+    assert velocity_error(estimates, nu, slice(1400, None)) < 0.01
+
+
+def test_freeze_leaves_no_spike_in_the_acceleration():
+    """Of a whole second, and with a force that the model does not know."""
+    rows, nu, nu_dot = ship(30.0, pushes, (0.2, 0.1, 0.0))
+    frozen = [list(row) for row in rows]
+    for k in range(2000, 2100):
+        frozen[k][:3] = rows[1999][:3]
+    estimates = run(frozen)
+    assert [e.frozen for e in estimates[1997:2102]] == [0.0, 0.0, *[1.0] * 100, 0.0, 0.0, 0.0]
+    error = np.abs(np.array([e[6:9] for e in estimates]) - nu_dot[1:])
+    assert error[1990:2200].max() < 0.02
+    assert velocity_error(estimates, nu, slice(1990, 2200)) < 0.005
+
+
+@pytest.mark.parametrize("every", [5, 10])
+def test_measurement_slower_than_the_step(every):
+    """20 Hz and 10 Hz measurements held for a 100 Hz observer are neither freezes nor believed twice."""
+    rows, nu, nu_dot = ship(30.0, pushes)
+    held = [[*rows[k - k % every][:3], *row[3:]] for k, row in enumerate(rows)]
+    estimates = run(held, params(measurement_period=0.01 * every))
+    assert not any(e.frozen for e in estimates[every:])
+    assert velocity_error(estimates, nu, slice(1000, None)) < 0.003
+    assert np.abs(np.array([e[6:9] for e in estimates]) - nu_dot[1:])[1000:].max() < 0.02
+
+
+def test_long_steps():
+    rows, nu, nu_dot = ship(60.0, pushes, h=0.1)
+    estimates = run(rows, params(measurement_period=0.1), 0.1)
+    assert velocity_error(estimates, nu, slice(200, None)) < 0.004
+    assert np.abs(np.array([e[6:9] for e in estimates]) - nu_dot[1:])[200:].max() < 0.02
+
+
+def test_heading_is_continuous_over_many_turns():
+    rows, nu, _ = ship(200.0, lambda t: (0.1, 0.0, 0.3))
+    estimates = run(rows)
+    turned = np.array([e.psi_hat for e in estimates])
+    assert turned[-1] > 4.0 * math.pi
+    assert np.abs(np.diff(turned)).max() < 0.02
+    assert velocity_error(estimates, nu, slice(1000, None)) < 0.005
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_whatever_comes_in_what_goes_out_is_finite_and_recovers(seed):
+    rng = random.Random(seed)
+    wild = [NAN, math.inf, -math.inf, 0.0, 1e308, -1e308, 1e154, -1e30, 1e3, -7.0, 5e-324]
+    rows, nu, _ = ship(20.0, pushes)
+    hurt = [
+        [rng.choice(wild) if 200 <= k < 800 and rng.random() < 0.5 else x for x in row]
+        for k, row in enumerate(rows)
+    ]
+    estimates = run(hurt)
+    assert all(math.isfinite(x) for e in estimates for x in e)
+    assert velocity_error(estimates, nu, slice(1500, None)) < 0.005
+
+
+def test_ship_at_rest_is_harmless():
+    estimates = run([[5.0, 2.0, 1.0, 0.0, 0.0, 0.0]] * 1500)
+    assert all(e[:3] == pytest.approx((5.0, 2.0, 1.0), abs=1e-9) for e in estimates)
+    assert max(abs(x) for e in estimates for x in e[3:9]) < 1e-9
+
+
+@pytest.mark.parametrize("h", [0.01, 0.1])
+def test_covariance_is_that_of_the_matrices(h):
+    """F P F^T + Q and (I - K H) P, with a noise that does not change."""
+    drift, noise = 0.02, 1e-6
+    k = rates(Learning(change_time=1e12, alert=0.0), h, h)
+    F = np.array([[1.0, h, 0.5 * h * h], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
+    H = np.array([[1.0, 0.0, 0.0]])
+    P, axis = np.diag([1.0, 0.01, 0.0025]), Axis()
+    for _ in range(50):
+        P = F @ P @ F.T + np.diag([0.0, 0.0, h * drift * drift])
+        K = P @ H.T / (P[0, 0] + noise)
+        P = (np.eye(3) - K @ H) @ P
+        axis, position, velocity = taken(later(axis, drift, k, h), 0.001, noise, k)
+        assert (position, velocity) == pytest.approx(tuple(0.001 * K[:2, 0]), rel=1e-6)
+    assert axis.covariance == pytest.approx(P[np.triu_indices(3)], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_covariance_stays_one(seed):
+    """Positive semidefinite and bounded, however odd the innovations and long the pauses."""
+    rng = random.Random(seed)
+    k, axis = rates(Learning(), 0.01, 0.01), Axis()
+    for _ in range(3000):
+        for _ in range(rng.choice([1, 1, 1, 100])):
+            axis = later(axis, 1e-4, k, 0.01)
+        axis, _, _ = taken(axis, rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-8, 2), 4e-8, k)
+        pp, pv, pd, vv, vd, dd = axis.covariance
+        P = np.array([[pp, pv, pd], [pv, vv, vd], [pd, vd, dd]])
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(P), 1e-30))
+        assert np.linalg.eigvalsh(P * scale[:, None] * scale).min() > -1e-6
+        assert all(map(math.isfinite, flatten(axis)))
+        assert abs(axis.d) <= MOST
+        assert vv + dd < 1e4
+
+
+def test_learnt_variation_follows_the_disturbance():
+    """A disturbance that swings makes the gain large, one that is constant lets it fall again."""
+    k, swinging = rates(Learning(), 0.01, 0.01), Axis(covariance=Covariance(dd=1e-8, vv=1e-8, pp=1e-8))
+    for j in range(2000):
+        swinging = later(swinging._replace(d=0.05 * math.sin(0.02 * j)), 1e-5, k, 0.01)
+    assert swinging.variance == pytest.approx(0.5 * 0.05**2, rel=0.7)
+    calm = swinging
+    for _ in range(4000):
+        calm = later(calm._replace(d=0.05, covariance=Covariance(dd=1e-8)), 1e-5, k, 0.01)
+    assert calm.variance < 0.01 * swinging.variance
