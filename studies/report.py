@@ -100,9 +100,10 @@ class Report:
         """A list with a point before each line."""
         self._pieces.append("\n".join(f"- {' '.join(line.split())}" for line in lines))
 
-    def table(self, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """A table; all columns but the first stand to the right."""
-        lines = [header, [":--", *["--:"] * (len(header) - 1)], *([cell(c) for c in r] for r in rows)]
+    def table(self, header: Sequence[str], rows: Iterable[Sequence[Any]], words: bool = False) -> None:
+        """A table; all columns but the first stand to the right, unless they hold words."""
+        side = ":--" if words else "--:"
+        lines = [header, [":--", *[side] * (len(header) - 1)], *([cell(c) for c in r] for r in rows)]
         self._pieces.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
 
     def figure(self, name: str, figure: "Figure", caption: str) -> None:
@@ -112,7 +113,11 @@ class Report:
         FigureCanvasAgg(figure)
         with whole(self.folder / f"{name}.png") as scratch:
             figure.savefig(scratch, format="png", dpi=DPI)
-        self._pieces.append(f"![{caption}]({name}.png)\n\n*{caption}*")
+        self.picture(f"{name}.png", caption)
+
+    def picture(self, path: str, caption: str) -> None:
+        """Embed a picture that lies in the report's folder already."""
+        self._pieces.append(f"![{caption}]({path})\n\n*{caption}*")
 
     def result(self, name: str, value: Any) -> None:
         """Numbers for ``results.json``: nested mappings, sequences, named tuples, arrays."""

@@ -60,7 +60,7 @@ def closed_loop(
     goal = target(0, h)
 
     def estimate(s, tau):
-        return Estimate(*s, *motion(s.u, s.v, s.r, acting(s, tau, loss, earth), b), 0.0)
+        return Estimate(*s[:6], *motion(s.u, s.v, s.r, acting(s, tau, loss, earth), b), 0.0)
 
     # The acceleration before the first step is none of the controller's force; init takes its own.
     cs = component.init(Inputs(estimate(s, NO_FORCE), goal), params)

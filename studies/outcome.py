@@ -1,0 +1,109 @@
+"""What is kept of a tracking run: errors, model error and its estimate, effort, the store of samples."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import cosim
+
+AXES = "XYN"
+# The start of a run, which depends on where the ship lay, is left out.
+SETTLED = 20.0
+
+
+class Outcome(NamedTuple):
+    """Numbers of one run; RMS values from 20 s on.
+
+    Attributes:
+        done: False where the run broke off.
+        position: distance to the target [m].
+        second: the same over the second half, which is the second lap of the ellipse [m].
+        cross_track, heading: errors e [m] and heading [rad].
+        surge: mean error along the ship over the second half, z1_x [m].
+        omega_X, omega_Y, omega_N: error of the estimated model error [N, N, N m].
+        omega_hat_X: mean estimate of the model error in surge over the second half [N].
+        iaew, iaewwt: metrics (4.59), (4.60).
+        swing: RMS of the requested yaw moment above 0.5 Hz [N m]: oscillation.
+        sigma: smallest singular value of the store at the end [1].
+        rank: share of the time with the rank condition met [1].
+    """
+
+    done: bool
+    position: float
+    second: float
+    cross_track: float
+    heading: float
+    surge: float
+    omega_X: float
+    omega_Y: float
+    omega_N: float
+    omega_hat_X: float
+    iaew: float
+    iaewwt: float
+    swing: float
+    sigma: float
+    rank: float
+
+    @property
+    def omega(self) -> float:
+        """Error of the estimated force in sway, where the rotational damping acts most [N]."""
+        return self.omega_Y
+
+
+BROKEN = Outcome(False, *[float("nan")] * 14)
+
+
+def rms(x: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+def quick(x: np.ndarray, step: float, above: float = 0.5) -> np.ndarray:
+    """The part of a signal above a frequency [Hz], by a moving mean of one period."""
+    width = max(1, round(1.0 / (above * step)))
+    return x - np.convolve(x, np.ones(width) / width, "same")
+
+
+def outcome(result: cosim.Result) -> Outcome:
+    """The numbers of a run; those of one that broke off are NaN."""
+    if result.status == "failed":
+        return BROKEN
+    log = cosim.read_log(result.folder)
+    late = log["time"] >= SETTLED
+    half = log["time"] >= 0.5 * log["time"][-1]
+    m = result.metrics
+    wrong = {
+        a: rms((log[f"controller.omega_hat_{a}"] - log[f"vessel.omega_star_{a}"])[late]) for a in AXES
+    }
+    distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
+    learns = "controller.sigma_min" in log
+    return Outcome(
+        done=True,
+        position=rms(distance[late]),
+        second=rms(distance[half]),
+        cross_track=m["cross_track_rms"],
+        heading=m["heading_rms"],
+        surge=float(log["controller.z1_x"][half].mean()),
+        omega_X=wrong["X"],
+        omega_Y=wrong["Y"],
+        omega_N=wrong["N"],
+        omega_hat_X=float(log["controller.omega_hat_X"][half].mean()),
+        iaew=m["IAEW"],
+        iaewwt=m["IAEWWT"],
+        swing=rms(quick(log["controller.tau_N"], log["time"][1] - log["time"][0])[late]),
+        sigma=float(log["controller.sigma_min"][-1]) if learns else float("nan"),
+        rank=float(log["controller.rank_met"][late].mean()) if learns else float("nan"),
+    )
+
+
+def true_states(content: dict[str, Any]) -> dict[str, Any]:
+    """The scenario with the ship's true state in place of the observer's estimate, and no faults."""
+    state = ("x", "y", "psi", "u", "v", "r", "u_dot", "v_dot", "r_dot")
+    told = [[f"vessel.{name}", f"controller.{name}_hat"] for name in state]
+    kept = [pair for pair in content["connections"] if pair != ["observer.*", "controller.*"]]
+    return {**content, "connections": [*kept, *told], "faults": []}
+
+
+def columns(outcomes: list[Outcome], name: str) -> list[float]:
+    """One number of every run."""
+    return [float(getattr(o, name)) for o in outcomes]

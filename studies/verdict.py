@@ -1,0 +1,225 @@
+"""The conclusions of chapter 5, each with what our runs say of it."""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any, NamedTuple
+
+from scipy import stats
+
+from .outcome import Outcome, columns
+from .runs import Interval, interval, ratio
+
+FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")
+OLD = ("controller_bs", "controller_abs", "controller_cl_svd_eps", "controller_cl_win_z2")
+CONTROLLERS = ("controller_bs", "controller_abs", *FOUR)
+
+Table = Mapping[str, Mapping[str, list[Outcome]]]
+Paths = Mapping[str, Table]
+
+
+class Verdict(NamedTuple):
+    thesis: str
+    here: str
+    numbers: str
+
+
+def share(table: Table, condition: str, a: str, b: str) -> Interval:
+    """Position error of controller a over that of b, seed by seed."""
+    runs = table[condition]
+    x, y = (columns(runs[f"controller_{name}"], "position") for name in (a, b))
+    return finite_ratio(x, y)
+
+
+def finite_ratio(x: Sequence[float], y: Sequence[float]) -> Interval:
+    """Ratio over the seeds for which both went through; open where there is none."""
+    kept = [(p, q) for p, q in zip(x, y, strict=True) if isfinite(p) and isfinite(q)]
+    if not kept:
+        return Interval(float("nan"), 0.0, float("inf"))
+    return ratio([p for p, _ in kept], [q for _, q in kept])
+
+
+def judged(shares: Mapping[str, Interval]) -> str:
+    """Reproduced where every share is surely below 1, reversed where surely above, else mixed."""
+    below = [s.high < 1.0 for s in shares.values()]
+    above = [s.low > 1.0 for s in shares.values()]
+    if all(below):
+        return "reproduced"
+    if all(above):
+        return "reversed"
+    if any(below) or any(above):
+        kinds = ("reproduced", "reversed")
+        return "; ".join(
+            f"{kinds[0] if b else kinds[1] if a else 'undecided'} ({run})"
+            for run, b, a in zip(shares, below, above, strict=True)
+        )
+    return "undecided"
+
+
+def told(shares: Mapping[str, Interval]) -> str:
+    return "; ".join(f"{run}: {value}" for run, value in shares.items())
+
+
+def better(by_path: Paths, thesis: str, a: str, b: str, *conditions: str) -> Verdict:
+    """Whether a tracks better than b, on each path and condition."""
+    shares = {
+        f"{path}, {condition}": share(table, condition, a, b)
+        for path, table in by_path.items()
+        for condition in conditions
+    }
+    return Verdict(thesis, judged(shares), f"error of {a} over {b}: {told(shares)}")
+
+
+def correlation(by_path: Paths) -> Verdict:
+    """Whether those who know the model error better track better."""
+    found = {}
+    for path, table in by_path.items():
+        for condition in ("mdf", "kalman", "true"):
+            runs = [o for outcomes in table[condition].values() for o in outcomes if o.done]
+            rank: Any = stats.spearmanr([o.omega for o in runs], [o.position for o in runs])
+            found[f"{path}, {condition}"] = float(rank.statistic)
+    lowest = min(found.values())
+    verdict = "reproduced" if lowest > 0.5 else "not reproduced" if lowest < 0.0 else "weak"
+    numbers = "; ".join(f"{run}: {value:.2f}" for run, value in found.items())
+    return Verdict(
+        "A better estimate of ω goes with better tracking (5.4.3)",
+        verdict,
+        f"Spearman's rank correlation of the two errors over controllers and seeds: {numbers}",
+    )
+
+
+def worst(by_path: Paths) -> Verdict:
+    """Whether SVD with z2 is the worst of the four, and what makes it so."""
+    rows = {}
+    for condition in ("mdf", "mdf, stale", "true, stale", "true, ungated"):
+        for path, table in by_path.items():
+            errors = {n: interval(columns(o, "position")).mean for n, o in table[condition].items()}
+            four = {n: e for n, e in errors.items() if n in FOUR and e == e}
+            if four:
+                rows[f"{path}, {condition}"] = max(four, key=lambda n: four[n]) == FOUR[1]
+    ours = [rows[run] for run in rows if run.endswith(", mdf")]
+    here = "reproduced" if all(ours) else "not reproduced" if not any(ours) else "on one path"
+    numbers = "; ".join(f"{run}: {'worst' if is_worst else 'not'}" for run, is_worst in rows.items())
+    return Verdict("CL-SVD-z2 is the worst of the four (5.3.3)", here, numbers)
+
+
+def stale(by_path: Paths) -> Verdict:
+    """What the printed, stale errors do."""
+    shares = {}
+    for path, table in by_path.items():
+        for name in FOUR:
+            fresh = columns(table["mdf, ungated"][name], "position")
+            printed = columns(table["mdf, stale"][name], "position")
+            shares[f"{path}, {name.removeprefix('controller_cl_')}"] = finite_ratio(printed, fresh)
+    return Verdict(
+        "Algorithms 1 and 2 as printed, with stored ε_j (4.1.3), are fit for use",
+        "no: they wind up" if all(s.low > 1.0 for s in shares.values()) else "mixed",
+        f"error with stale over recomputed errors, MDF: {told(shares)}",
+    )
+
+
+def saturated(by_path: Paths) -> Verdict:
+    """What samples do that were stored while the thrusters gave less than was asked for."""
+    numbers = []
+    for path, table in by_path.items():
+        for name in FOUR:
+            with_gate, without = (
+                interval(columns(table[c][name], "position")).mean for c in ("true", "true, ungated")
+            )
+            label = name.removeprefix("controller_cl_")
+            numbers.append(f"{path}, {label}: {without:.4f} m, with the gate {with_gate:.4f} m")
+    return Verdict(
+        "SVD storage is fragile: it hoards what is wrong (5.3.3, Table 5.2)",
+        "reproduced without any spike"
+        if _svd_suffers(by_path["eight"])
+        else "not reproduced in these runs",
+        "true states, samples of saturated thrusters stored as printed: " + "; ".join(numbers),
+    )
+
+
+def _svd_suffers(table: Table) -> bool:
+    def error(name: str) -> float:
+        return interval(columns(table["true, ungated"][name], "position")).mean
+
+    return min(error(FOUR[0]), error(FOUR[1])) > 3.0 * max(error(FOUR[2]), error(FOUR[3]))
+
+
+def richer(by_path: Paths) -> Verdict:
+    """Which path and which store give the larger smallest singular value."""
+    sigma = {
+        (path, name): interval(columns(table["mdf"][name], "sigma"))
+        for path, table in by_path.items()
+        for name in FOUR
+    }
+    by_store = all(sigma[p, FOUR[0]].mean > sigma[p, FOUR[2]].mean for p in by_path)
+    by_shape = all(sigma["eight", n].mean > sigma["ellipse", n].mean for n in FOUR[:2])
+    verdict = {True: "reproduced", False: "not reproduced"}
+    numbers = "; ".join(f"{p}, {n.removeprefix('controller_cl_')}: {s}" for (p, n), s in sigma.items())
+    return Verdict(
+        "The SVD store has the larger singular values, the eight is richer than the ellipse (Fig. 5.7)",
+        f"store: {verdict[by_store]}; eight: {verdict[by_shape]}",
+        f"σ_min at the end, MDF: {numbers}",
+    )
+
+
+def goals(by_path: Paths) -> list[Verdict]:
+    """What the corrected concurrent learning must reach."""
+    ellipse = by_path["ellipse"]
+    laps = {n: interval(columns(ellipse["true"][n], "second")).mean for n in FOUR}
+    shares = {
+        f"{path}, {name.removeprefix('controller_')}": share(
+            table, "kalman", name.removeprefix("controller_"), "abs"
+        )
+        for path, table in by_path.items()
+        for name in FOUR
+    }
+    return [
+        Verdict(
+            "(goal) corrected, with true states: below 0.01 m on the second lap of the ellipse",
+            "reached" if max(laps.values()) < 0.01 else "not reached",
+            "; ".join(f"{n.removeprefix('controller_')}: {e:.5f} m" for n, e in laps.items()),
+        ),
+        Verdict(
+            "(goal) with the best observer and freezes at least twice as good as ABS",
+            "reached" if all(s.high < 0.5 for s in shares.values()) else "not by all",
+            f"share of the error of ABS: {told(shares)}",
+        ),
+    ]
+
+
+def claims(by_path: Paths) -> list[Verdict]:
+    """Every conclusion with its verdict."""
+    senses = ("mdf", "kalman")
+    return [
+        better(by_path, "Adaptation helps: ABS tracks better than BS (5.4.3)", "abs", "bs", *senses),
+        better(
+            by_path,
+            "CL tracks better than ABS (5.4.3): CL-SVD-ε",
+            "cl_svd_eps",
+            "abs",
+            *senses,
+        ),
+        better(by_path, "CL tracks better than ABS: CL-WIN-z2", "cl_win_z2", "abs", *senses),
+        better(by_path, "ε beats z2 with the window (5.3.3)", "cl_win_eps", "cl_win_z2", *senses),
+        better(by_path, "ε beats z2 with singular values (5.3.3)", "cl_svd_eps", "cl_svd_z2", *senses),
+        better(by_path, "CL-SVD-ε beats CL-WIN-z2 (5.4)", "cl_svd_eps", "cl_win_z2", *senses),
+        better(
+            {"ellipse": by_path["ellipse"]},
+            "CL-WIN-ε is better than CL-SVD-ε on the ellipse (5.3.1)",
+            "cl_win_eps",
+            "cl_svd_eps",
+            *senses,
+        ),
+        better(
+            {"eight": by_path["eight"]},
+            "CL-SVD-ε is better than CL-WIN-ε on the eight (5.3.2)",
+            "cl_svd_eps",
+            "cl_win_eps",
+            *senses,
+        ),
+        worst(by_path),
+        correlation(by_path),
+        richer(by_path),
+        stale(by_path),
+        saturated(by_path),
+        *goals(by_path),
+    ]
