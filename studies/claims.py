@@ -92,7 +92,7 @@ def stuck(found: Runs) -> Row:
     return (
         said,
         verdict,
-        f"of {runs} runs with NaN, zeros and spikes of 10 m left without estimate: {numbers}",
+        f"of {runs} runs with NaN, zeros and spikes of 10 m and 1 km left without: {numbers}",
     )
 
 

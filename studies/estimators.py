@@ -24,11 +24,12 @@ from .runs import Interval, interval, run_all, shipped, vary, without
 
 STOP, QUICK_STOP, QUICK_SEEDS = 120.0, 60.0, 2
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
-# Tracking lost, a marker taken for another one far away, and values that are none.
+# Tracking lost, a marker taken for another one far away, and millimetres taken for metres.
 UPSETS = [
     {"kind": "dropout", "signals": POSE, "at": [20.0, 35.0], "duration": 0.5, "value": "nan"},
     {"kind": "dropout", "signals": POSE, "at": [25.0], "duration": 0.5, "value": "zero"},
-    {"kind": "spikes", "signals": POSE, "at": [30.0, 40.0], "size": 10.0},
+    {"kind": "spikes", "signals": POSE, "at": [30.0], "size": 10.0},
+    {"kind": "spikes", "signals": POSE, "at": [40.0], "size": 1000.0},
 ]
 HIDDEN = {
     "drag": {"vessel.delta_X_u": -4.0},

@@ -33,12 +33,14 @@ def _axes(names: Sequence[str]) -> "tuple[Figure, list[Axes]]":
     return figure, list(panels)
 
 
-def _lines(panel: "Axes", time: np.ndarray, name: str, true: Log, estimates: Mapping[str, Log]) -> None:
+def _lines(
+    panel: "Axes", time: np.ndarray, name: str, true: Log, estimates: Mapping[str, Log], label: str
+) -> None:
     """The estimates of one signal, the truth on top, and limits that the truth sets."""
     for observer, estimate in estimates.items():
         wide = 1.6 if observer == "kalman" else 1.0
         panel.plot(time, estimate[name], label=observer, color=COLORS[observer], linewidth=wide)
-    panel.plot(time, true[name], color="black", linewidth=1.0, linestyle="--", label="truth")
+    panel.plot(time, true[name], color="black", linewidth=1.0, linestyle="--", label=label)
     low, high = np.nanmin(true[name]), np.nanmax(true[name])
     margin = 0.5 * (high - low) + {"u": 0.01, "v": 0.01}.get(name, 0.02)
     panel.set_ylim(low - margin, high + margin)
@@ -53,12 +55,17 @@ def _true(log: Log) -> dict[str, np.ndarray]:
 
 
 def _window(
-    names: Sequence[str], part: slice, time: np.ndarray, true: Log, estimates: Mapping[str, Log]
+    names: Sequence[str],
+    part: slice,
+    time: np.ndarray,
+    true: Log,
+    estimates: Mapping[str, Log],
+    label: str = "truth",
 ) -> "tuple[Figure, list[Axes]]":
     figure, panels = _axes(names)
     cut = {observer: _cut(estimate, part) for observer, estimate in estimates.items()}
     for panel, name in zip(panels, names, strict=True):
-        _lines(panel, time[part], name, _cut(true, part), cut)
+        _lines(panel, time[part], name, _cut(true, part), cut, label)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
     return figure, panels
@@ -70,7 +77,8 @@ def compared(log: Log, estimates: Mapping[str, Log], reference: Log | None = Non
     h = float(np.median(np.diff(time)))
     start = time.size // 2
     part = slice(start, start + round(20.0 / h))
-    return _window(("u", "v", "r"), part, time, reference or _true(log), estimates)[0]
+    true, label = (_true(log), "truth") if reference is None else (reference, "smoother")
+    return _window(("u", "v", "r"), part, time, true, estimates, label)[0]
 
 
 def freeze(log: Log, estimates: Mapping[str, Log], first: int, end: int) -> "Figure":

@@ -63,8 +63,11 @@ def replay(component: Component, log: Log, **values: float) -> dict[str, np.ndar
 
 def rms(values: np.ndarray) -> float:
     """Root of the mean square; infinite where an observer has run away."""
+    if not values.size:
+        return float("nan")
     with np.errstate(over="ignore"):
-        return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
+        found = float(np.sqrt(np.mean(np.square(values))))
+    return found if np.isfinite(found) else float("inf")
 
 
 def errors(log: Log, estimate: Log) -> dict[str, float]:
@@ -118,7 +121,7 @@ def wraps(log: Log) -> list[int]:
 def peak_after(log: Log, estimate: Log, rows: Sequence[int], name: str) -> float:
     """Largest error within a second after any of these rows."""
     h = float(np.median(np.diff(log["time"])))
-    error = np.abs(estimate[name] - log[f"vessel.{name}"])
+    error = np.nan_to_num(np.abs(estimate[name] - log[f"vessel.{name}"]), nan=np.inf)
     parts = [error[row : row + round(AFTER / h)] for row in rows]
     return float(max((part.max() for part in parts if part.size), default=float("nan")))
 

@@ -152,7 +152,7 @@ def interval(values: Sequence[float], level: float = 0.95) -> Interval:
     """Mean of independent values with its Student t interval, which one value leaves open."""
     x = np.asarray(values, float)
     mean = float(x.mean())
-    if x.size < 2:
+    if x.size < 2 or not np.isfinite(x).all():
         return Interval(mean, -math.inf, math.inf)
     half = float(stats.t.ppf(0.5 + 0.5 * level, x.size - 1) * x.std(ddof=1) / math.sqrt(x.size))
     return Interval(mean, mean - half, mean + half)

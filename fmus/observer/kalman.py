@@ -19,7 +19,7 @@ from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number, choose, clip, exp, finite, fmax, where
 from ..signals import Estimate, Force
 from .axis import MOST, Axis, Learning, Rates, later, rates, taken
-from .correction import Motion, moved
+from .correction import Motion
 from .derivative import Acceleration
 from .screen import Inputs, Sample, Screening, Seen, first_look, look
 
@@ -88,15 +88,15 @@ def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> Moti
     half = 0.5 * h
     middle = Motion(x, y, psi + half * r, u + half * u_dot, v + half * v_dot, r + half * r_dot)
     u_dot, v_dot, r_dot = acceleration(middle, b, tau, hull)
-    there = moved(middle, h)
-    h = where(keep < 1.0, 0.0, h)
+    x_dot, y_dot = rotate_to_earth(middle.psi, middle.u, middle.v)
+    gain = where(keep < 1.0, 0.0, h)
     return Motion(
-        there.x,
-        there.y,
-        there.psi - half * r,
-        clip(keep * u + h * u_dot, -MOST, MOST),
-        clip(keep * v + h * v_dot, -MOST, MOST),
-        clip(keep * r + h * r_dot, -MOST, MOST),
+        x + h * x_dot,
+        y + h * y_dot,
+        psi + h * middle.r,
+        clip(keep * u + gain * u_dot, -MOST, MOST),
+        clip(keep * v + gain * v_dot, -MOST, MOST),
+        clip(keep * r + gain * r_dot, -MOST, MOST),
     )
 
 

@@ -1,0 +1,175 @@
+"""The study of the estimators: its measures on made-up signals, measured runs, and the whole of it."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from scipy.io import savemat
+
+from cosim import InputError
+from studies import basin, estimators
+from studies.claims import ahead
+from studies.replay import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
+
+H = 0.01
+DATA = Path(os.environ.get("CYBERSHIP_DATA", ROOT.parent / "shared" / "data"))
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="no measured runs: CYBERSHIP_DATA names no folder that exists"
+)
+
+
+def circle(seconds=60.0, h=H, u=0.1, r=0.2):
+    """A log of a ship on a circle at constant speed, without noise."""
+    t = np.arange(round(seconds / h)) * h
+    psi = r * t
+    zero = np.zeros_like(t)
+    return {
+        "time": t,
+        "observer.x_m": 5.0 + u / r * np.sin(psi),
+        "observer.y_m": 2.0 - u / r * np.cos(psi),
+        "observer.psi_m": np.angle(np.exp(1j * psi)),
+        **{f"observer.tau_{axis}": zero for axis in "XYN"},
+        **{f"vessel.{name}": zero for name in SIGNALS},
+    } | {"vessel.u": zero + u, "vessel.r": zero + r}
+
+
+def true_estimate(log):
+    psi = np.unwrap(log["observer.psi_m"])
+    pose = {"x_hat": log["observer.x_m"], "y_hat": log["observer.y_m"], "psi_hat": psi}
+    return pose | {name: log[f"vessel.{name}"] for name in SIGNALS}
+
+
+def test_replay_is_the_component_itself():
+    log = circle(20.0)
+    found = replay(observer("mdf"), log)
+    assert found["u"][-1] == pytest.approx(0.1, rel=1e-2)
+    assert found["frozen"].max() == 0.0
+    slow = replay(observer("mdf"), log, measurement_period=0.05)
+    assert slow["u"][-1] == pytest.approx(found["u"][-1])
+
+
+def test_lag_is_found():
+    t = np.arange(6000) * H
+    log = {"time": t, "vessel.u": np.sin(t)}
+    assert lag(log, {"u": np.sin(t - 0.23)}, "u") == pytest.approx(0.23)
+    assert lag(log, {"u": np.sin(t)}, "u") == 0.0
+
+
+def test_freezes_and_wraps_are_found_where_they_are():
+    log = circle()
+    for name in ("x_m", "y_m", "psi_m"):
+        log[f"observer.{name}"][3000:3080] = log[f"observer.{name}"][2999]
+        log[f"observer.{name}"][4000:4002] = log[f"observer.{name}"][3999]
+    assert freezes(log) == [(3000, 3080)]
+    expected = [row for row in np.flatnonzero(np.diff(log["observer.psi_m"]) < -3.0) + 1 if row > 1000]
+    assert wraps(log) == expected
+    assert len(expected) == 2
+
+
+def test_share_that_is_held_through_a_freeze():
+    log = circle()
+    for name in ("x_m", "y_m", "psi_m"):
+        log[f"observer.{name}"][3000:3080] = log[f"observer.{name}"][2999]
+    u = np.full(6000, 0.1)
+    assert held(log, {"u": u}) == 1.0
+    u[3000:3080] = np.linspace(0.1, 0.025, 80)
+    assert held(log, {"u": u}) == pytest.approx(0.25)
+
+
+def test_force_of_five_commands():
+    ahead_only = basin.force(np.array([[1.0], [0.0], [1.0], [0.0], [0.0]]))[:, 0]
+    assert ahead_only == pytest.approx([2.33, 0.0, 0.0])
+    port_only = basin.force(np.array([[1.0], [0.0], [0.0], [0.0], [0.0]]))[:, 0]
+    assert port_only[2] > 0.0, "the propeller to port turns the bow to starboard"
+    bow = basin.force(np.array([[0.0], [0.0], [0.0], [0.0], [1.0]]))[:, 0]
+    assert bow == pytest.approx([0.0, 2.629, 2.629 * 0.3875])
+
+
+def test_smoother_is_exact_for_a_cubic_with_gaps():
+    t = np.arange(400) * 0.05
+    values = 1.0 + 0.5 * t - 0.2 * t**2 + 0.01 * t**3
+    good = np.ones(400, bool)
+    good[100:106] = False
+    values[100:106] = 1e9
+    position, rate, change = basin.local_cubic(values, good, 0.05)
+    inner = slice(20, 380)
+    assert rate[inner] == pytest.approx(0.5 - 0.4 * t[inner] + 0.03 * t[inner] ** 2, abs=1e-6)
+    assert change[inner] == pytest.approx(-0.4 + 0.06 * t[inner], abs=1e-5)
+    good[200:230] = False
+    position, _, _ = basin.local_cubic(values, good, 0.05)
+    assert np.isnan(position[215])
+    assert np.isfinite(position[250])
+
+
+def test_reference_and_prediction_on_a_circle():
+    log = circle(h=0.05)
+    found = basin.reference(log)
+    inner = slice(40, -40)
+    assert found["u"][inner] == pytest.approx(0.1, abs=1e-5)
+    assert found["v"][inner] == pytest.approx(0.0, abs=1e-5)
+    assert found["r"][inner] == pytest.approx(0.2, abs=1e-5)
+    assert found["v_dot"][inner] == pytest.approx(0.0, abs=1e-4)
+    right = true_estimate(log)
+    assert basin.prediction_error(log, right, 0.5) < 1e-5
+    wrong = right | {"u": right["u"] + 0.02}
+    assert basin.prediction_error(log, wrong, 0.5) == pytest.approx(0.01, rel=0.01)
+
+
+def test_ahead_divides_by_the_best_of_the_others():
+    run = {o: {f"rms_{s}": 1.0 + k for s in SIGNALS} for k, o in enumerate(OBSERVERS)}
+    run["kalman"] = {f"rms_{s}": 0.5 for s in SIGNALS}
+    assert ahead([run, run])["u_dot"].mean == pytest.approx(0.5)
+
+
+def test_data_that_is_none_ends_in_exit_code_2(tmp_path, capsys):
+    arguments = ["--out", str(tmp_path / "out"), "--data", str(tmp_path)]
+    assert estimators.main(arguments) == 2
+    assert "no measured runs" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    savemat(tmp_path / "other.mat", {"something": np.zeros(3)})
+    with pytest.raises(InputError, match=r"other\.mat"):
+        basin.read(tmp_path / "other.mat")
+
+
+@needs_data
+def test_measured_runs_can_be_read():
+    for path in basin.files(DATA):
+        log = basin.read(path)
+        assert 0.8 < basin.valid(log).mean() < 1.0
+        assert np.median(np.diff(log["time"])) == pytest.approx(0.05, abs=1e-3)
+        assert np.abs(log["observer.tau_X"]).max() == pytest.approx(2.33, rel=0.01), "full ahead, once"
+        moving = basin.reference(log)["u"]
+        assert 0.005 < np.nanstd(moving) < 0.5
+
+
+@needs_data
+@pytest.mark.slow
+def test_kalman_predicts_the_real_ship_best():
+    """Needs no reference: where the ship is half a second later, by estimate alone."""
+    for path in basin.files(DATA):
+        log = basin.read(path)
+        estimates = {
+            o: replay(observer(o), log, measurement_period=0.05) for o in ("mdf", "luenberger", "kalman")
+        }
+        found = {o: basin.prediction_error(log, e, 0.5) for o, e in estimates.items()}
+        assert found["kalman"] < 0.8 * min(found["mdf"], found["luenberger"]), path.name
+
+
+@pytest.mark.slow
+def test_whole_study(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(estimators, "QUICK_STOP", 42.0)
+    assert estimators.main(["--quick", "--seeds", "1", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / "report.md")
+    text = (tmp_path / "report.md").read_text()
+    results = json.loads((tmp_path / "results.json").read_text())
+    for picture in tmp_path.glob("*.png"):
+        assert f"({picture.name})" in text
+    assert (tmp_path / "compared.png").is_file()
+    assert len(results["claims"]) == 6
+    assert set(results["simulated"]) >= {"ellipse", "eight", "rich", "ellipse, upsets"}
+    assert results["simulated"]["rich"]["kalman"]["rms_u_dot"]["mean"] < 0.01
+    held_by = {o: results["simulated"]["rich"][o]["held"]["mean"] for o in ("df", "mdf")}
+    assert held_by["df"] is None or held_by["df"] < 0.5 < held_by["mdf"]
