@@ -12,7 +12,7 @@ from scipy.io import loadmat
 
 from cosim import InputError
 from fmus.frames import rotate_to_body
-from fmus.thrusters.thrusters import Allocation
+from fmus.thrusters.allocation import Allocation
 
 from .replay import SETTLED, Log, rms
 

@@ -166,7 +166,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
     report = Report(out, "Chapter 5: which way of learning tracks best?", seeds)
     report.text(
         "Plant: Table 2.1, corrected; controllers: gains of Table 5.1, ignorant of the damping by the "
-        "yaw rate. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s, whatever the observer; "
+        "yaw rate. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; "
         "`true` means the ship's own state. In the thesis stored errors go stale (Algorithms 1 and 2 "
         "store ε itself); here they are formed anew, and `stale` is the printed form. Samples stored "
         "while more than 2 N was asked for, which the thrusters do not give, are kept out by default; "
