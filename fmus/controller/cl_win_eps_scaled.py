@@ -1,4 +1,8 @@
-"""Concurrent learning with a window of samples, driven by eps, of two factors, (2.20)-(2.23)."""
+"""Concurrent learning with a window of samples, driven by eps, of two factors, (2.20)-(2.23).
+
+Samples are smoothed over two seconds: the factor of the inertia multiplies the acceleration, whose lag
+and noise in an observer would otherwise be taken for a wrong mass.
+"""
 
 from .concurrent import concurrent
 from .models import SCALED
@@ -11,4 +15,5 @@ COMPONENT = concurrent(
     storage=window,
     by_eps=True,
     store_change=0.2,
+    smoothing=2.0,
 )

@@ -95,14 +95,19 @@ def _all(nu: Triple, nu_dot: Triple, tau: Triple, b: InertiaOnly) -> Regressors:
 
 
 _I = Inertia()
+# Gains of the cubic terms: small regressors, large coefficients.
+CUBIC = {"X_uuu": 100.0, "Y_vvv": 100.0}
 
 # (2.24)-(2.26), corrected: c1, c2, c3 of C(nu), and all damping of Table 2.1.
 ALL_UNKNOWN = Parametrisation(
     coefficients=(
-        Coefficient("c1", "kg.m", "Y_rdot - m x_g of C(nu)", _I.Y_rdot - _I.m * _I.x_g, 8.0),
-        Coefficient("c2", "kg", "Y_vdot - m of C(nu)", _I.Y_vdot - _I.m, 8.0),
-        Coefficient("c3", "kg", "m - X_udot of C(nu)", _I.m - _I.X_udot, 8.0),
-        *(Coefficient(c.name, c.unit, c.description, c.start, 8.0) for c in variables(TowedDamping)),
+        Coefficient("c1", "kg.m", "Y_rdot - m x_g of C(nu)", _I.Y_rdot - _I.m * _I.x_g, 20.0),
+        Coefficient("c2", "kg", "Y_vdot - m of C(nu)", _I.Y_vdot - _I.m, 20.0),
+        Coefficient("c3", "kg", "m - X_udot of C(nu)", _I.m - _I.X_udot, 20.0),
+        *(
+            Coefficient(c.name, c.unit, c.description, c.start, CUBIC.get(c.name, 8.0))
+            for c in variables(TowedDamping)
+        ),
         *_ROTATIONAL,
     ),
     pattern=(
