@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from conftest import COMPONENTS
-from loops import closed_loop, ellipse_target, multisine_target
+from loops import closed_loop, ellipse_target, multisine_target, unlimited
 
 from fmus.controller.adaptive import Disturbance
 from fmus.controller.learning import Drive, Memory, learned
 from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
 from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, summed
 from fmus.declare import variables
-from fmus.hull import ExtraDamping, RotationalDamping, TowedDamping
+from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
 
 TRUE_PHI = np.array(RotationalDamping())
@@ -24,15 +24,13 @@ SYSID4 = (-0.26, -3.5, 0.2, -0.014, 1.55, 0.017, 0.2, 0.017, -1.8, -0.02, -0.2, 
 
 
 def sysid4_plant():
-    rotational = RotationalDamping(
-        *(a - b for a, b in zip(SYSID4[3:11], RotationalDamping(), strict=True))
+    changes = {"X_absu_u": SYSID4[0], "X_u": SYSID4[1], "X_absu_r": SYSID4[2]}
+    nominal = RotationalDamping()._asdict()
+    changes |= {n: a - b for a, (n, b) in zip(SYSID4[3:11], nominal.items(), strict=True)}
+    plant = vessel.Params()
+    return plant._replace(
+        change=plant.change._replace(**{f"delta_{name}": x for name, x in changes.items()})
     )
-    change = vessel.DampingChange(
-        towed=TowedDamping(*[0.0] * 9)._replace(X_absu_u=SYSID4[0], X_u=SYSID4[1]),
-        rotational=rotational,
-        extra=ExtraDamping(X_absu_r=SYSID4[2]),
-    )
-    return vessel.Params(change=change)
 
 
 @pytest.mark.parametrize("name", ["controller_abs", *FOUR])
@@ -227,7 +225,7 @@ def test_earth_fixed_force_is_found_by_store_and_by_integral(name, rho):
 
 def test_nothing_is_learned_or_stored_while_frozen_or_blocked():
     component = COMPONENTS["controller_cl_win_eps"]
-    base = component.params()
+    base = unlimited(component.params())
     for p in (
         base._replace(hold_frozen=1.0),
         base._replace(blocker=base.blocker._replace(nu_max=0.0)),

@@ -48,11 +48,12 @@ def test_loss_of_thrust_is_among_the_coefficients():
     rng = np.random.default_rng(2)
     loss = (0.3, -0.1, 0.31)
     phi = (*SURGE.truth()[:11], *loss)
-    change = vessel.DampingChange(towed=TowedDamping(*[0.0] * 9)._replace(X_u=-3.5, X_absu_u=-0.26))
+    plant = vessel.Params()
+    change = plant.change._replace(delta_X_u=-3.5, delta_X_absu_u=-0.26)
     phi = (-0.26, -3.5, *phi[2:])
     for _ in range(50):
         nu, tau = random_motion(rng)
-        left = nothing_left(SURGE, nu, tau, phi, vessel.Params(change=change), loss)
+        left = nothing_left(SURGE, nu, tau, phi, plant._replace(change=change), loss)
         assert left == pytest.approx([0.0] * 3, abs=1e-12)
 
 

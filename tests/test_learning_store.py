@@ -6,6 +6,7 @@ import random
 import numpy as np
 import pytest
 from conftest import COMPONENTS
+from loops import unlimited
 
 from fmus.controller.blocker import Blocker, BlockerOptions, blocked, exceeds
 from fmus.controller.eigen import exceed, smallest, tridiagonal
@@ -127,7 +128,7 @@ def test_sums_are_those_of_the_rows():
 def test_full_store_traced_does_what_the_plain_one_does(name):
     component = COMPONENTS[name]
     rng = random.Random(1)
-    trace, p = trace_step(component), component.params()
+    trace, p = trace_step(component), unlimited(component.params())
     i = component.inputs()
     state, changed = component.init(i, p), 0
     for k in range(40):
