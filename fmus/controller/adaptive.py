@@ -88,16 +88,17 @@ def climb(values: Any, gains: Any, slopes: Any, dt: Number) -> tuple[Any, ...]:
 
 def energy(z: Errors, p: Any, phi: Any, omega: Triple) -> Energy:
     """V3 of (4.14), corrected; an estimate whose gain is 0 is left out."""
-    pairs = [
-        *zip(p.truth, phi, p.gamma, strict=True),
-        *zip(p.omega_true, omega, p.disturbance, strict=True),
-    ]
+    known = weighted(p.truth, phi, p.gamma) + weighted(p.omega_true, omega, p.disturbance)
+    return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * known)
+
+
+def weighted(truth: Sequence[Any], estimates: Sequence[Any], gains: Sequence[Any]) -> Any:
+    """Sum of error^2 / gain; a gain of 0 counts as no error."""
     total = 0.0
-    for true, estimate, gain in pairs:
+    for true, estimate, gain in zip(truth, estimates, gains, strict=True):
         error = true - estimate
-        # error^2 / gain, and 0 for a gain of 0.
         total = total + error * error * gain / (gain * gain + 1e-300)
-    return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * total)
+    return total
 
 
 def adaptive(name: str, description: str, model: Parametrisation) -> Component:

@@ -37,6 +37,12 @@ class Belief(NamedTuple):
     towed: TowedDamping = TowedDamping()
 
 
+def _written_out(arguments: str, sums: Sequence[Sequence[str]]) -> Any:
+    """A function that gives a tuple of sums, without a loop: that would cost more than the sums."""
+    terms = [" + ".join(["0.0", *products]) for products in sums]
+    return eval(f"lambda {arguments}: ({', '.join(terms)},)")
+
+
 @dataclass(frozen=True, eq=False)
 class Parametrisation:
     """A model M nu_dot = tau + known + F phi.
@@ -87,23 +93,25 @@ class Parametrisation:
         ]
         return vector("Gamma", fields, [GAIN])
 
-    def force(self, F: Regressors, phi: Sequence[Any]) -> Triple:
-        """F phi [N, N, N m]."""
-        forces = []
-        for indices, row in zip(self.pattern, F, strict=True):
-            total = 0.0
-            for k, f in zip(indices, row, strict=True):
-                total = total + phi[k] * f
-            forces.append(total)
-        return forces[0], forces[1], forces[2]
+    @cached_property
+    def force(self) -> Callable[[Regressors, Sequence[Any]], Triple]:
+        """(F, phi) -> F phi [N, N, N m]."""
+        return _written_out(
+            "F, phi",
+            [
+                [f"F[{axis}][{j}] * phi[{k}]" for j, k in enumerate(indices)]
+                for axis, indices in enumerate(self.pattern)
+            ],
+        )
 
-    def project(self, F: Regressors, e: Triple) -> tuple[Any, ...]:
-        """F^T e, one entry for each parameter."""
-        sums: list[Any] = [0.0] * len(self.coefficients)
-        for indices, row, x in zip(self.pattern, F, e, strict=True):
-            for k, f in zip(indices, row, strict=True):
-                sums[k] = sums[k] + f * x
-        return tuple(sums)
+    @cached_property
+    def project(self) -> Callable[[Regressors, Triple], tuple[Any, ...]]:
+        """(F, e) -> F^T e, one entry for each parameter."""
+        sums: list[list[str]] = [[] for _ in self.coefficients]
+        for axis, indices in enumerate(self.pattern):
+            for j, k in enumerate(indices):
+                sums[k].append(f"F[{axis}][{j}] * e[{axis}]")
+        return _written_out("F, e", sums)
 
     def turned(self, F: Regressors, psi: Number) -> tuple[Triple, ...]:
         """F^T R^T(psi), one row for each parameter: its force in the earth-fixed frame."""
