@@ -185,6 +185,8 @@ class Component:
         sampled: True for a law that acts at its sampling instants, so that an output may use the
             input of the same instant; False for a plant in continuous time, where the input acts
             through the integral (and through direct feedthrough, found by tracing).
+        held: inputs of a sampled law that act over the whole step, as the force does that moved a ship
+            between two measurements: an output follows the value of the step's start.
         hold_nonfinite: True where an input that is NaN or infinite keeps its last finite value; False
             for a component that makes its own sense of such a value.
         max_step: a longer communication step [s] is divided into equal parts no longer than this.
@@ -204,6 +206,7 @@ class Component:
     sampled: bool = True
     max_step: float | None = None
     hold_nonfinite: bool = True
+    held: tuple[str, ...] = ()
     prepare: Callable[[Any], Any] | None = None
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
 

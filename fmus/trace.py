@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from . import ops
-from .declare import Component, flatten, packer, rebuild
+from .declare import Component, flatten, packer, rebuild, variables
 
 OPERATIONS = {
     "sin": ops.sin,
@@ -242,13 +242,15 @@ def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
 def output_dependencies(component: Component) -> list[frozenset[str]]:
     """Inputs that each output follows at the same communication point.
 
-    A sampled law uses the input of the instant at which it acts. A plant's state at the end of a step
-    of vanishing length does not depend on the input, so there only direct feedthrough is left.
+    A sampled law uses the input of the instant at which it acts, unless it is held. A plant's state at
+    the end of a step of vanishing length does not depend on the input, so there only direct feedthrough
+    is left.
     """
     trace = trace_step(component, None if component.sampled else 0.0)
-    return [
-        frozenset(n for n in names if n.startswith("inputs")) for names in used_variables(trace.outputs)
-    ]
+    followed = {
+        f"inputs[{k}]" for k, v in enumerate(variables(component.inputs)) if v.name not in component.held
+    }
+    return [names & followed for names in used_variables(trace.outputs)]
 
 
 def initial_dependencies(component: Component) -> list[frozenset[str]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import COMPONENTS, ROOT
 
 import cosim
 from benchmarks.ellipse import CONTROLLERS, over_seeds
@@ -45,6 +45,17 @@ def test_shipped_scenario_runs_through(path, tmp_path):
     assert result.metrics["e_pos_max"] < 0.5
     assert len(list(tmp_path.glob("*.png"))) == 5
     assert not list(Path(tmp_path).glob("*.part"))
+
+
+@pytest.mark.parametrize("observer", [n for n in COMPONENTS if n.startswith("observer")])
+@pytest.mark.parametrize("thrusters", [n for n in COMPONENTS if n.startswith("thrusters")])
+def test_parts_are_swapped_by_one_line_each(observer, thrusters, tmp_path):
+    """No algebraic loop and no other warning: the force that moved the ship is that of the last row."""
+    content = json.loads((SCENARIOS / "ellipse.json").read_text()) | {"stop": 0.5, "metrics": {}}
+    content["fmus"]["observer"] = {"path": f"{observer}.fmu"}
+    content["fmus"]["thrusters"] = {"path": f"{thrusters}.fmu"}
+    result = cosim.simulate(cosim.load_scenario(content), tmp_path)
+    assert (result.status, result.warnings) == ("done", [])
 
 
 @pytest.mark.slow

@@ -203,4 +203,5 @@ COMPONENT = Component(
     init=init,
     step=step,
     hold_nonfinite=False,
+    held=("tau_X", "tau_Y", "tau_N"),
 )

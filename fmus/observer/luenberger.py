@@ -51,4 +51,5 @@ COMPONENT = Component(
     init=init,
     step=step,
     hold_nonfinite=False,
+    held=("tau_X", "tau_Y", "tau_N"),
 )
