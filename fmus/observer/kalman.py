@@ -21,10 +21,9 @@ from ..signals import Estimate, Force
 from .axis import MOST, Axis, Learning, Rates, later, rates, taken
 from .correction import Motion
 from .derivative import Acceleration
-from .screen import Inputs, Sample, Screening, Seen, first_look, look
+from .screen import Inputs, Sample, Screening, Seen, first_look, limited, look
 
 STD = Range(1e-6, 1.0)
-MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
 
 
 class Noise(NamedTuple):
@@ -149,16 +148,6 @@ def either(condition: Number, a: Any, b: Any) -> Any:
     if condition.__class__ is bool:
         return a if condition else b
     return rebuild(a, [where(condition, x, y) for x, y in zip(flatten(a), flatten(b), strict=True)])
-
-
-def limited(tau: Force) -> Force:
-    """A force as far as it can be true."""
-    X, Y, N = tau
-    return Force(
-        clip(finite(X, 0.0), -MOST_FORCE, MOST_FORCE),
-        clip(finite(Y, 0.0), -MOST_FORCE, MOST_FORCE),
-        clip(finite(N, 0.0), -MOST_FORCE, MOST_FORCE),
-    )
 
 
 def init(i: Inputs, p: Params) -> State:
