@@ -75,7 +75,8 @@ def test_no_upset_is_for_good(observer, h, upset):
     """Finite always, and eight seconds after one bad sample what it would have been without."""
     tau = [math.inf] * 3 if upset == "infinite force" else [0.1, 0.0, 0.0]
     rows = []
-    for t in np.arange(round(20.0 / h)) * h:
+    for k in range(round(20.0 / h)):
+        t = k * h
         psi = 0.1 * t
         wobble = 1e-4 * math.sin(1e3 * t)
         pose = [5.0 + 0.8 * math.sin(psi) + wobble, 2.0 - 0.8 * math.cos(psi), psi + wobble]
