@@ -45,6 +45,51 @@ def test_faults_of_the_measurement_are_survived(ellipse, tmp_path, observer):
     assert np.abs(log["observer.u_hat"] - log["vessel.u"])[late].max() < 0.05
 
 
+UPSETS = {
+    "1 km": lambda pose: [pose[0] + 1e3, *pose[1:]],
+    "1000 km": lambda pose: [pose[0] - 1e6, pose[1] + 1e6, pose[2]],
+    "1000 turns and a half": lambda pose: [*pose[:2], pose[2] + 2001.0 * math.pi],
+    "NaN": lambda pose: [math.nan] * 3,
+    "one NaN": lambda pose: [pose[0], math.nan, pose[2]],
+    "zeros": lambda pose: [0.0] * 3,
+    "infinite force": lambda pose: pose,
+}
+
+
+def replayed(component, rows, h):
+    """Estimates for rows of x_m, y_m, psi_m, tau_X, tau_Y, tau_N."""
+    pack, named = packer(component.inputs), variables(component.params)
+    starts = [h if v.name == "measurement_period" else v.start for v in named]
+    params = packer(component.params)(starts)
+    state, found = component.init(pack(rows[0]), params), []
+    for row in rows[1:]:
+        state, estimate = component.step(state, pack(row), params, h)
+        found.append(list(estimate[:9]))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("upset", UPSETS)
+@pytest.mark.parametrize("h", [0.01, 0.1])
+@pytest.mark.parametrize("observer", OBSERVERS)
+def test_no_upset_is_for_good(observer, h, upset):
+    """Finite always, and eight seconds after one bad sample what it would have been without."""
+    tau = [math.inf] * 3 if upset == "infinite force" else [0.1, 0.0, 0.0]
+    rows = []
+    for k in range(round(20.0 / h)):
+        t = k * h
+        psi = 0.1 * t
+        wobble = 1e-4 * math.sin(1e3 * t)
+        pose = [5.0 + 0.8 * math.sin(psi) + wobble, 2.0 - 0.8 * math.cos(psi), psi + wobble]
+        rows.append([*pose, 0.1, 0.0, 0.0])
+    calm = replayed(COMPONENTS[observer], rows, h)
+    hurt = round(10.0 / h)
+    rows[hurt] = [*UPSETS[upset](rows[hurt][:3]), *tau]
+    found = replayed(COMPONENTS[observer], rows, h)
+    assert np.isfinite(found).all()
+    late = slice(round(18.0 / h), None)
+    assert found[late] == pytest.approx(calm[late], abs=1e-3)
+
+
 @pytest.mark.parametrize("observer", [o for o in OBSERVERS if o != "observer_df"])
 def test_heading_runs_on_over_turns(ellipse, tmp_path, observer):
     log = run(ellipse, tmp_path, observer)

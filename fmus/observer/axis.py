@@ -1,9 +1,11 @@
-"""Kalman filter on one axis: position, velocity, and a disturbance of the acceleration.
+"""Kalman filter on one axis: position, velocity, and a disturbance of the acceleration with its slope.
 
-x_dot = v, v_dot = known + d, d_dot = noise; the position is measured. How noisy d_dot is nobody knows,
-and it changes, so that it is learnt in two ways. A disturbance that has varied lately will go on to do
-so. And innovations that stay on one side tell that something new has begun: the covariance then grows by
-a factor with each sample, until they scatter again (a strong tracking filter).
+x_dot = v, v_dot = known + d, d_dot = s, s_dot = -s / T + noise; the position is measured. The slope lets
+the disturbance swing without lagging behind: a wrong model errs by what the ship does, smoothly. How
+noisy it is nobody knows, so that this is learnt in two ways. The variance of a slope that has been large
+lately is large, and its noise follows from that, as in the model of Singer (1970). And innovations that
+stay on one side tell that something new has begun: the covariance then grows by a factor with each
+sample, until they scatter again (a strong tracking filter).
 
 Written out for scalars, so that it needs no matrices.
 """
@@ -11,30 +13,33 @@ Written out for scalars, so that it needs no matrices.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
-from ..ops import Number, clip, exp, fmax, sqrt, where
+from ..ops import Number, clip, fmax, sqrt, where
 
 # Beyond what any ship of this size does; within, no arithmetic overflows.
 MOST = 5.0  # m/s, rad/s, m/s2, rad/s2
+MOST_DISTURBANCE = 1.0  # m/s2, rad/s2
+MOST_SLOPE = 0.02  # m/s3, rad/s3
 # Standard deviations of an innovation that count: what is far off is no better known than what is off.
 MOST_INNOVATION = 5.0
 # A squared mean innovation below this many variances is scatter.
-SCATTER = 8.0
+SCATTER = 4.0
 
 
 class Learning(NamedTuple):
     """How the noise of the disturbance is learnt."""
 
-    change_time: Annotated[float, "s", "in which a disturbance changes", Range(0.1)] = 20.0
-    memory_time: Annotated[float, "s", "over which its variation is learnt", Range(0.1)] = 3.0
-    alert: Annotated[float, "1/s", "growth of the covariance in doubt", Range(0.0, 100.0)] = 10.0
-    alert_time: Annotated[float, "s", "over which innovations are averaged", Range(0.01)] = 0.1
+    change_time: Annotated[float, "s", "for which a disturbance goes on changing", Range(0.1)] = 8.0
+    memory_time: Annotated[float, "s", "over which its slope is remembered", Range(0.1)] = 2.0
+    alert: Annotated[float, "1/s", "growth of the covariance in doubt", Range(0.0, 100.0)] = 20.0
+    alert_time: Annotated[float, "s", "over which innovations are averaged", Range(0.01)] = 0.3
 
 
 class Rates(NamedTuple):
     """What is the same on every axis, computed once a step."""
 
-    memory: Any  # share of the present in the variation that is learnt
-    change: Any  # [1/s]
+    memory: Any  # share of the present in the variance that is learnt
+    keep: Any  # share of the slope that is left after a step
+    noise: Any  # gain of its variance by one step, in variances
     alert: Any  # growth of the covariance by one sample
     mean: Any  # share of a sample in the mean innovation
     scatter: Any  # squared mean innovation that is none
@@ -46,17 +51,21 @@ class Covariance(NamedTuple):
     pp: Any = 1.0
     pv: Any = 0.0
     pd: Any = 0.0
+    ps: Any = 0.0
     vv: Any = 0.01
     vd: Any = 0.0
+    vs: Any = 0.0
     dd: Any = 0.0025
+    ds: Any = 0.0
+    ss: Any = 0.0
 
 
 class Axis(NamedTuple):
-    """Disturbance [m/s2 or rad/s2] with its slow mean and its variance about that; mean innovation in
+    """Disturbance [m/s2 or rad/s2], its slope and the learnt variance of that; mean innovation in
     standard deviations; covariance."""
 
     d: Any = 0.0
-    mean: Any = 0.0
+    slope: Any = 0.0
     variance: Any = 0.0
     bias: Any = 0.0
     covariance: Covariance = Covariance()
@@ -64,12 +73,14 @@ class Axis(NamedTuple):
 
 def rates(p: Learning, period: Number, h: Number) -> Rates:
     """The rates of learning at a time between samples and a step [s]."""
+    mean = period / (p.alert_time + period)
     return Rates(
-        1.0 - exp(-h / p.memory_time),
-        2.0 / p.change_time,
+        h / (p.memory_time + h),
+        p.change_time / (p.change_time + h),
+        2.0 * h / p.change_time,
         p.alert * period,
-        1.0 - exp(-period / p.alert_time),
-        0.5 * SCATTER * period / p.alert_time,
+        mean,
+        0.5 * SCATTER * mean,
     )
 
 
@@ -78,29 +89,36 @@ def later(a: Axis, drift: Number, k: Rates, h: Number) -> Axis:
 
     Args:
         a: axis.
-        drift: what a disturbance gains in a second, at least [m/s2 or rad/s2].
+        drift: what a slope gains in a second, at least [m/s3 or rad/s3].
         k: rates.
         h: time [s].
     """
-    d, mean, variance, bias, (pp, pv, pd, vv, vd, dd) = a
-    half = 0.5 * h * h
+    d, slope, variance, bias, (pp, pv, pd, ps, vv, vd, vs, dd, ds, ss) = a
+    keep, half = k.keep, 0.5 * h * h
+    # F P, of which the lower rows are needed right of the diagonal only.
     pv1 = pv + h * vv + half * vd
     pd1 = pd + h * vd + half * dd
-    vd1 = vd + h * dd
-    off = d - mean
+    ps1 = ps + h * vs + half * ds
+    vd1 = vd + h * dd + half * ds
+    vs1 = vs + h * ds + half * ss
+    ds1 = ds + h * ss
+    dd1 = dd + h * ds
     return Axis(
-        d,
-        mean + k.memory * off,
-        # What may be an error of the estimate is no variation.
-        variance + k.memory * (fmax(off * off - dd, 0.0) - variance),
+        d + h * slope,
+        keep * slope,
+        variance + k.memory * (slope * slope - variance),
         bias,
         Covariance(
             pp + h * (pv + pv1) + half * (pd + pd1),
-            pv1 + h * pd1,
-            pd1,
-            vv + h * (vd + vd1),
-            vd1,
-            dd + h * (drift * drift + k.change * variance),
+            pv1 + h * pd1 + half * ps1,
+            pd1 + h * ps1,
+            keep * ps1,
+            vv + h * (vd + vd1) + half * (vs + vs1),
+            vd1 + h * vs1,
+            keep * vs1,
+            dd1 + h * ds1,
+            keep * ds1,
+            keep * keep * ss + h * drift * drift + k.noise * variance,
         ),
     )
 
@@ -114,27 +132,31 @@ def taken(a: Axis, innovation: Number, noise: Number, k: Rates) -> tuple[Axis, A
         noise: variance of the measured position [m2 or rad2].
         k: rates.
     """
-    d, mean, variance, bias, (pp, pv, pd, vv, vd, dd) = a
+    d, slope, variance, bias, (pp, pv, pd, ps, vv, vd, vs, dd, ds, ss) = a
     excess = fmax(bias * bias - k.scatter, 0.0)
     factor = where(vv + dd < MOST * MOST, 1.0 + k.alert * excess, 1.0)
     inverse = 1.0 / (factor * pp + noise)
     share = factor * inverse
-    kp, kv, kd = share * pp, share * pv, share * pd
-    rest = factor * noise * inverse
+    kp, kv, kd, ks = share * pp, share * pv, share * pd, share * ps
+    rest = noise * share
     sigmas = clip(innovation * sqrt(inverse), -MOST_INNOVATION, MOST_INNOVATION)
     return (
         Axis(
-            clip(d + kd * innovation, -MOST, MOST),
-            mean,
+            clip(d + kd * innovation, -MOST_DISTURBANCE, MOST_DISTURBANCE),
+            clip(slope + ks * innovation, -MOST_SLOPE, MOST_SLOPE),
             variance,
             bias + k.mean * (sigmas - bias),
             Covariance(
-                kp * noise,
+                rest * pp,
                 rest * pv,
                 rest * pd,
+                rest * ps,
                 factor * (vv - kv * pv),
                 factor * (vd - kv * pd),
+                factor * (vs - kv * ps),
                 factor * (dd - kd * pd),
+                factor * (ds - kd * ps),
+                factor * (ss - ks * ps),
             ),
         ),
         kp * innovation,

@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
 from ..frames import rotate_to_body, rotate_to_earth
-from ..ops import Number, where
+from ..ops import Number, clip, where
 from ..signals import Estimate
 from .derivative import FRACTION, Acceleration, accelerated, weight
 from .screen import Inputs, Sample, Seen, first_look
@@ -13,7 +13,7 @@ GAIN = Range(0.0, 50.0)
 
 
 class Gains(NamedTuple):
-    """K_1 and K_2, and the filter of the acceleration."""
+    """K_1 and K_2, limits of the velocity, and the filter of the acceleration."""
 
     k1_x: Annotated[float, "rad/s", "correction of the north position", GAIN] = 6.0
     k1_y: Annotated[float, "rad/s", "correction of the east position", GAIN] = 6.0
@@ -21,6 +21,8 @@ class Gains(NamedTuple):
     k2_u: Annotated[float, "rad2/s2", "correction of the surge velocity", GAIN] = 9.0
     k2_v: Annotated[float, "rad2/s2", "correction of the sway velocity", GAIN] = 9.0
     k2_r: Annotated[float, "rad2/s2", "correction of the yaw rate", GAIN] = 9.0
+    u_max: Annotated[float, "m/s", "velocity that no ship has", Range(0.0, 100.0)] = 2.0
+    r_max: Annotated[float, "rad/s", "yaw rate that no ship has", Range(0.0, 100.0)] = 5.0
     b: Annotated[float, "1", "weight of a new acceleration in its filter", FRACTION] = 0.05
     filter_period: Annotated[float, "s", "sampling period that b belongs to", Range(1e-6)] = 0.01
 
@@ -65,9 +67,10 @@ def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
         m.x + gain * k.k1_x * dx,
         m.y + gain * k.k1_y * dy,
         m.psi + gain * k.k1_psi * dpsi,
-        keep * m.u + gain * k.k2_u * ahead,
-        keep * m.v + gain * k.k2_v * aside,
-        keep * m.r + gain * k.k2_r * dpsi,
+        # A spike may not throw the velocity to where the model of the damping overflows.
+        clip(keep * m.u + gain * k.k2_u * ahead, -k.u_max, k.u_max),
+        clip(keep * m.v + gain * k.k2_v * aside, -k.u_max, k.u_max),
+        clip(keep * m.r + gain * k.k2_r * dpsi, -k.r_max, k.r_max),
     )
     return Motion(
         where(s.first, s.x, on.x),

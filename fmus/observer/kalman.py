@@ -2,9 +2,9 @@
 
 Estimated are eta, nu and on each body axis a disturbance of the acceleration: what the model does not
 explain, from a wrong damping coefficient to thrust that never came. The acceleration follows from the
-model, (2.2), and the disturbance. The innovation is turned into the body frame, where the axes part (see
-:mod:`.axis`); their covariances grow while the measurement is frozen or lost (see :mod:`.screen`), so
-that the first sample thereafter counts for more.
+model, (2.2), halfway through the step, and the disturbance. The innovation is turned to body axes,
+where the axes part (see :mod:`.axis`); their covariances grow while the measurement is frozen or lost
+(see :mod:`.screen`), so that the first sample thereafter counts for more.
 
 A sample far off is a spike and left out, until so many follow that the ship must really be there. Lost
 for longer than ``rest_time``, the model is left too and the velocity fades, because the nominal hull is
@@ -13,28 +13,27 @@ unstable above 0.04 m/s. A force that is NaN or infinite counts as zero.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Component, Range, flatten, rebuild
+from ..declare import Component, Range
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
-from ..ops import Number, choose, clip, exp, finite, fmax, where
+from ..ops import Number, choose, clip, exp, finite, fmax, when, where
 from ..signals import Estimate, Force
 from .axis import MOST, Axis, Learning, Rates, later, rates, taken
 from .correction import Motion
 from .derivative import Acceleration
-from .screen import Inputs, Sample, Screening, Seen, first_look, look
+from .screen import Inputs, Sample, Screening, Seen, first_look, limited, look
 
 STD = Range(1e-6, 1.0)
-MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
 
 
 class Noise(NamedTuple):
-    """Noise of the measurement, and what a disturbance gains in a second at least."""
+    """Noise of the measurement, and what the slope of a disturbance gains in a second at least."""
 
     position_std: Annotated[float, "m", "standard deviation of a measured position", STD] = 0.0002
     heading_std: Annotated[float, "rad", "standard deviation of a measured heading", STD] = 0.0003
-    drift_u: Annotated[float, "m/s2", "growth of the surge disturbance in 1 s", STD] = 0.00007
-    drift_v: Annotated[float, "m/s2", "growth of the sway disturbance in 1 s", STD] = 0.00007
-    drift_r: Annotated[float, "rad/s2", "growth of the yaw disturbance in 1 s", STD] = 0.00015
+    drift_u: Annotated[float, "m/s3", "growth in 1 s of the slope in surge", STD] = 0.000024
+    drift_v: Annotated[float, "m/s3", "growth in 1 s of the slope in sway", STD] = 0.000024
+    drift_r: Annotated[float, "rad/s3", "growth in 1 s of the slope in yaw", STD] = 0.000048
 
 
 class Doubt(NamedTuple):
@@ -72,49 +71,44 @@ class State(NamedTuple):
     refused: Any = 0.0
 
 
-def acceleration(m: Motion, b: Belief, tau: Force, hull: Hull) -> Acceleration:
-    """nu_dot at a motion, by the model and the disturbances."""
-    u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, tau, hull)
-    return Acceleration(u_dot + b.surge.d, v_dot + b.sway.d, r_dot + b.yaw.d)
+def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> tuple[Motion, Acceleration]:
+    """Pose and velocity after h [s] of a force, and nu_dot by the model alone.
 
-
-def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> Motion:
-    """Pose and velocity after h [s] of a force: the midpoint method, halfway by the old acceleration.
-
-    Where only a share of the velocity is kept, nothing is known of its change.
+    This is the midpoint method, halfway by the old acceleration; it needs the model once a step. Where
+    only a share of the velocity is kept, nothing is known of its change.
     """
-    b, (u_dot, v_dot, r_dot) = s.belief, s.acceleration
-    x, y, psi, u, v, r = b.motion
+    (x, y, psi, u, v, r), surge, sway, yaw = s.belief
+    u_dot, v_dot, r_dot = s.acceleration
     half = 0.5 * h
-    middle = Motion(x, y, psi + half * r, u + half * u_dot, v + half * v_dot, r + half * r_dot)
-    u_dot, v_dot, r_dot = acceleration(middle, b, tau, hull)
-    x_dot, y_dot = rotate_to_earth(middle.psi, middle.u, middle.v)
+    um, vm, rm = u + half * u_dot, v + half * v_dot, r + half * r_dot
+    X, Y, N = motion(um, vm, rm, tau, hull)
+    x_dot, y_dot = rotate_to_earth(psi + half * r, um, vm)
     gain = where(keep < 1.0, 0.0, h)
     return Motion(
         x + h * x_dot,
         y + h * y_dot,
-        psi + h * middle.r,
-        clip(keep * u + gain * u_dot, -MOST, MOST),
-        clip(keep * v + gain * v_dot, -MOST, MOST),
-        clip(keep * r + gain * r_dot, -MOST, MOST),
-    )
+        psi + h * rm,
+        clip(keep * u + gain * (X + surge.d), -MOST, MOST),
+        clip(keep * v + gain * (Y + sway.d), -MOST, MOST),
+        clip(keep * r + gain * (N + yaw.d), -MOST, MOST),
+    ), Acceleration(X, Y, N)
 
 
-def believed(s: State, tau: Force, hull: Hull, p: Params, k: Rates, h: Number) -> Belief:
+def believed(s: State, ahead: Motion, keep: Number, p: Params, k: Rates, h: Number) -> Belief:
     """What is believed after h [s], before the sample of that instant."""
     _, surge, sway, yaw = s.belief
     n = p.noise
-    lost = s.seen.age > p.screening.rest_time
-    keep = where(lost, exp(-h / p.doubt.fade_time), 1.0)
-    going = Belief(
-        predicted(s, tau, hull, keep, h),
-        later(surge, n.drift_u, k, h),
-        later(sway, n.drift_v, k, h),
-        later(yaw, n.drift_r, k, h),
+    return when(
+        keep < 1.0,
+        # Long lost, nothing is known any more but that a ship comes to rest.
+        lambda: Belief(ahead, Axis(keep * surge.d), Axis(keep * sway.d), Axis(keep * yaw.d)),
+        lambda: Belief(
+            ahead,
+            later(surge, n.drift_u, k, h),
+            later(sway, n.drift_v, k, h),
+            later(yaw, n.drift_r, k, h),
+        ),
     )
-    # Long lost, nothing is known any more but that a ship comes to rest.
-    unknown = Belief(going.motion, Axis(keep * surge.d), Axis(keep * sway.d), Axis(keep * yaw.d))
-    return either(lost, unknown, going)
 
 
 def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number]:
@@ -144,23 +138,6 @@ def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number
     return Belief(after, surge, sway, yaw), distance <= doubt.gate * doubt.gate
 
 
-def either(condition: Number, a: Any, b: Any) -> Any:
-    """:func:`fmus.ops.choose` for nested tuples."""
-    if condition.__class__ is bool:
-        return a if condition else b
-    return rebuild(a, [where(condition, x, y) for x, y in zip(flatten(a), flatten(b), strict=True)])
-
-
-def limited(tau: Force) -> Force:
-    """A force as far as it can be true."""
-    X, Y, N = tau
-    return Force(
-        clip(finite(X, 0.0), -MOST_FORCE, MOST_FORCE),
-        clip(finite(Y, 0.0), -MOST_FORCE, MOST_FORCE),
-        clip(finite(N, 0.0), -MOST_FORCE, MOST_FORCE),
-    )
-
-
 def init(i: Inputs, p: Params) -> State:
     seen = first_look(i.measurement)
     return State(seen, Belief(Motion(seen.x_m, seen.y_m, seen.psi_m)))
@@ -171,7 +148,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
     period = p.screening.measurement_period
     k = rates(p.learning, period, h)
-    before = believed(s, tau, hull, p, k, h)
+    keep = where(s.seen.age > p.screening.rest_time, exp(-h / p.doubt.fade_time), 1.0)
+    ahead, model = predicted(s, tau, hull, keep, h)
+    before = believed(s, ahead, keep, p, k, h)
     seen, sample = look(s.seen, i.measurement, before.motion.psi, p.screening, h)
     # A sample that is held until the next measurement tells nothing new.
     new = sample.good & ((seen.age <= 0.0) | sample.overdue) & (h > 0.0)
@@ -179,14 +158,16 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     fits = new & fitting
     refused = where(fits, 0.0, where(new, s.refused + fmax(h, period), s.refused))
     elsewhere = sample.first | (refused > p.doubt.jump_time)
-    there = Belief(Motion(sample.x, sample.y, finite(sample.psi, 0.0)))
-    belief = either(elsewhere, there, either(fits, after, before))
+    belief = when(
+        elsewhere,
+        lambda: Belief(Motion(sample.x, sample.y, finite(sample.psi, 0.0))),
+        lambda: choose(fits, after, before),
+    )
     m = belief.motion
-    u_dot, v_dot, r_dot = acceleration(m, belief, tau, hull)
     known = Acceleration(
-        where(sample.overdue, 0.0, u_dot),
-        where(sample.overdue, 0.0, v_dot),
-        where(sample.overdue, 0.0, r_dot),
+        where(sample.overdue, 0.0, clip(model.u_dot + belief.surge.d, -MOST, MOST)),
+        where(sample.overdue, 0.0, clip(model.v_dot + belief.sway.d, -MOST, MOST)),
+        where(sample.overdue, 0.0, clip(model.r_dot + belief.yaw.d, -MOST, MOST)),
     )
     state = State(seen, belief, choose(h > 0.0, known, s.acceleration), where(elsewhere, 0.0, refused))
     frozen = where(sample.good, 0.0, 1.0)

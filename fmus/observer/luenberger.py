@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from ..declare import Component
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
-from ..ops import Number, finite
+from ..ops import Number
 from ..signals import Estimate, Force
 from .correction import Gains, Motion, State, corrected, estimated, moved, start
-from .screen import Inputs, Screening, look
+from .screen import Inputs, Screening, limited, look
 
 
 class Params(NamedTuple):
@@ -25,9 +25,8 @@ class Params(NamedTuple):
 
 def accelerate(m: Motion, tau: Force, p: Params, h: Number) -> Motion:
     """The velocity after h [s] of a force, by the model."""
-    force = Force(finite(tau.tau_X, 0.0), finite(tau.tau_Y, 0.0), finite(tau.tau_N, 0.0))
     hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
-    u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, force, hull)
+    u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, limited(tau), hull)
     return m._replace(u=m.u + h * u_dot, v=m.v + h * v_dot, r=m.r + h * r_dot)
 
 

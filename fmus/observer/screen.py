@@ -8,8 +8,10 @@ taken to be true: the ship lies still.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
-from ..ops import TWO_PI, Number, floor, is_finite, not_, where
+from ..ops import TWO_PI, Number, clip, finite, floor, is_finite, not_, where
 from ..signals import Force, Measurement
+
+MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
 
 
 class Screening(NamedTuple):
@@ -50,6 +52,16 @@ def present(m: Measurement) -> Number:
     """Whether a sample is a measurement at all: finite and not (0, 0, 0)."""
     zero = (m.x_m == 0.0) & (m.y_m == 0.0) & (m.psi_m == 0.0)
     return is_finite(m.x_m + m.y_m + m.psi_m) & not_(zero)
+
+
+def limited(tau: Force) -> Force:
+    """A force as far as it can be true; one that is NaN or infinite is none."""
+    X, Y, N = tau
+    return Force(
+        clip(finite(X, 0.0), -MOST_FORCE, MOST_FORCE),
+        clip(finite(Y, 0.0), -MOST_FORCE, MOST_FORCE),
+        clip(finite(N, 0.0), -MOST_FORCE, MOST_FORCE),
+    )
 
 
 def unwrap(psi_m: Number, near: Number) -> Number:
