@@ -15,8 +15,10 @@ import cosim
 from cosim.plots import draw
 
 from .command import progress, run_study, study_parser
+from .found import FAULTY, FRESH, PRINTED, REGULAR, Found, Runs, label, lost, mean
 from .hoard import hoard, logged
-from .lessons import DELAYS, FAULTY, REGULAR, SETTINGS, Found, Runs, label, lessons, lost, mean
+from .lessons import DELAYS, lessons
+from .margin import SETTINGS
 from .outcome import AXES, Log, missing
 from .report import Report
 from .runs import Content, run_all, vary
@@ -30,10 +32,10 @@ OPEN = {f"controller.{name}": OFF for name in ("tau_max", "nu_dot_max", "nu_max"
 BLOCKER = {"controller.tau_max": 3.0, "controller.nu_dot_max": 0.1, "controller.nu_max": 1.0}
 STALE = {"controller.stale": 1.0}
 STORES = {
-    "as printed": OPEN | STALE,
-    "as printed, blocker": BLOCKER | STALE,
-    "errors formed anew": OPEN,
-    "errors formed anew, blocker": BLOCKER,
+    PRINTED: OPEN | STALE,
+    f"{PRINTED}, blocker": BLOCKER | STALE,
+    FRESH: OPEN,
+    f"{FRESH}, blocker": BLOCKER,
 }
 
 Jobs = dict[Any, dict[str, Content]]
@@ -98,9 +100,9 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
         first = together(sailing, seeds[:1], logs, jobs, advance)
         rest = together(sailing, seeds[1:], None, jobs, advance)
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
-        others = [together(group, some, None, jobs, advance) for group, some in groups[1:]]
+        spikes, delays = (together(group, some, None, jobs, advance) for group, some in groups[1:])
         kept = run_all(hoards, few, hoard, None, jobs, advance)
-    return Found(sailed_all, *others, kept)
+    return Found(sailed_all, spikes, delays, kept)
 
 
 def folder(key: tuple[str, float]) -> str:

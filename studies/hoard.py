@@ -101,5 +101,5 @@ def hoard(result: cosim.Result) -> Hoard:
         float(near.mean()),
         float(from_spikes.mean()),
         float((log["time"][-1] - taken[from_spikes]).max(initial=0.0)),
-        float(growth[near].sum() / growth.sum()),
+        float(growth[near].sum() / max(growth.sum(), 1e-300)),
     )

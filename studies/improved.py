@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import cosim
 from fmus.controller.models import SURGE
 
 from . import sysid4
 from .command import progress, run_study, study_parser
+from .lap_pictures import errors_picture, force_picture, path_picture
 from .outcome import AXES, LEARNED_FROM, Log, missing, rms, true_states
 from .report import Report
 from .runs import Content, Interval, interval, paired, run_all, shipped, vary
@@ -36,7 +36,6 @@ LOGGED = [
     "guidance.x_t",
     "guidance.y_t",
 ]
-UNITS = ("m", "m", "rad")
 
 
 class Lap(NamedTuple):
@@ -158,8 +157,8 @@ def coefficients(report: Report, found: Found) -> None:
         rows.append([c.name, c.unit, f"{truth:g}", *each])
     report.table(header, rows)
     report.text(
-        "On an ellipse at constant speed u and τ_X hardly change: |u|u, u and the lost surge force press "
-        "on the ship in much the same proportion all the time, and so do r, |r|r and the lost moment. "
+        "On an ellipse at constant speed u and τ_X hardly change: |u|u, u and the lost surge force "
+        "press on the ship in much the same proportion all the time, so do r, |r|r and the lost moment. "
         "Their sums are found better than their parts, whose errors cancel: estimate less truth of the "
         "surge force, by parts [N]."
     )
@@ -169,52 +168,6 @@ def coefficients(report: Report, found: Found) -> None:
         for s, runs in found.items()
     ]
     report.table(["observer", *names], parts)
-
-
-def errors_picture(logs: Mapping[str, Log]) -> Figure:
-    """z1 over time (Fig. 7.18a)."""
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    panels = figure.subplots(3, 1, sharex=True)
-    for panel, name, unit in zip(panels, ("x", "y", "psi"), UNITS, strict=True):
-        for label, log in logs.items():
-            panel.plot(log["time"], log[f"controller.z1_{name}"], label=label, linewidth=1.0)
-        panel.set_ylabel(f"z1_{name} [{unit}]")
-        panel.grid(alpha=0.3)
-    panels[0].legend(fontsize=7, ncols=3)
-    panels[-1].set_xlabel("time [s]")
-    return figure
-
-
-def force_picture(log: Log) -> Figure:
-    """Model error with the lost thrust, and its estimate (Fig. 7.18b)."""
-    figure = Figure(figsize=(8.0, 7.0), layout="constrained")
-    panels = figure.subplots(3, 1, sharex=True)
-    for panel, a in zip(panels, AXES, strict=True):
-        panel.plot(log["time"], missing(log, a), "k", label="ω", linewidth=1.0)
-        panel.plot(log["time"], log[f"controller.omega_hat_{a}"], "tab:red", label="estimate")
-        panel.set_ylabel(f"ω_{a} [{'N m' if a == 'N' else 'N'}]")
-        # The start, where ship and estimate are still far off, would flatten the rest.
-        late = log["time"] > 0.1 * log["time"][-1]
-        low, high = np.quantile(missing(log, a)[late], [0.005, 0.995])
-        panel.set_ylim(low - 0.5 * (high - low) - 0.02, high + 0.5 * (high - low) + 0.02)
-        panel.grid(alpha=0.3)
-    panels[0].legend(fontsize=8)
-    panels[-1].set_xlabel("time [s]")
-    return figure
-
-
-def path_picture(logs: Mapping[str, Log]) -> Figure:
-    """The trajectories (Fig. 7.17)."""
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    axes = figure.subplots()
-    for label, log in logs.items():
-        axes.plot(log["vessel.y"], log["vessel.x"], label=label, linewidth=1.0)
-    last = next(iter(logs.values()))
-    axes.plot(last["guidance.y_t"], last["guidance.x_t"], "k--", label="target", linewidth=1.0)
-    axes.set(xlabel="east [m]", ylabel="north [m]", aspect="equal")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
-    return figure
 
 
 def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> Path:
