@@ -15,14 +15,14 @@ import cosim
 from cosim.plots import draw
 
 from .command import progress, run_study, study_parser
-from .found import FAULTY, FRESH, PRINTED, REGULAR, Found, Runs, label, lost, mean
+from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found, Runs, label, lost, mean
 from .hoard import hoard, logged
 from .lessons import DELAYS, lessons
 from .margin import SETTINGS
 from .outcome import AXES, Log, missing
 from .report import Report
 from .runs import Content, run_all, vary
-from .trials import ABS, CLZ, CONTROLLERS, LABELS, TRIALS, Sailed, Trial, gains, sailed, scenario
+from .trials import ABS, CLE, CLZ, CONTROLLERS, LABELS, TRIALS, Sailed, Trial, gains, sailed, scenario
 
 CL = ("controller_cl_win_eps", "controller_cl_win_z2", "controller_cl_svd_eps", "controller_cl_svd_z2")
 FEW = 3  # seeds of the experiments in which little is random
@@ -59,6 +59,14 @@ def spiked(trial: Trial) -> Jobs:
     }
 
 
+def slow_eight(trial: Trial) -> Jobs:
+    """(blocker, with spikes) -> controller -> scenario: what is not among the trials."""
+    return {
+        (OPENED, False): {c: scenario(trial, c, spikes=False) for c in (CLZ, CLE)},
+        (BLOCKED, True): {c: scenario(trial, c, parameters=BLOCKER) for c in (CLZ, CLE)},
+    }
+
+
 def delayed(trial: Trial) -> Jobs:
     """(gains, delay of the thrusters [s]) -> controller -> scenario; half a run."""
     half = trial._replace(seconds=0.5 * trial.seconds)
@@ -91,7 +99,12 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
     every = [t._replace(seconds=shorter * t.seconds) for t in TRIALS]
     few, slow = seeds[:FEW], every[0]
     sailing = trials(every)
-    groups = [(sailing, seeds), (spiked(slow), seeds), (delayed(slow), few)]
+    groups = [
+        (sailing, seeds),
+        (spiked(slow), seeds),
+        (slow_eight(every[1]), seeds),
+        (delayed(slow), few),
+    ]
     hoards = hoarding(slow)
     total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(hoards) * len(few)
     rmtree(out / "logs", ignore_errors=True)
@@ -100,9 +113,9 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
         first = together(sailing, seeds[:1], logs, jobs, advance)
         rest = together(sailing, seeds[1:], None, jobs, advance)
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
-        spikes, delays = (together(group, some, None, jobs, advance) for group, some in groups[1:])
+        others = [together(group, some, None, jobs, advance) for group, some in groups[1:]]
         kept = run_all(hoards, few, hoard, None, jobs, advance)
-    return Found(sailed_all, spikes, delays, kept)
+    return Found(sailed_all, others[0], others[1], others[2], kept)
 
 
 def folder(key: tuple[str, float]) -> str:

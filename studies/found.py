@@ -12,6 +12,7 @@ from .verdict import finite_ratio
 Runs = Mapping[str, Sequence[Sailed]]
 REGULAR, FAULTY = False, True
 PRINTED, FRESH = "as printed", "errors formed anew"
+OPENED, BLOCKED = "no blocker", "blocker"
 
 
 class Found(NamedTuple):
@@ -20,12 +21,14 @@ class Found(NamedTuple):
     Attributes:
         trials: (trial, with the guidance fault) -> controller -> runs.
         spiked: (store, with spikes) -> controller -> runs.
+        eight: (blocker, with spikes) -> controller -> runs of the slow eight.
         delayed: (gains, delay) -> controller -> runs.
         hoards: controller -> what its store held.
     """
 
     trials: Mapping[tuple[str, bool], Runs]
     spiked: Mapping[tuple[str, bool], Runs]
+    eight: Mapping[tuple[str, bool], Runs]
     delayed: Mapping[tuple[str, float], Runs]
     hoards: Mapping[str, Sequence[Hoard]]
 

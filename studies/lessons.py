@@ -6,7 +6,21 @@ import numpy as np
 
 from fmus.hull import Inertia, mass_matrix
 
-from .found import FAULTY, FRESH, PRINTED, REGULAR, Found, kept, label, lost, mean, share, values
+from .found import (
+    BLOCKED,
+    FAULTY,
+    FRESH,
+    OPENED,
+    PRINTED,
+    REGULAR,
+    Found,
+    kept,
+    label,
+    lost,
+    mean,
+    share,
+    values,
+)
 from .hoard import Hoard
 from .margin import margins
 from .runs import Interval
@@ -165,6 +179,28 @@ def spikes(found: Found) -> list[Verdict]:
     ]
 
 
+def eight(found: Found) -> Verdict:
+    """The slow eight, where CLE was by far the worst: with spikes, without, and with the blocker."""
+    trial = TRIALS[1].name
+    runs = found.trials[trial, REGULAR]
+    spiked = {c: share(runs[c], runs[RBS], "iaew") for c in (ABS, CLZ, CLE)}
+    worst = all(spiked[c].low > 1.0 for c in (CLZ, CLE))
+    cause = [
+        f"{LABELS[c]} {share(each[c], runs[RBS], 'iaew')} {name}"
+        for name, each in (
+            ("without spikes", found.eight[OPENED, False]),
+            ("with spikes and the blocker", found.eight[BLOCKED, True]),
+        )
+        for c in (CLZ, CLE)
+    ]
+    return Verdict(
+        "On the slow eight CLZ and CLE keep an error in sway and come worst out of the metrics (6.4.3)",
+        "reproduced" if worst else "not reproduced",
+        f"IAEW over that of RBS, {trial}: {told({LABELS[c]: s for c, s in spiked.items()})}. Cause: "
+        f"stored spikes; {'; '.join(cause)}",
+    )
+
+
 def short(controller: str) -> str:
     return controller.removeprefix("controller_cl_")
 
@@ -235,6 +271,7 @@ def lessons(found: Found) -> list[Verdict]:
         surge_error(found),
         no_surge(found),
         *spikes(found),
+        eight(found),
         estimators(),
         oscillation(found),
     ]
