@@ -1,12 +1,27 @@
 """What is kept of a tracking run: errors, model error and its estimate, effort, the store of samples."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import signal
 
 import cosim
 
+Log = Mapping[str, np.ndarray]
+
 AXES = "XYN"
+# What the model error and its estimate are made of.
+LEARNED_FROM = [
+    f"{signal}_{a}"
+    for signal in (
+        "vessel.omega_star",
+        "controller.omega_hat",
+        "thrusters.tau_act",
+        "thrusters.tau_cmd",
+    )
+    for a in AXES
+]
 # The start of a run, which depends on where the ship lay, is left out.
 SETTLED = 20.0
 
@@ -59,9 +74,16 @@ def rms(x: np.ndarray) -> float:
 
 
 def quick(x: np.ndarray, step: float, above: float = 0.5) -> np.ndarray:
-    """The part of a signal above a frequency [Hz], by a moving mean of one period."""
-    width = max(1, round(1.0 / (above * step)))
-    return x - np.convolve(x, np.ones(width) / width, "same")
+    """The part of a signal above a frequency [Hz], without a shift in time."""
+    high_pass = signal.butter(4, above, "high", fs=1.0 / step, output="sos")
+    return signal.sosfiltfilt(high_pass, x)
+
+
+def missing(log: Log, axis: str) -> np.ndarray:
+    """All that the control model lacks [N, N m], (7.7): the thrust that was commanded and lost is part
+    of it, which ``omega_star`` of the vessel does not know of."""
+    lost = log[f"thrusters.tau_act_{axis}"] - log[f"thrusters.tau_cmd_{axis}"]
+    return log[f"vessel.omega_star_{axis}"] + lost
 
 
 def outcome(result: cosim.Result) -> Outcome:
@@ -104,6 +126,6 @@ def true_states(content: dict[str, Any]) -> dict[str, Any]:
     return {**content, "connections": [*kept, *told], "faults": []}
 
 
-def columns(outcomes: list[Outcome], name: str) -> list[float]:
+def columns(outcomes: Sequence[Any], name: str) -> list[float]:
     """One number of every run."""
     return [float(getattr(o, name)) for o in outcomes]
