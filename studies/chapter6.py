@@ -8,7 +8,6 @@ without the fault of its guidance. Each lesson of 6.5 is held against the result
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from shutil import rmtree
 from typing import Any
 
 import cosim
@@ -107,7 +106,6 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
     ]
     hoards = hoarding(slow)
     total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(hoards) * len(few)
-    rmtree(out / "logs", ignore_errors=True)
     with progress(total, "chapter 6") as advance:
         logs = out / "logs"
         first = together(sailing, seeds[:1], logs, jobs, advance)
