@@ -1,0 +1,32 @@
+"""Holds a ship model against measurements; what it lacks is to be learned from them.
+
+A measured run goes through three steps, each model-free, before a model sees it::
+
+    import diagnosis
+
+    track = diagnosis.clean(diagnosis.read("run.csv"))  # what is missing, frozen, out of order
+    smoothed = diagnosis.smooth(track)  # pose, velocity, acceleration, and how sure they are
+    windows = diagnosis.Windows([smoothed])
+    nominal = windows.errors()
+    slower = windows.errors(vessel={"delta_X_u": -4.0})
+"""
+
+from cosim import InputError
+
+from .cleaning import Counts, Track, clean
+from .measurement import Run, read
+from .smoothing import Smoothed, smooth
+from .windows import WindowErrors, Windows
+
+__all__ = [
+    "Counts",
+    "InputError",
+    "Run",
+    "Smoothed",
+    "Track",
+    "WindowErrors",
+    "Windows",
+    "clean",
+    "read",
+    "smooth",
+]
