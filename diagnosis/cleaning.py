@@ -14,10 +14,11 @@ from .measurement import Run
 
 SHORTEST = 8.0  # s; one window of prediction
 RAREST = 2.0  # s between two samples; beyond, a ship of this size cannot be followed
-LOST_ORDER = 0.1  # largest share of rows whose time may be out of order
+MOST_OUT = 0.1  # largest share of rows whose time may be out of order
 LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate on both sides
 # Beyond these no ship moves: the unit is another one.
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
+TURN = 6.3  # rad; a heading that stays below is in radians, and may wrap
 
 
 class Counts(NamedTuple):
@@ -41,7 +42,7 @@ class Track:
         dropped: (n,), NaN, infinite, or all three zero.
         between: (n,), rows of a log between two measurements of a slower measurement system.
         period: of the measurement [s].
-        lost: rows left out, as their time stamp is missing, repeated or goes backwards.
+        out: rows left out, as their time stamp is missing, repeated or goes backwards.
         notes: what was found, a line each.
     """
 
@@ -51,7 +52,7 @@ class Track:
     dropped: np.ndarray
     between: np.ndarray
     period: float
-    lost: int
+    out: int
     notes: tuple[str, ...]
 
     @cached_property
@@ -61,8 +62,8 @@ class Track:
 
     def counts(self, spikes: int = 0) -> Counts:
         """What became of the samples."""
-        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.lost
-        samples = int((~self.between).sum()) + self.lost
+        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
+        samples = int((~self.between).sum()) + self.out
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
@@ -74,34 +75,37 @@ def clean(run: Run) -> Track:
     """
     where = f"run '{run.name}'"
     kept = in_order(run.time)
-    lost = run.time.size - kept.size
-    if lost > LOST_ORDER * run.time.size:
-        raise InputError(f"{where}: time does not grow in {lost} of {run.time.size} rows")
-    notes = (f"{lost} rows left out: time missing, repeated or backwards",) if lost else ()
-    run = run.rows(kept, *notes) if lost else run
-    seconds = float(run.time[-1] - run.time[0]) if kept.size > 1 else 0.0
+    out = run.time.size - kept.size
+    if out > MOST_OUT * run.time.size:
+        raise InputError(f"{where}: time does not grow in {out} of {run.time.size} rows")
+    notes = list(run.notes)
+    if out:
+        notes.append(f"{out} rows left out: time missing, repeated or backwards")
+        run = run.rows(kept)
+    row = float(np.median(np.diff(run.time))) if kept.size > 1 else 0.0
+    seconds = float(run.time[-1] - run.time[0]) + row if kept.size > 1 else 0.0
     if seconds < SHORTEST * (1.0 - 1e-6):
         raise InputError(f"{where} is too short: {seconds:.3g} s, at least {SHORTEST:g} s are needed")
-    dropped = ~np.isfinite(run.pose).all(axis=1) | (run.pose == 0.0).all(axis=1)
-    repeats = _repeats(run.pose, ~dropped)
+    dropped = lost(run.pose)
+    repeats = repeated(run.pose, ~dropped)
     fresh = np.flatnonzero(~dropped & ~repeats)
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
-    row, period = (float(np.median(np.diff(t))) for t in (run.time, run.time[fresh]))
+    period = float(np.median(np.diff(run.time[fresh])))
     if row > RAREST:
         raise InputError(f"{where}: a sample each {row:.4g} s is too rare; is the time in another unit?")
     between = np.zeros_like(repeats)
     if period > 1.5 * row:  # a log that is faster than the measurement
         last = run.time[fresh][np.maximum(np.searchsorted(fresh, np.arange(repeats.size)) - 1, 0)]
         between = repeats & (run.time - last < period - 0.5 * row)
-        notes += (f"a measurement every {period:.4g} s, a row every {row:.4g} s",)
+        notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
     pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
     _plausible(run.time[fresh], pose[fresh], where)
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
     _moves(pose[fresh], where)
-    notes = (*run.notes, *notes[lost > 0 :], *_gaps(run.time[fresh], period))
-    return Track(run, pose, frozen, dropped, between, period, lost, notes)
+    notes += _gaps(run.time[fresh], period)
+    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes))
 
 
 def in_order(time: np.ndarray) -> np.ndarray:
@@ -123,8 +127,13 @@ def in_order(time: np.ndarray) -> np.ndarray:
     return np.array(found[::-1])
 
 
-def _repeats(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Where a pose is to the bit the last one that was there."""
+def lost(pose: np.ndarray) -> np.ndarray:
+    """(n,): where a pose (n, 3) is no measurement: NaN, infinite, or all zero."""
+    return ~np.isfinite(pose).all(axis=1) | (pose == 0.0).all(axis=1)
+
+
+def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """(n,): where a pose (n, 3) is to the bit the last one that was there."""
     rows = np.flatnonzero(there)
     repeats = np.zeros(there.size, bool)
     repeats[rows[1:]] = (np.diff(pose[rows], axis=0) == 0.0).all(axis=1)
@@ -156,9 +165,12 @@ def _plausible(time: np.ndarray, pose: np.ndarray, where: str) -> None:
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
         raise InputError(f"{where} goes {speed:.3g} m/s: is its position in mm?")
-    jumps = np.abs(np.abs(np.diff(pose[:, 2])) - 360.0) < 10.0
+    psi = pose[:, 2]
+    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
+        return
+    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
     turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
-    if turn > QUICKEST or (jumps.any() and np.abs(pose[:, 2]).max() < 370.0):
+    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
         raise InputError(f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?")
 
 
@@ -180,10 +192,10 @@ def noise(values: np.ndarray) -> np.ndarray:
     return 1.4826 * np.median(third, axis=0) / np.sqrt(20.0)
 
 
-def _gaps(time: np.ndarray, period: float) -> tuple[str, ...]:
+def _gaps(time: np.ndarray, period: float) -> list[str]:
     """A line for the gaps of half a second and more, if there are any."""
     dt = np.diff(time)
     long = dt > max(0.5, LONG * period)
     if not long.any():
-        return ()
-    return (f"{long.sum()} gaps, the longest {dt.max():.4g} s at {time[dt.argmax()]:.4g} s",)
+        return []
+    return [f"{long.sum()} gaps, the longest {dt.max():.4g} s at {time[dt.argmax()]:.4g} s"]

@@ -58,9 +58,9 @@ class Column(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(description="the column's name in the file")
-    unit: str | None = Field(None, description="its unit; SI if not said")
-    flip: bool = Field(False, description="whether its axis points the other way")
-    offset: float = Field(0.0, description="what is added, in its unit, after the flip")
+    unit: str | None = Field(default=None, description="its unit; SI if not said")
+    flip: bool = Field(default=False, description="whether its axis points the other way")
+    offset: float = Field(default=0.0, description="what is added, in its unit, after the flip")
 
 
 class Layout(BaseModel):
@@ -68,8 +68,8 @@ class Layout(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    separator: str = Field(",", min_length=1, max_length=1, description="between two cells")
-    decimal: str = Field(".", min_length=1, max_length=1, description="the decimal point")
+    separator: str = Field(default=",", min_length=1, max_length=1, description="between two cells")
+    decimal: str = Field(default=".", min_length=1, max_length=1, description="the decimal point")
     columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
 
     @field_validator("columns", mode="before")

@@ -48,11 +48,10 @@ class Run:
     five: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
-    def rows(self, keep: np.ndarray, *notes: str) -> "Run":
-        """The run with only some of its rows, and further notes."""
-        parts = (self.time, self.pose, self.tau_cmd, self.u, self.five)
-        kept = [None if part is None else part[keep] for part in parts]
-        return Run(self.name, *kept, notes=(*self.notes, *notes))  # pyright: ignore[reportArgumentType]
+    def rows(self, keep: np.ndarray) -> "Run":
+        """The run with only some of its rows."""
+        u, five = (None if part is None else part[keep] for part in (self.u, self.five))
+        return Run(self.name, self.time[keep], self.pose[keep], self.tau_cmd[keep], u, five, self.notes)
 
 
 def force(five: np.ndarray) -> np.ndarray:
@@ -103,7 +102,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
             tau = force(five)
         else:
             assert u is not None
-            tau = np.column_stack(thrust(*u.T, Allocation()))
+            x, y, bow = u.T
+            tau = np.column_stack(thrust(x, y, bow, Allocation()))
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     pose = np.column_stack([columns[s] for s in POSE])
     return Run(name, columns["time"], pose, tau, u, five, notes)
@@ -125,8 +125,8 @@ def _matlab(path: Path) -> dict[str, np.ndarray]:
             raise ValueError(f"a matrix of shape {data.shape}")
     except KeyError:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
-    except (OSError, ValueError, TypeError, NotImplementedError) as error:
-        raise InputError(f"'{path}' is not a measured run: {error}") from None
+    except Exception as error:  # a broken file makes the reader stumble in many ways
+        raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
     rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE]]
     return dict(zip(("time", *POSE, *FIVE), rows, strict=True))
 
@@ -171,7 +171,6 @@ def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
         encoding="utf-8-sig",
         skipinitialspace=True,
         index_col=False,
-        float_precision="round_trip",
     ).rename(columns=str.strip)
 
 

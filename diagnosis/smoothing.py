@@ -1,31 +1,28 @@
 """Pose, velocity and acceleration of a measured run without any model of the ship.
 
 Each channel is taken for a process driven by white jerk and measured with white noise. The noise is
-estimated from third differences, the jerk's spectral density by likelihood, and a sample further than
-five standard deviations from where all the others say it should be is a spike.
+estimated from third differences, the jerk's spectral density by likelihood, its course over time from
+the jerk that is found; a sample further than five standard deviations from where all the others say it
+should be is a spike.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
-from scipy.optimize import minimize_scalar
 
 from cosim import InputError
 from fmus.frames import rotate_to_body
 
 from .cleaning import Counts, Track, noise
-from .spline import Basis, Knots, basis, gram, inverse_band, knots, penalty, variance
+from .fitting import Problem, adapted, gate, huber, likeliest, solve
+from .spline import Knots, basis, inverse_band, knots, penalty, variance
 
-GATE = 5.0  # standard deviations
-HUBER = 2.0  # standard deviations from which on a sample pulls no harder
 BREAK = 3.0  # s; over a longer gap nothing is said
 SPACING = 0.05  # s between knots, or a sampling period if that is longer
 FEWEST = 20  # samples in a stretch
 # Below this a measurement means nothing, and the kinks of a stepwise force would be spikes [m, m, rad].
 LEAST_NOISE = 2e-5
-ROUNDS = 10
+ADAPTIONS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +36,7 @@ class Smoothed:
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
         noise: (3,), standard deviation of the measurement [m, m, rad].
-        jerk: (3,), spectral density of the jerk [m2/s5, m2/s5, rad2/s5].
+        jerk: (3,), mean spectral density of the jerk [m2/s5, m2/s5, rad2/s5].
     """
 
     track: Track
@@ -71,40 +68,27 @@ class Smoothed:
         return self.track.counts(int(self.spikes.sum()))
 
 
-class Problem(NamedTuple):
-    """Measurements of one run, and the spline that is to follow them."""
-
-    z: np.ndarray
-    b: Basis
-    grid: Knots
-    stiff: np.ndarray
-    sigma: np.ndarray
-
-
-class Fit(NamedTuple):
-    """Coefficients (size, 3); lower bands (3, 6, size) of the Cholesky factors of B^T W B + lambda K."""
-
-    coefficients: np.ndarray
-    factors: np.ndarray
-
-
 def smooth(track: Track) -> Smoothed:
     """Smooth a run.
 
     Raises:
         InputError: no stretch of it is dense enough.
     """
-    time, origin = track.run.time - track.run.time[0], np.nanmean(track.pose, axis=0)
+    time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
     good = np.flatnonzero(track.valid)
     grid = knots(*stretches(time[good], track), max(SPACING, track.period))
     inside = within(grid, time)
     good = good[inside[good]]
     z = track.pose[good] - origin
     sigma = np.maximum(noise(z), LEAST_NOISE)
-    problem = Problem(z, basis(grid, time[good]), grid, penalty(grid), sigma)
+    even = penalty(grid, np.ones(int(grid.intervals.sum())))
+    problem = Problem(z, basis(grid, time[good]), grid, np.array(3 * [even]), sigma)
     local = np.full(3, 64.0 * (track.period / grid.spacing) ** 5)  # follows a few samples
     trusted = gate(problem, local, huber(problem, local))
-    smoothness = np.array([likeliest(problem, trusted, c) for c in range(3)])
+    smoothness = likeliest(problem, trusted)
+    for _ in range(ADAPTIONS):
+        problem = adapted(problem, smoothness, trusted)
+        smoothness = likeliest(problem, trusted)
     trusted = gate(problem, smoothness, trusted)
     fit = solve(problem, smoothness, trusted)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
@@ -154,63 +138,6 @@ def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     found = np.full((where.size, values.shape[1]), np.nan)
     found[where] = values
     return found
-
-
-def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
-    """The smoothing spline of each channel, for weights (n,) of the samples."""
-    band = gram(p.b, weights, p.grid.size)
-    right = p.b.transposed(weights[:, None] * p.z, p.grid.size)
-    factors = np.array([cholesky_banded(band + s * p.stiff, lower=True) for s in smoothness])
-    parts = [cho_solve_banded((factors[c], True), right[:, c]) for c in range(3)]
-    return Fit(np.column_stack(parts), factors)
-
-
-def huber(p: Problem, smoothness: np.ndarray) -> np.ndarray:
-    """Weights (n,) by which a sample that is far off pulls no harder than one that is a little off."""
-    weights = np.ones(len(p.z))
-    for _ in range(ROUNDS):
-        off = np.abs(p.z - p.b(solve(p, smoothness, weights).coefficients)) / p.sigma
-        weights = np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
-    return weights
-
-
-def gate(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """1 for each sample that agrees with all the others, 0 for a spike, (n,).
-
-    A sample that had a weight is held against the fit without it, whose deviation and variance follow
-    from the fit with it and its leverage.
-    """
-    for _ in range(ROUNDS):
-        fit = solve(p, smoothness, weights)
-        spread = variance(p.b, inverse_band(fit.factors))
-        off = np.abs(p.z - p.b(fit.coefficients)) / p.sigma
-        own = np.minimum(weights[:, None] * spread, 0.999)
-        expected = np.where(own > 0.0, np.sqrt(1.0 - own), np.sqrt(1.0 + spread))
-        kept = (off <= GATE * expected).all(axis=1).astype(float)
-        if (kept == weights).all():
-            break
-        weights = kept
-    return weights
-
-
-def likeliest(p: Problem, weights: np.ndarray, channel: int) -> float:
-    """The smoothness of one channel with the largest likelihood."""
-    band = gram(p.b, weights, p.grid.size)
-    z = p.z[:, channel : channel + 1]
-    right = p.b.transposed(weights[:, None] * z, p.grid.size)
-
-    def cost(log_smoothness: float) -> float:
-        s = 10.0**log_smoothness
-        try:
-            factor = cholesky_banded(band + s * p.stiff, lower=True)
-        except LinAlgError:
-            return np.inf
-        c = cho_solve_banded((factor, True), right)
-        off = float(np.sum(weights[:, None] * (z - p.b(c)) * z)) / p.sigma[channel] ** 2
-        return 2.0 * float(np.log(factor[0]).sum()) - p.grid.rank * np.log(s) + off
-
-    found: Any = minimize_scalar(cost, bounds=(-8.0, 8.0), method="bounded", options={"xatol": 0.02})
-    return 10.0 ** float(found.x)
 
 
 def _body_std(

@@ -107,14 +107,29 @@ def gram(b: Basis, weights: np.ndarray, size: int) -> np.ndarray:
     return band
 
 
-def penalty(grid: Knots) -> np.ndarray:
-    """(6, size): lower band of the integral of squared third derivatives, times the spacing^5."""
-    band = np.zeros((WIDTH, grid.size))
-    inside = np.concatenate([f + np.arange(n) for f, n in zip(grid.first, grid.intervals, strict=True)])
+def penalty(grid: Knots, weights: np.ndarray) -> np.ndarray:
+    """(6, size): lower band of the integral of squared third derivatives, times the spacing^5.
+
+    Args:
+        grid: knots.
+        weights: (intervals,), of each interval, those of all stretches in a row.
+    """
+    band, at = np.zeros((WIDTH, grid.size)), inside(grid)
     for j in range(WIDTH):
         for k in range(j, WIDTH):
-            band[k - j, inside + j] += PENALTY[j, k]
+            band[k - j, at + j] += PENALTY[j, k] * weights
     return band
+
+
+def inside(grid: Knots) -> np.ndarray:
+    """(intervals,): number of the first function that lives in each interval of all stretches."""
+    return np.concatenate([f + np.arange(n) for f, n in zip(grid.first, grid.intervals, strict=True)])
+
+
+def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
+    """(intervals, channels): third derivative in the middle of each interval."""
+    values = np.tile(0.5 ** np.arange(WIDTH - 3) @ PIECES[3], (int(grid.intervals.sum()), 1))
+    return Basis(inside(grid), values / grid.spacing**3)(coefficients)
 
 
 def inverse_band(factors: np.ndarray) -> np.ndarray:
