@@ -12,14 +12,28 @@ from .spline import Basis, Knots, gram, inverse_band, penalty, third, variance
 GATE = 5.0  # standard deviations
 HUBER = 2.0  # standard deviations from which on a sample pulls no harder
 ROUNDS = 10
+LEAST = 6  # samples that must agree in a stretch
+ADAPTIONS = 2
 AROUND = 8.0  # s over which the jerk is averaged
 CALM = 0.2  # of the mean jerk: so much there is at least
+
+
+class TooFewError(Exception):
+    """In some stretch hardly any sample agrees with the others.
+
+    Args:
+        rows: of the run, all samples of that stretch.
+    """
+
+    def __init__(self, rows: np.ndarray) -> None:
+        self.rows = rows
 
 
 class Problem(NamedTuple):
     """Measurements of one run, and the spline that is to follow them.
 
     Attributes:
+        rows: (n,), which rows of the run they are.
         z: (n, 3), measurements.
         b: the spline's basis at them.
         grid: its knots.
@@ -27,6 +41,7 @@ class Problem(NamedTuple):
         sigma: (3,), standard deviation of the noise.
     """
 
+    rows: np.ndarray
     z: np.ndarray
     b: Basis
     grid: Knots
@@ -39,6 +54,27 @@ class Fit(NamedTuple):
 
     coefficients: np.ndarray
     factors: np.ndarray
+
+
+def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The samples to trust, and how smooth the spline through them is most likely.
+
+    Args:
+        p: problem with an even penalty.
+        local: (3,), smoothness that follows a few samples, to find what sticks out.
+
+    Returns:
+        The problem with its penalty adapted to the jerk, smoothness (3,), weights (n,) of 0 and 1.
+
+    Raises:
+        TooFewError: in some stretch.
+    """
+    weights = gate(p, local, huber(p, local))
+    smoothness = likeliest(p, weights)
+    for _ in range(ADAPTIONS):
+        p = adapted(p, smoothness, weights)
+        smoothness = likeliest(p, weights)
+    return p, smoothness, gate(p, smoothness, weights)
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
@@ -65,7 +101,11 @@ def gate(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
     A sample that had a weight is held against the fit without it, whose deviation and variance follow
     from the fit with it and its leverage.
+
+    Raises:
+        TooFewError: in some stretch.
     """
+    stretch = np.searchsorted(p.grid.first, p.b.first, side="right") - 1
     for _ in range(ROUNDS):
         fit = solve(p, smoothness, weights)
         spread = variance(p.b, inverse_band(fit.factors))
@@ -75,6 +115,9 @@ def gate(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
         kept = (off <= GATE * expected).all(axis=1).astype(float)
         if (kept == weights).all():
             break
+        few = np.bincount(stretch, kept) < LEAST
+        if few.any():
+            raise TooFewError(p.rows[few[stretch]])
         weights = kept
     return weights
 

@@ -14,7 +14,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 
 from .cleaning import Counts, Track, noise
-from .fitting import Problem, adapted, gate, huber, likeliest, solve
+from .fitting import Problem, TooFewError, solve, trusted
 from .spline import Knots, basis, inverse_band, knots, penalty, variance
 
 BREAK = 3.0  # s; over a longer gap nothing is said
@@ -22,7 +22,6 @@ SPACING = 0.05  # s between knots, or a sampling period if that is longer
 FEWEST = 20  # samples in a stretch
 # Below this a measurement means nothing, and the kinks of a stepwise force would be spikes [m, m, rad].
 LEAST_NOISE = 2e-5
-ADAPTIONS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,26 +73,31 @@ def smooth(track: Track) -> Smoothed:
     Raises:
         InputError: no stretch of it is dense enough.
     """
+    rows = np.flatnonzero(track.valid)
+    while True:
+        try:
+            return _smooth(track, rows)
+        except TooFewError as stretch:
+            rows = np.setdiff1d(rows, stretch.rows)
+
+
+def _smooth(track: Track, rows: np.ndarray) -> Smoothed:
+    """Smooth a run by some of its rows."""
     time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
-    good = np.flatnonzero(track.valid)
-    grid = knots(*stretches(time[good], track), max(SPACING, track.period))
+    grid = knots(*stretches(time[rows], track), max(SPACING, track.period))
     inside = within(grid, time)
-    good = good[inside[good]]
-    z = track.pose[good] - origin
+    dense = rows[inside[rows]]
+    z = track.pose[dense] - origin
     sigma = np.maximum(noise(z), LEAST_NOISE)
-    even = penalty(grid, np.ones(int(grid.intervals.sum())))
-    problem = Problem(z, basis(grid, time[good]), grid, np.array(3 * [even]), sigma)
+    even = np.array(3 * [penalty(grid, np.ones(int(grid.intervals.sum())))])
+    problem = Problem(dense, z, basis(grid, time[dense]), grid, even, sigma)
     local = np.full(3, 64.0 * (track.period / grid.spacing) ** 5)  # follows a few samples
-    trusted = gate(problem, local, huber(problem, local))
-    smoothness = likeliest(problem, trusted)
-    for _ in range(ADAPTIONS):
-        problem = adapted(problem, smoothness, trusted)
-        smoothness = likeliest(problem, trusted)
-    trusted = gate(problem, smoothness, trusted)
-    fit = solve(problem, smoothness, trusted)
+    problem, smoothness, weights = trusted(problem, local)
+    fit = solve(problem, smoothness, weights)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
-    spikes = np.zeros(time.size, bool)
-    spikes[good[trusted == 0.0]] = True
+    spikes = track.valid.copy()
+    spikes[rows] = False
+    spikes[dense] = weights == 0.0
     found = []
     for derivative in range(3):
         b = basis(grid, time[inside], derivative)

@@ -68,7 +68,9 @@ def test_five_commands_stay_five(tmp_path):
 def test_force_of_five_commands():
     assert force(np.array([[1.0, 0.0, 1.0, 0.0, 0.0]]))[0] == pytest.approx([2.33, 0.0, 0.0])
     port_only = force(np.array([[1.0, 0.0, 0.0, 0.0, 0.0]]))[0]
-    assert port_only[2] == pytest.approx(0.055 * 1.165), "the propeller to port turns the bow to starboard"
+    assert port_only[2] == pytest.approx(0.055 * 1.165), (
+        "the propeller to port turns the bow to starboard"
+    )
     bow = force(np.array([[0.0, 0.0, 0.0, 0.0, 1.0]]))[0]
     assert bow == pytest.approx([0.0, 2.629, 2.629 * 0.3875])
     both = np.array([[0.3, -0.2, 0.3, -0.2, 0.0]])
@@ -168,7 +170,10 @@ def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
     ("layout", "message"),
     [
         ({"columns": {"x": {"name": "x", "unit": "mn"}}}, "'mn' is no unit of x; did you mean 'm'?"),
-        ({"columns": {"psi": {"name": "psi", "unit": "m"}}}, "'m' is no unit of psi; there are rad, deg"),
+        (
+            {"columns": {"psi": {"name": "psi", "unit": "m"}}},
+            "'m' is no unit of psi; there are rad, deg",
+        ),
         ({"columns": {"pzi": "psi"}}, "'pzi' is not a signal of a run; did you mean 'psi'?"),
         ({"columns": {"x": "North"}}, "no column 'North' (for x)"),
         ({"columns": {"u1": "x"}}, "no column 'u2'"),

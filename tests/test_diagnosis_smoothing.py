@@ -59,7 +59,7 @@ def kalman_and_rauch(time, z, valid, q, sigma):
 
 
 def test_same_as_kalman_filter_and_rauch_smoother(monkeypatch):
-    monkeypatch.setattr("diagnosis.smoothing.ADAPTIONS", 0)  # the jerk is equally strong throughout
+    monkeypatch.setattr("diagnosis.fitting.ADAPTIONS", 0)  # the jerk is equally strong throughout
     time = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.03, 1000))
     run, _ = white_jerk(time, 2)
     run = changed(run, slice(400, 440), np.nan)
@@ -123,7 +123,7 @@ def test_same_ship_elsewhere_and_later_gives_the_same_velocity():
     pose = np.column_stack([40.0 + c * x - d * y, d * x + c * y - 7.0, psi + turn])
     s = smooth(clean(replace(RUN, pose=pose, time=RUN.time + 1e5)))
     assert np.abs(s.nu - SMOOTHED.nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
-    moved = smooth(clean(replace(RUN, pose=RUN.pose + (40.0, -7.0, 0.0))))
+    moved = smooth(clean(replace(RUN, pose=RUN.pose + np.array([40.0, -7.0, 0.0]))))
     np.testing.assert_allclose(moved.nu, SMOOTHED.nu, atol=2e-5)
 
 
@@ -158,6 +158,14 @@ def test_uncertainty_grows_in_a_gap_and_a_long_one_is_left_out():
     assert not s.used[1500:1800].any()
 
 
+def test_stretch_in_which_nothing_agrees_is_refused_as_spikes():
+    wild = changed(RUN, np.r_[1000:1200, 1400:1600], np.nan)
+    wild = changed(wild, slice(1200, 1400), 3.0 * np.random.default_rng(0).standard_normal((200, 3)))
+    s = smooth(clean(wild))
+    assert s.spikes[1200:1400].mean() > 0.9
+    assert np.abs(s.nu - SMOOTHED.nu)[:900].max() < 1e-3
+
+
 def test_run_of_crumbs_is_refused():
     crumbs = np.full_like(RUN.pose, np.nan)
     for k in range(0, N, 400):
@@ -180,7 +188,9 @@ def test_spline_is_exact_for_a_quintic():
         np.testing.assert_allclose(basis(grid, time, k)(c)[:, 0], wanted.deriv(k)(time), atol=1e-5)
     middle = np.concatenate([2.125 + 0.25 * np.arange(12), 9.125 + 0.25 * np.arange(4)])
     np.testing.assert_allclose(third(grid, c)[:, 0], wanted.deriv(3)(middle), atol=1e-3)
-    np.testing.assert_allclose(b.transposed(wanted(time)[:, None], grid.size)[:, 0], dense.T @ wanted(time))
+    np.testing.assert_allclose(
+        b.transposed(wanted(time)[:, None], grid.size)[:, 0], dense.T @ wanted(time)
+    )
     band = gram(b, np.ones(time.size), grid.size)
     np.testing.assert_allclose(full(band), dense.T @ dense, atol=1e-12)
     square = (wanted.deriv(3) ** 2).integ()
@@ -201,7 +211,10 @@ def test_band_of_the_inverse_is_that_of_the_inverse():
     grid = knots(np.array([0.0]), np.array([40.0]), 0.05)
     time = np.sort(rng.uniform(0.0, 40.0, 1500))
     b = basis(grid, time[(time < 20.0) | (time > 22.5)])
-    bands = [gram(b, np.ones(b.first.size), grid.size) + s * penalty(grid, np.ones(800)) for s in (1e-2, 1.0, 1e4)]
+    bands = [
+        gram(b, np.ones(b.first.size), grid.size) + s * penalty(grid, np.ones(800))
+        for s in (1e-2, 1.0, 1e4)
+    ]
     found = inverse_band(np.array([cholesky_banded(band, lower=True) for band in bands]))
     for c, band in enumerate(bands):
         inverse = np.linalg.inv(full(band))

@@ -14,8 +14,8 @@ from fmus.thrusters.allocation import Allocation, allocate
 RUN, _ = sail()
 SMOOTHED = smooth(clean(RUN))
 WINDOWS = Windows([SMOOTHED])
-# A window that starts with the smoother's velocity error ends some millimetres off.
-POSITION, HEADING = 4e-3, 4e-3
+# The first window starts where the smoother sees one side only: a velocity error of a millimetre a second.
+POSITION, HEADING, USUAL = 6e-3, 4e-3, 1.5e-3
 
 
 def windows_of(*runs):
@@ -34,6 +34,7 @@ def test_right_model_errs_by_noise():
     position, heading = errors.over_all()
     assert np.hypot(*NOISE[:2]) * 0.95 < position < POSITION
     assert NOISE[2] * 0.95 < heading < HEADING
+    assert np.median(errors.position) < USUAL
 
 
 def test_without_noise_almost_nothing_is_left():
@@ -43,40 +44,48 @@ def test_without_noise_almost_nothing_is_left():
 
 
 @pytest.mark.parametrize(
-    ("ship", "thrusters", "least"),
+    ("ship", "thrusters"),
     [
-        ({"delta_X_u": -4.0}, {}, 0.05),
-        ({"delta_Y_ur": -10.0}, {}, 0.05),
-        ({"mass": 3.0}, {}, 0.02),
-        ({"V_n": 0.03}, {}, 0.01),
-        ({"F_n": 0.1}, {}, 0.02),
-        ({"marker_offset_dx": 0.05, "marker_offset_dy": -0.03}, {}, 0.008),
-        ({"heading_offset": 0.06}, {}, 0.008),
-        ({}, {"loss_surge": 0.3}, 0.05),
-        ({}, {"bow_failure_time": 20.0}, 0.05),
-        ({}, {"lag": 0.5}, 0.02),
-        ({}, {"delay": 0.4}, 0.02),
-        ({}, {"plant_rate": 0.1}, 0.005),
+        ({"delta_X_u": -4.0}, {}),
+        ({"delta_Y_ur": -10.0}, {}),
+        ({"mass": 3.0}, {}),
+        ({"V_n": 0.03}, {}),
+        ({"F_n": 0.1}, {}),
+        ({"marker_offset_dx": 0.05, "marker_offset_dy": -0.03}, {}),
+        ({"heading_offset": 0.06}, {}),
+        ({}, {"loss_surge": 0.3}),
+        ({}, {"bow_failure_time": 20.0}),
+        ({}, {"lag": 0.5}),
+        ({}, {"delay": 0.4}),
+        ({}, {"plant_rate": 0.1}),
     ],
-)  # fmt: skip
-def test_hidden_effect_is_seen_and_its_value_takes_it_away(ship, thrusters, least):
-    windows = windows_of(sail(ship=ship, thrusters=thrusters)[0])
-    position, _ = rms(windows)
-    assert position > least
-    position, heading = rms(windows, vessel=ship, thrusters=thrusters)
-    assert position < 1.3 * POSITION
-    assert heading < 1.3 * HEADING
+)
+def test_hidden_effect_is_seen_and_its_value_takes_it_away(ship, thrusters):
+    windows = windows_of(sail(ship=ship, thrusters=thrusters, noise=0.0)[0])
+    before, _ = rms(windows)
+    after, heading = rms(windows, vessel=ship, thrusters=thrusters)
+    assert before > 8e-3
+    assert after < 5e-4, "numbers and initial states, nothing else"
+    assert heading < 5e-4
+
+
+def test_hidden_drag_is_seen_through_noise():
+    windows = windows_of(sail(ship={"delta_X_u": -4.0})[0])
+    before, after = windows.errors(), windows.errors(vessel={"delta_X_u": -4.0})
+    assert before.over_all()[0] > 0.1
+    assert after.over_all()[0] < POSITION
+    assert np.median(after.position) < USUAL
 
 
 def test_several_models_at_once_are_each_one_alone():
     drag, lag = np.array([[-4.0], [0.0], [-1.0]]), np.array([[0.0], [0.3], [0.5]])
     many = WINDOWS.errors({"delta_X_u": drag}, {"lag": lag})
     assert many.position.shape == (3, 8)
-    for k in range(3):
+    for k in range(3):  # the history is as long as the slowest of them needs
         one = WINDOWS.errors({"delta_X_u": drag[k, 0]}, {"lag": lag[k, 0]})
-        np.testing.assert_allclose(many.position[k], one.position, rtol=1e-9)
-        np.testing.assert_allclose(many.heading[k], one.heading, rtol=1e-9)
-        np.testing.assert_allclose(many.over_all()[0][k], one.over_all()[0])
+        np.testing.assert_allclose(many.position[k], one.position, rtol=1e-3)
+        np.testing.assert_allclose(many.heading[k], one.heading, rtol=1e-3)
+        np.testing.assert_allclose(many.over_all()[0][k], one.over_all()[0], rtol=1e-3)
 
 
 def test_several_runs_at_once_are_each_one_alone():
@@ -123,13 +132,17 @@ def test_frozen_and_wild_samples_do_not_count():
     errors = windows_of(run).errors()
     assert errors.samples.sum() <= 3200 - 33
     assert errors.over_all()[0] < POSITION
+    assert np.median(errors.position) < USUAL
 
 
-def test_uneven_time_stamps_do_no_harm():
-    run, _ = sail(h=0.01)
+def test_uneven_time_stamps_do_little_harm():
+    run, _ = sail(h=0.01, noise=0.0)
     keep = np.sort(np.random.default_rng(0).permutation(run.time.size)[: run.time.size // 2])
-    uneven = replace(run.rows(keep), tau_cmd=run.tau_cmd[keep])
-    assert rms(windows_of(uneven))[0] < POSITION
+    windows = windows_of(run.rows(keep))
+    assert np.diff(run.time[keep]).max() > 0.04
+    # With half of the samples half of the commands are lost, and the others held too long.
+    assert rms(windows)[0] < 4e-3
+    assert rms(windows, vessel={"delta_X_u": -4.0})[0] > 0.05
 
 
 def test_time_may_start_anywhere():
