@@ -28,6 +28,7 @@ from .smoothing import Smoothed
 Values = Mapping[str, Any]
 LONGEST_STEP = 0.02  # s
 LAGS = 10.0  # time constants after which a lag has forgotten
+LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond any windows of some seconds
 IDLE = (0.01, 0.01, 0.02)  # m/s, m/s, rad/s: below, the thrusters had not been at work before the run
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
@@ -57,7 +58,7 @@ class Starts:
 
     Attributes:
         runs: each run with the rows of the first samples of its windows.
-        h: step of integration [s], a whole part of the sampling period.
+        h: step of integration [s], a whole part of the time between two rows.
         steps: in a window.
         five: whether there are five commands.
     """
@@ -160,7 +161,7 @@ def memory(plan: Any) -> float:
     delay, lag = plan.dynamics
     rate = plan.rate.plant_rate
     slow = np.where(np.asarray(rate) > 0.0, 2.0 / np.maximum(rate, 1e-3), 0.0)
-    return float(np.max(delay + LAGS * np.asarray(lag) + slow))
+    return min(LONGEST_MEMORY, float(np.max(delay + LAGS * np.asarray(lag) + slow)))
 
 
 def first_state(starts: Starts, p: Any) -> vessel.State:

@@ -138,11 +138,10 @@ class Cut(NamedTuple):
 
     @property
     def kind(self) -> tuple[float, bool]:
-        """Step of integration [s], a whole part of the period; whether there are five commands."""
-        period = round(self.smoothed.track.period, 9)
-        return period / int(
-            np.ceil(period / LONGEST_STEP - 1e-6)
-        ), self.smoothed.track.run.five is not None
+        """Step of integration [s], a whole part of that between rows; whether commands are five."""
+        row = round(float(np.median(np.diff(self.time))), 9)
+        parts = int(np.ceil(row / LONGEST_STEP - 1e-6))
+        return row / parts, self.smoothed.track.run.five is not None
 
 
 def cut(smoothed: Smoothed) -> Cut:

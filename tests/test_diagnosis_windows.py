@@ -1,5 +1,7 @@
 """The window prediction error: at the level of noise for the right model, large for a wrong one."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -143,6 +145,20 @@ def test_uneven_time_stamps_do_little_harm():
     # With half of the samples half of the commands are lost, and the others held too long.
     assert rms(windows)[0] < 4e-3
     assert rms(windows, vessel={"delta_X_u": -4.0})[0] > 0.05
+
+
+def test_log_that_is_faster_than_its_measurement():
+    run, _ = sail(h=0.01, noise=0.0)
+    slow = run.pose[np.arange(run.time.size) // 5 * 5]
+    windows = windows_of(replace(run, pose=slow))
+    assert windows.run.size == 8
+    assert windows.errors().samples.tolist() == [160] * 8
+    assert rms(windows)[0] < 1e-3
+
+
+def test_effects_of_a_user_can_still_be_loaded_after_the_package():
+    code = "import sys, diagnosis; assert 'fmus.vessel.vessel' not in sys.modules; diagnosis.Windows"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_time_may_start_anywhere():
