@@ -11,7 +11,9 @@ from .spline import Basis, Knots, gram, inverse_band, penalty, third, variance
 
 GATE = 5.0  # standard deviations
 HUBER = 2.0  # standard deviations from which on a sample pulls no harder
+FAR = 10.0  # times what nearly all measurements reach; beyond, one would drag all the others along
 ROUNDS = 10
+SAME = 0.02  # difference of weights that makes none
 LEAST = 6  # samples that must agree in a stretch
 ADAPTIONS = 2
 AROUND = 8.0  # s over which the jerk is averaged
@@ -34,7 +36,7 @@ class Problem(NamedTuple):
 
     Attributes:
         rows: (n,), which rows of the run they are.
-        z: (n, 3), measurements.
+        z: (n, 3), measurements, about their median.
         b: the spline's basis at them.
         grid: its knots.
         stiff: (3, 6, size), penalty K of each channel.
@@ -80,7 +82,7 @@ def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndar
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
     """The smoothing spline of each channel, for weights (n,) of the samples."""
     band = gram(p.b, weights, p.grid.size)
-    right = p.b.transposed(weights[:, None] * p.z, p.grid.size)
+    right = p.b.matrix.T @ (weights[:, None] * p.z)
     sums = band + smoothness[:, None, None] * p.stiff
     factors = np.array([cholesky_banded(each, lower=True) for each in sums])
     parts = [cho_solve_banded((factors[c], True), right[:, c]) for c in range(3)]
@@ -89,10 +91,13 @@ def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
 
 def huber(p: Problem, smoothness: np.ndarray) -> np.ndarray:
     """Weights (n,) by which a sample that is far off pulls no harder than one that is a little off."""
-    weights = np.ones(len(p.z))
+    far = FAR * np.maximum(np.quantile(np.abs(p.z), 0.9, axis=0), p.sigma)
+    weights = np.minimum(1.0, (far / np.maximum(np.abs(p.z), far * 1e-9)).min(axis=1))
     for _ in range(ROUNDS):
         off = np.abs(p.z - p.b(solve(p, smoothness, weights).coefficients)) / p.sigma
-        weights = np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
+        before, weights = weights, np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
+        if np.abs(weights - before).max() < SAME:
+            break
     return weights
 
 
@@ -131,7 +136,7 @@ def _likeliest(p: Problem, weights: np.ndarray, channel: int) -> float:
     """The smoothness of one channel with the largest likelihood."""
     band = gram(p.b, weights, p.grid.size)
     z = p.z[:, channel : channel + 1]
-    right = p.b.transposed(weights[:, None] * z, p.grid.size)
+    right = p.b.matrix.T @ (weights[:, None] * z)
 
     def cost(log_smoothness: float) -> float:
         s = 10.0**log_smoothness

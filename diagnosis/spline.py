@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, PPoly
+from scipy.sparse import csr_array
 
 DEGREE = 5
 WIDTH = DEGREE + 1
@@ -72,20 +73,26 @@ def knots(start: np.ndarray, end: np.ndarray, spacing: float) -> Knots:
 
 
 class Basis(NamedTuple):
-    """The six functions that count at each of some times: number of the first, values (n, 6)."""
+    """The six functions that count at each of some times.
+
+    Attributes:
+        first: (n,), number of the first.
+        values: (n, 6), what they are.
+        matrix: (n, size), the same as a sparse matrix.
+    """
 
     first: np.ndarray
     values: np.ndarray
+    matrix: csr_array
 
     def __call__(self, coefficients: np.ndarray) -> np.ndarray:
         """(n, channels): the spline, for coefficients (size, channels)."""
-        return np.einsum("nj,njc->nc", self.values, coefficients[self.first[:, None] + np.arange(WIDTH)])
+        return self.matrix @ coefficients
 
-    def transposed(self, values: np.ndarray, size: int) -> np.ndarray:
-        """(size, channels): the sums of values (n, channels) that each coefficient sees."""
-        at = (self.first[:, None] + np.arange(WIDTH)).ravel()
-        parts = [(self.values * channel[:, None]).ravel() for channel in values.T]
-        return np.array([np.bincount(at, part, size) for part in parts]).T
+
+def _basis(first: np.ndarray, values: np.ndarray, size: int) -> Basis:
+    at, rows = (first[:, None] + np.arange(WIDTH)).ravel(), np.arange(0, values.size + 1, WIDTH)
+    return Basis(first, values, csr_array((values.ravel(), at, rows), shape=(first.size, size)))
 
 
 def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
@@ -95,7 +102,7 @@ def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
     interval = np.clip(np.floor(place), 0, grid.intervals[stretch] - 1).astype(int)
     powers = np.vander(place - interval, WIDTH - derivative, increasing=True)
     values = powers @ PIECES[derivative] / grid.spacing**derivative
-    return Basis(grid.first[stretch] + interval, values)
+    return _basis(grid.first[stretch] + interval, values, grid.size)
 
 
 def gram(b: Basis, weights: np.ndarray, size: int) -> np.ndarray:
@@ -129,7 +136,7 @@ def inside(grid: Knots) -> np.ndarray:
 def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
     """(intervals, channels): third derivative in the middle of each interval."""
     values = np.tile(0.5 ** np.arange(WIDTH - 3) @ PIECES[3], (int(grid.intervals.sum()), 1))
-    return Basis(inside(grid), values / grid.spacing**3)(coefficients)
+    return _basis(inside(grid), values / grid.spacing**3, grid.size)(coefficients)
 
 
 def inverse_band(factors: np.ndarray) -> np.ndarray:
@@ -168,11 +175,10 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
 
 def variance(b: Basis, inverse: np.ndarray) -> np.ndarray:
     """(n, channels): variance of the spline whose coefficients have this covariance."""
-    j, k = np.meshgrid(np.arange(WIDTH), np.arange(WIDTH), indexing="ij")
-    low, apart = np.minimum(j, k), np.abs(j - k)
     total = np.zeros((b.first.size, inverse.shape[1]))
-    for a in range(WIDTH):
-        for c in range(WIDTH):
-            part = inverse[b.first + low[a, c], :, apart[a, c]]
-            total += (b.values[:, a] * b.values[:, c])[:, None] * part
+    for j in range(WIDTH):
+        for apart in range(WIDTH - j):
+            times = 1.0 if apart == 0 else 2.0
+            weight = times * b.values[:, j] * b.values[:, j + apart]
+            total += weight[:, None] * inverse[b.first + j, :, apart]
     return total
