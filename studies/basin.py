@@ -1,4 +1,4 @@
-"""Measured runs of the real ship: the file format, and a reference to hold estimates against.
+"""Measured runs of the real ship, and a reference to hold estimates against.
 
 Of the real ship nobody knows the true velocity. The reference is a smoother that also looks ahead: at
 each instant a cubic is fitted to the measured pose within half a second on either side, frozen and lost
@@ -8,15 +8,14 @@ samples left out.
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
+import diagnosis
 from cosim import InputError
+from diagnosis.cleaning import lost, repeated
 from fmus.frames import rotate_to_body
-from fmus.thrusters.allocation import Allocation
 
 from .replay import SETTLED, Log, rms
 
-VSP_ASIDE = 0.055  # m; the first VSP sits to port by that, the second to starboard
 REACH = 0.5  # s to either side that the smoother looks
 AHEAD = 0.5  # s of prediction
 
@@ -33,32 +32,17 @@ def files(data: Path) -> list[Path]:
     return found
 
 
-def force(commands: np.ndarray) -> np.ndarray:
-    """Nominal tau [N, N, N m], shape (3, n), of the five commands, shape (5, n)."""
-    p = Allocation()
-    x1, y1, x2, y2 = p.F_vsp * commands[:4]
-    bow = p.F_bow * commands[4]
-    yaw = p.l_vsp * (y1 + y2) + p.l_bow * bow + VSP_ASIDE * (x1 - x2)
-    return np.array([x1 + x2, y1 + y2 + bow, yaw])
-
-
 def read(path: Path) -> dict[str, np.ndarray]:
     """A measured run with the columns that an observer's log has.
 
     Raises:
         InputError: no file of this kind.
     """
-    try:
-        data = np.asarray(loadmat(path)["cse1_data"], float)
-        if data.shape[0] < 12 or data.shape[1] < 100:
-            raise ValueError(f"a matrix of {data.shape[0]} rows and {data.shape[1]} columns")
-    except (OSError, KeyError, ValueError, NotImplementedError) as error:
-        raise InputError(f"'{path}' is not a measured run: {error}") from None
+    run = diagnosis.read(path)
     # A command acts from its time to the next: at a sample, the one before has acted.
-    tau = np.roll(force(np.nan_to_num(data[7:12])), 1, axis=1)
-    columns = [data[1], data[2], data[6], *tau]
+    columns = [*run.pose.T, *np.roll(run.tau_cmd, 1, axis=0).T]
     names = ("x_m", "y_m", "psi_m", "tau_X", "tau_Y", "tau_N")
-    return {"time": data[0] - data[0, 0]} | {
+    return {"time": run.time - run.time[0]} | {
         f"observer.{name}": column for name, column in zip(names, columns, strict=True)
     }
 
@@ -66,8 +50,8 @@ def read(path: Path) -> dict[str, np.ndarray]:
 def valid(log: Log) -> np.ndarray:
     """Where the pose is a new measurement: neither lost nor frozen."""
     pose = np.column_stack([log[f"observer.{name}"] for name in ("x_m", "y_m", "psi_m")])
-    new = np.concatenate([[True], (np.diff(pose, axis=0) != 0.0).any(axis=1)])
-    return new & np.isfinite(pose).all(axis=1) & (pose != 0.0).any(axis=1)
+    gone = lost(pose)
+    return ~gone & ~repeated(pose, ~gone)
 
 
 def local_cubic(values: np.ndarray, good: np.ndarray, h: float) -> tuple[np.ndarray, ...]:

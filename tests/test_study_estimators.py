@@ -79,15 +79,6 @@ def test_share_that_is_held_through_a_freeze():
     assert held(log, {"u": u}) == pytest.approx(0.25)
 
 
-def test_force_of_five_commands():
-    ahead_only = basin.force(np.array([[1.0], [0.0], [1.0], [0.0], [0.0]]))[:, 0]
-    assert ahead_only == pytest.approx([2.33, 0.0, 0.0])
-    port_only = basin.force(np.array([[1.0], [0.0], [0.0], [0.0], [0.0]]))[:, 0]
-    assert port_only[2] > 0.0, "the propeller to port turns the bow to starboard"
-    bow = basin.force(np.array([[0.0], [0.0], [0.0], [0.0], [1.0]]))[:, 0]
-    assert bow == pytest.approx([0.0, 2.629, 2.629 * 0.3875])
-
-
 def test_smoother_is_exact_for_a_cubic_with_gaps():
     t = np.arange(400) * 0.05
     values = 1.0 + 0.5 * t - 0.2 * t**2 + 0.01 * t**3

@@ -1,0 +1,56 @@
+"""Holds a ship model against measurements; what it lacks is to be learned from them.
+
+A measured run goes through three steps, each model-free, before a model sees it::
+
+    import diagnosis
+
+    track = diagnosis.clean(diagnosis.read("run.csv"))  # what is missing, frozen, out of order
+    smoothed = diagnosis.smooth(track)  # pose, velocity, acceleration, and how sure they are
+    windows = diagnosis.Windows([smoothed])
+    nominal = windows.errors()
+    slower = windows.errors(vessel={"delta_X_u": -4.0})
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cosim import InputError
+
+    from .cleaning import Counts, Track, clean
+    from .measurement import Run, read
+    from .smoothing import Smoothed, smooth
+    from .windows import WindowErrors, Windows
+
+__all__ = [
+    "Counts",
+    "InputError",
+    "Run",
+    "Smoothed",
+    "Track",
+    "WindowErrors",
+    "Windows",
+    "clean",
+    "read",
+    "smooth",
+]
+
+_HOME = {
+    "InputError": "cosim",
+    "Counts": "diagnosis.cleaning",
+    "Track": "diagnosis.cleaning",
+    "clean": "diagnosis.cleaning",
+    "Run": "diagnosis.measurement",
+    "read": "diagnosis.measurement",
+    "Smoothed": "diagnosis.smoothing",
+    "smooth": "diagnosis.smoothing",
+    "WindowErrors": "diagnosis.windows",
+    "Windows": "diagnosis.windows",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import on demand: a user's effects must be loaded before the vessel that is to have them."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)

@@ -1,0 +1,184 @@
+"""Quintic splines on even knots, in stretches that know nothing of each other.
+
+The smoothing spline that penalises the square of the third derivative is the mean of a process driven
+by white jerk, given noisy measurements of it: what a Kalman filter and Rauch-Tung-Striebel smoother give
+(Kimeldorf and Wahba 1970), here for all samples at once, at any spacing, as a banded linear system.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline, PPoly
+from scipy.sparse import csr_array
+
+DEGREE = 5
+WIDTH = DEGREE + 1
+MEMORY = 200  # coefficients; further apart no two have anything to do with each other
+
+
+def _pieces() -> np.ndarray:
+    """(power, function): the six functions that live in an interval, as polynomials in its [0, 1]."""
+    spline = PPoly.from_spline(BSpline.basis_element(np.arange(WIDTH + 1.0), extrapolate=False).tck)
+    inside = np.searchsorted(spline.x, np.arange(WIDTH)[::-1])
+    return spline.c[::-1, inside]
+
+
+PIECES = [_pieces()]
+for _ in range(3):
+    PIECES.append(np.arange(1.0, len(PIECES[-1]))[:, None] * PIECES[-1][1:])
+
+
+def _penalty() -> np.ndarray:
+    """(6, 6): integral of the products of third derivatives over one interval of length 1."""
+    points, weights = np.polynomial.legendre.leggauss(3)
+    third = np.vander(0.5 * points + 0.5, 3, increasing=True) @ PIECES[3]
+    return third.T @ (0.5 * weights[:, None] * third)
+
+
+PENALTY = _penalty()
+
+
+class Knots(NamedTuple):
+    """Even knots over each of some stretches of time.
+
+    Attributes:
+        start, end: (stretches,) [s].
+        first: (stretches,), number of the first coefficient of each.
+        intervals: (stretches,), how many there are in each.
+        spacing: between knots [s].
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    first: np.ndarray
+    intervals: np.ndarray
+    spacing: float
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return int(self.first[-1] + self.intervals[-1] + DEGREE)
+
+    @property
+    def rank(self) -> int:
+        """Of the penalty: a parabola in each stretch goes free."""
+        return self.size - 3 * self.start.size
+
+
+def knots(start: np.ndarray, end: np.ndarray, spacing: float) -> Knots:
+    """Knots for stretches from ``start`` to ``end`` [s], no closer than ``spacing`` [s]."""
+    intervals = np.maximum(1, np.ceil((end - start) / spacing - 1e-6)).astype(int)
+    first = np.concatenate([[0], np.cumsum(intervals + DEGREE)[:-1]])
+    return Knots(start, end, first, intervals, spacing)
+
+
+class Basis(NamedTuple):
+    """The six functions that count at each of some times.
+
+    Attributes:
+        first: (n,), number of the first.
+        values: (n, 6), what they are.
+        matrix: (n, size), the same as a sparse matrix.
+    """
+
+    first: np.ndarray
+    values: np.ndarray
+    matrix: csr_array
+
+    def __call__(self, coefficients: np.ndarray) -> np.ndarray:
+        """(n, channels): the spline, for coefficients (size, channels)."""
+        return self.matrix @ coefficients
+
+
+def _basis(first: np.ndarray, values: np.ndarray, size: int) -> Basis:
+    at, rows = (first[:, None] + np.arange(WIDTH)).ravel(), np.arange(0, values.size + 1, WIDTH)
+    return Basis(first, values, csr_array((values.ravel(), at, rows), shape=(first.size, size)))
+
+
+def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
+    """The basis at times [s] that lie in stretches, or one of its derivatives."""
+    stretch = np.clip(np.searchsorted(grid.start, time, side="right") - 1, 0, None)
+    place = (time - grid.start[stretch]) / grid.spacing
+    interval = np.clip(np.floor(place), 0, grid.intervals[stretch] - 1).astype(int)
+    powers = np.vander(place - interval, WIDTH - derivative, increasing=True)
+    values = powers @ PIECES[derivative] / grid.spacing**derivative
+    return _basis(grid.first[stretch] + interval, values, grid.size)
+
+
+def gram(b: Basis, weights: np.ndarray, size: int) -> np.ndarray:
+    """(6, size): lower band of B^T W B, for weights (n,)."""
+    band = np.zeros((WIDTH, size))
+    for j in range(WIDTH):
+        for k in range(j, WIDTH):
+            band[k - j] += np.bincount(b.first + j, weights * b.values[:, j] * b.values[:, k], size)
+    return band
+
+
+def penalty(grid: Knots, weights: np.ndarray) -> np.ndarray:
+    """(6, size): lower band of the integral of squared third derivatives, times the spacing^5.
+
+    Args:
+        grid: knots.
+        weights: (intervals,), of each interval, those of all stretches in a row.
+    """
+    band, at = np.zeros((WIDTH, grid.size)), inside(grid)
+    for j in range(WIDTH):
+        for k in range(j, WIDTH):
+            band[k - j, at + j] += PENALTY[j, k] * weights
+    return band
+
+
+def inside(grid: Knots) -> np.ndarray:
+    """(intervals,): number of the first function that lives in each interval of all stretches."""
+    return np.concatenate([f + np.arange(n) for f, n in zip(grid.first, grid.intervals, strict=True)])
+
+
+def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
+    """(intervals, channels): third derivative in the middle of each interval."""
+    values = np.tile(0.5 ** np.arange(WIDTH - 3) @ PIECES[3], (int(grid.intervals.sum()), 1))
+    return _basis(inside(grid), values / grid.spacing**3, grid.size)(coefficients)
+
+
+def inverse_band(factors: np.ndarray) -> np.ndarray:
+    """The part of the inverse of S = L L^T that lies in its band (Takahashi et al. 1973).
+
+    The recursion runs backwards and soon forgets where it began, so that it runs in many parts at once.
+
+    Args:
+        factors: (channels, 6, size), lower bands of L.
+
+    Returns:
+        (size, channels, 6): entries (i, i) to (i, i + 5) of each inverse.
+    """
+    channels, _, size = factors.shape
+    parts = -(-size // MEMORY)
+    padded = np.zeros((WIDTH, (parts + 1) * MEMORY, channels))
+    padded[0] = 1.0
+    padded[:, :size] = factors.transpose(1, 2, 0)
+    below = (padded[1:] / padded[0]).transpose(1, 2, 0).copy()
+    squared = 1.0 / padded[0] ** 2
+    at = MEMORY * np.arange(parts)
+    found = np.empty((parts, MEMORY, channels, WIDTH))
+    known = np.zeros((parts, channels, WIDTH, WIDTH))  # of the six coefficients from i on
+    for i in range(2 * MEMORY - 1, -1, -1):
+        later = known[..., :DEGREE, :DEGREE].copy()
+        under = below[at + i]
+        row = -np.matmul(later, under[..., None])[..., 0]
+        known[..., 1:, 1:] = later
+        known[..., 0, 0] = squared[at + i] - (under * row).sum(axis=-1)
+        known[..., 0, 1:] = row
+        known[..., 1:, 0] = row
+        if i < MEMORY:
+            found[:, i] = known[..., 0, :]
+    return found.reshape(parts * MEMORY, channels, WIDTH)[:size]
+
+
+def variance(b: Basis, inverse: np.ndarray) -> np.ndarray:
+    """(n, channels): variance of the spline whose coefficients have this covariance."""
+    total = np.zeros((b.first.size, inverse.shape[1]))
+    for j in range(WIDTH):
+        for apart in range(WIDTH - j):
+            times = 1.0 if apart == 0 else 2.0
+            weight = times * b.values[:, j] * b.values[:, j + apart]
+            total += weight[:, None] * inverse[b.first + j, :, apart]
+    return total

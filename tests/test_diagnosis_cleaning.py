@@ -1,0 +1,150 @@
+"""Judging samples: what was put in is found and counted, and what cannot be used is refused."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from measured import NOISE, changed, sail
+
+from diagnosis import InputError, clean
+from diagnosis.cleaning import in_order, noise, unwrap
+
+RUN, _ = sail(24.0)
+N = RUN.time.size
+
+
+def test_a_sound_run_is_used_as_it_is():
+    track = clean(RUN)
+    assert tuple(track.counts()) == (N, 0, 0, 0, N)
+    assert track.notes == ()
+    assert track.period == pytest.approx(0.02)
+    np.testing.assert_array_equal(track.pose[:, :2], RUN.pose[:, :2])
+    turns = (track.pose[:, 2] - RUN.pose[:, 2]) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
+    assert np.abs(np.diff(track.pose[:, 2])).max() < 0.1
+    assert np.abs(turns).max() >= 1.0, "the heading has wrapped"
+
+
+def test_every_fault_is_counted_exactly():
+    run = changed(RUN, slice(100, 120), RUN.pose[99])
+    run = changed(run, slice(300, 307), np.nan)
+    run = changed(run, slice(400, 403), 0.0)
+    run = changed(run, 500, (np.inf, 1.0, 1.0))
+    run = changed(run, slice(600, 605), (1.0, 2.0, np.nan))
+    track = clean(run)
+    assert tuple(track.counts()) == (N, 20, 16, 0, N - 36)
+    assert np.flatnonzero(track.frozen).tolist() == list(range(100, 120))
+    assert not track.valid[300:307].any()
+    assert np.isnan(track.pose[~track.valid]).all()
+    assert np.isfinite(track.pose[track.valid]).all()
+
+
+def test_freeze_with_a_dropout_in_it_is_one_freeze():
+    run = changed(RUN, slice(100, 120), RUN.pose[99])
+    run = changed(run, 110, np.nan)
+    assert tuple(clean(run).counts())[:3] == (N, 19, 1)
+
+
+def test_one_channel_that_repeats_is_no_freeze():
+    pose = RUN.pose[200].copy()
+    pose[:2] = RUN.pose[199, :2]
+    assert clean(changed(RUN, 200, pose)).counts().frozen == 0
+
+
+def test_time_stamps_that_repeat_or_go_backwards_are_left_out():
+    time = RUN.time.copy()
+    time[300] = time[299]
+    time[500] = 3.0
+    time[700] = np.nan
+    time[900] = 1e9
+    track = clean(replace(RUN, time=time))
+    assert tuple(track.counts()) == (N, 0, 4, 0, N - 4)
+    assert (np.diff(track.run.time) > 0.0).all()
+    assert "4 rows left out" in track.notes[0]
+
+
+def test_gap_is_told():
+    keep = np.r_[0:400, 500:N]
+    track = clean(RUN.rows(keep))
+    assert track.counts().samples == keep.size
+    assert track.notes == ("1 gaps, the longest 2.02 s at 7.98 s",)
+
+
+def test_rows_between_two_measurements_are_no_freeze():
+    slow = RUN.pose[np.arange(N) // 5 * 5]
+    slow[500:600] = slow[499]
+    track = clean(replace(RUN, pose=slow))
+    assert track.period == pytest.approx(0.1)
+    fresh = int(track.valid.sum())
+    assert fresh == N // 5 - 20
+    assert "a measurement every 0.1 s, a row every 0.02 s" in track.notes
+    assert track.counts().used == fresh
+    assert 90 <= track.counts().frozen <= 100
+
+
+def test_heading_about_south_is_taken_for_radians():
+    psi = np.angle(np.exp(1j * (np.pi + 0.01 * np.random.default_rng(0).standard_normal(N))))
+    track = clean(replace(RUN, pose=np.column_stack([RUN.pose[:, :2], psi])))
+    assert np.ptp(track.pose[:, 2]) < 0.1
+
+
+@pytest.mark.parametrize("rate", [-1.7, -0.4, 0.9, 1.7])
+def test_heading_is_unwrapped_over_a_gap_by_its_rate(rate):
+    t = np.r_[0.0:10.0:0.05, 13.0:20.0:0.05]
+    true = 0.3 + rate * t
+    found = unwrap(t, np.angle(np.exp(1j * true)), 0.05)
+    np.testing.assert_allclose(found, true, atol=1e-9)
+
+
+@given(st.lists(st.integers(0, 8), min_size=1, max_size=9))
+def test_longest_part_in_order_is_found(values):
+    time = np.array(values, float)
+    rows = in_order(time)
+    assert (np.diff(rows) > 0).all()
+    assert (np.diff(time[rows]) > 0.0).all()
+    more = [time[list(c)] for c in combinations(range(time.size), rows.size + 1)]
+    assert not any((np.diff(part) > 0.0).all() for part in more)
+
+
+def test_noise_is_found_in_spite_of_motion_and_spikes():
+    pose = clean(RUN).pose.copy()
+    np.testing.assert_allclose(noise(pose), NOISE, rtol=0.1)
+    pose[::50] += 1.0
+    np.testing.assert_allclose(noise(pose), NOISE, rtol=0.25)
+
+
+def shuffled(run):
+    return replace(run, time=np.random.default_rng(0).permutation(run.time))
+
+
+def twice(run):
+    return replace(run, time=np.tile(run.time[: N // 2], 2))
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda r: r.rows(np.arange(399)), "run 'made' is too short: 7.98 s, at least 8 s"),
+        (lambda r: r.rows(np.arange(0)), "too short"),
+        (shuffled, "time does not grow"),
+        (twice, "time does not grow in 600 of 1200 rows"),
+        (lambda r: replace(r, time=1e3 * r.time), "a sample each 20 s is too rare; is the time in another unit?"),
+        (lambda r: changed(r, slice(0, N), (5.0, 2.0, 1.0)), "does not move: its pose is frozen"),
+        (lambda r: changed(r, slice(0, N), np.nan), "does not move: its pose is frozen or missing"),
+        (lambda r: replace(r, pose=np.random.default_rng(0).normal(1.0, 1e-3, (N, 3))), "noise around a place"),
+        (lambda r: replace(r, pose=1e3 * r.pose * [1, 1, 1e-3]), "is its position in mm?"),
+        (lambda r: replace(r, pose=r.pose * [1, 1, np.degrees(1.0)]), "is its heading in deg?"),
+    ],
+)  # fmt: skip
+def test_run_that_cannot_be_used_is_refused_with_one_line(edit, message):
+    with pytest.raises(InputError) as error:
+        clean(edit(RUN))
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_shortest_run_is_taken():
+    assert clean(RUN.rows(np.arange(400))).counts().used == 400

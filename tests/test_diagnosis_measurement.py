@@ -1,0 +1,234 @@
+"""Reading measured runs: every form of file gives the same run, and every mistake one line."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from measured import DATA, needs_data
+from scipy.io import savemat
+
+import cosim
+import diagnosis
+from diagnosis.columns import FIVE, TAU, THREE
+from diagnosis.measurement import force
+from fmus.thrusters.allocation import Allocation, thrust
+
+N = 400
+RNG = np.random.default_rng(0)
+TIME = np.arange(N) * 0.05
+POSE = RNG.uniform(-3.0, 3.0, (N, 3))
+SHARES = RNG.uniform(-1.0, 1.0, (N, 5))
+TAU_CMD = np.column_stack(thrust(*SHARES[:, :3].T, Allocation()))
+
+
+def table(**groups):
+    """A table with time and pose, and commands by the names of their columns."""
+    columns = {"time": TIME, "x": POSE[:, 0], "y": POSE[:, 1], "psi": POSE[:, 2]}
+    return pd.DataFrame(columns | groups)
+
+
+def with_tau():
+    return table(**dict(zip(TAU, TAU_CMD.T, strict=True)))
+
+
+def same(a, b):
+    np.testing.assert_array_equal(a.time, b.time)
+    np.testing.assert_array_equal(a.pose, b.pose)
+    np.testing.assert_array_equal(a.tau_cmd, b.tau_cmd)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_what_was_written_is_read(tmp_path, kind):
+    path = tmp_path / f"mine.{kind}"
+    getattr(with_tau(), f"to_{kind}")(path, index=False)
+    run = diagnosis.read(path)
+    assert run.name == "mine"
+    np.testing.assert_allclose(run.time, TIME, rtol=1e-15)
+    np.testing.assert_allclose(run.pose, POSE, rtol=1e-15)
+    np.testing.assert_allclose(run.tau_cmd, TAU_CMD, rtol=1e-15)
+    assert run.u is None
+    assert run.five is None
+
+
+def test_commands_become_the_force_that_they_mean(tmp_path):
+    table(**dict(zip(THREE, SHARES[:, :3].T, strict=True))).to_csv(tmp_path / "a.csv", index=False)
+    run = diagnosis.read(tmp_path / "a.csv")
+    np.testing.assert_allclose(run.u, SHARES[:, :3], rtol=1e-15)
+    np.testing.assert_allclose(run.tau_cmd, TAU_CMD, rtol=1e-15)
+
+
+def test_five_commands_stay_five(tmp_path):
+    table(**dict(zip(FIVE, SHARES.T, strict=True))).to_csv(tmp_path / "a.csv", index=False)
+    run = diagnosis.read(tmp_path / "a.csv")
+    np.testing.assert_allclose(run.five, SHARES, rtol=1e-15)
+    np.testing.assert_allclose(run.tau_cmd, force(SHARES), rtol=1e-12, atol=1e-15)
+
+
+def test_force_of_five_commands():
+    assert force(np.array([[1.0, 0.0, 1.0, 0.0, 0.0]]))[0] == pytest.approx([2.33, 0.0, 0.0])
+    port_only = force(np.array([[1.0, 0.0, 0.0, 0.0, 0.0]]))[0]
+    assert port_only[2] == pytest.approx(0.055 * 1.165), (
+        "the propeller to port turns the bow to starboard"
+    )
+    bow = force(np.array([[0.0, 0.0, 0.0, 0.0, 1.0]]))[0]
+    assert bow == pytest.approx([0.0, 2.629, 2.629 * 0.3875])
+    both = np.array([[0.3, -0.2, 0.3, -0.2, 0.0]])
+    assert force(both)[0] == pytest.approx(2.0 * np.array(thrust(0.3, -0.2, 0.0, Allocation())))
+
+
+def test_names_units_and_axes_are_told_in_a_file_beside(tmp_path):
+    other = pd.DataFrame(
+        {
+            "t": 1e3 * TIME,
+            "North": POSE[:, 0],
+            "West": -1e3 * POSE[:, 1],
+            "Mathematical": 90.0 - np.degrees(POSE[:, 2]),
+            "tau_X": TAU_CMD[:, 0],
+            "tau_Y": TAU_CMD[:, 1],
+            "Moment": 1e3 * TAU_CMD[:, 2],
+        }
+    )
+    layout = {
+        "separator": ";",
+        "decimal": ",",
+        "columns": {
+            "time": {"name": "t", "unit": "ms"},
+            "x": "North",
+            "y": {"name": "West", "unit": "mm", "flip": True},
+            "psi": {"name": "Mathematical", "unit": "deg", "flip": True, "offset": 90},
+            "tau_N": {"name": "Moment", "unit": "N.mm"},
+        },
+    }
+    other.to_csv(tmp_path / "a.csv", index=False, sep=";", decimal=",")
+    (tmp_path / "a.csv.json").write_text(json.dumps(layout))
+    run = diagnosis.read(tmp_path / "a.csv")
+    np.testing.assert_allclose(run.time, TIME, atol=1e-12)
+    np.testing.assert_allclose(run.pose, POSE, atol=1e-12)
+    np.testing.assert_allclose(run.tau_cmd, TAU_CMD, atol=1e-12)
+
+
+def test_of_a_log_only_what_a_ship_would_tell_is_read(ellipse, tmp_path):
+    result = cosim.simulate(cosim.load_scenario(ellipse), tmp_path / "first")
+    log = cosim.read_log(result.folder)
+    run = diagnosis.read(result.folder)
+    assert run.name == "first"
+    same(run, diagnosis.read(result.folder / "log.csv"))
+    for k, name in enumerate(("x_m", "y_m", "psi_m")):
+        np.testing.assert_allclose(run.pose[:, k], log[f"observer.{name}"], rtol=1e-15)
+    np.testing.assert_allclose(run.tau_cmd[:, 2], log["thrusters.tau_cmd_N"], rtol=1e-15)
+    np.testing.assert_allclose(run.u[:, 0], log["thrusters.u_vsp_x"], rtol=1e-15)
+    assert np.abs(run.pose[:, 0] - log["vessel.x"]).max() > 1e-4, "noise is part of the measurement"
+    told = pd.DataFrame(log)
+    for name in told.columns:
+        if name.startswith(("vessel.", "controller.", "guidance.")) or "_hat" in name:
+            told[name] = 1.0
+    told.to_csv(result.folder / "log.csv", index=False)
+    (result.folder / "log.json").write_text('{"scenario": "another"}')
+    same(run, diagnosis.read(result.folder))
+
+
+def test_missing_commands_are_held_and_told(tmp_path):
+    held = with_tau()
+    held.loc[0:4, "tau_X"] = np.nan
+    held.loc[10:12, "tau_X"] = np.nan
+    held.to_csv(tmp_path / "a.csv", index=False)
+    run = diagnosis.read(tmp_path / "a.csv")
+    assert (run.tau_cmd[:5, 0] == 0.0).all()
+    assert (run.tau_cmd[10:13, 0] == TAU_CMD[9, 0]).all()
+    assert (run.tau_cmd[:, 1] == TAU_CMD[:, 1]).all()
+    assert "missing" in run.notes[0]
+
+
+def test_lost_poses_are_kept_as_they_are(tmp_path):
+    lost = with_tau()
+    lost.loc[5, "x"] = np.nan
+    lost.loc[6, "psi"] = np.inf
+    lost.to_csv(tmp_path / "a.csv", index=False)
+    run = diagnosis.read(tmp_path / "a.csv")
+    assert np.isnan(run.pose[5, 0])
+    assert np.isinf(run.pose[6, 2])
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda t: t.drop(columns="psi").assign(psii=0.0), "no column 'psi'; did you mean 'psii'?"),
+        (lambda t: t.drop(columns="time"), "no column 'time'"),
+        (lambda t: t.drop(columns="tau_Y"), "no column 'tau_Y'; did you mean 'tau_X'?"),
+        (lambda t: t.drop(columns=list(TAU)), "has no commands: tau_X, tau_Y, tau_N, or u_vsp_x"),
+        (lambda t: t.assign(x="north"), "x = 'north' is not a number"),
+        (lambda t: t.assign(u1=50.0, u2=0.0, u3=0.0, u4=0.0, u5=0.0), 'commands reach 50, not -1 to 1; are they of "unit": "%"?'),
+    ],
+)  # fmt: skip
+def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
+    edit(with_tau()).to_csv(tmp_path / "mine.csv", index=False)
+    refused(tmp_path / "mine.csv", message)
+
+
+@pytest.mark.parametrize(
+    ("layout", "message"),
+    [
+        ({"columns": {"x": {"name": "x", "unit": "mn"}}}, "'mn' is no unit of x; did you mean 'm'?"),
+        (
+            {"columns": {"psi": {"name": "psi", "unit": "m"}}},
+            "'m' is no unit of psi; there are rad, deg",
+        ),
+        ({"columns": {"pzi": "psi"}}, "'pzi' is not a signal of a run; did you mean 'psi'?"),
+        ({"columns": {"x": "North"}}, "no column 'North' (for x)"),
+        ({"columns": {"u1": "x"}}, "no column 'u2'"),
+        ({"colums": {}}, "colums: Extra inputs are not permitted; did you mean 'columns'?"),
+        ({"columns": {"x": {"unit": "m"}}}, "columns.x.name: Field required"),
+        ([1], "valid dictionary"),
+    ],
+)
+def test_wrong_layout_is_refused_with_one_line(tmp_path, layout, message):
+    with_tau().to_csv(tmp_path / "mine.csv", index=False)
+    (tmp_path / "mine.csv.json").write_text(json.dumps(layout))
+    refused(tmp_path / "mine.csv", message)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("mine.csv", b"", "cannot be read as a table"),
+        ("mine.csv", b"\xff\xfe\x00time", "cannot be read as a table"),
+        ("mine.csv", b"time,x\n1,2\n1,2,3,4\n", "mine.csv' has no commands"),
+        ("mine.parquet", b"no parquet", "cannot be read as a table"),
+        ("mine.mat", b"no matlab", "is not a measured run"),
+        ("mine.csv.json", b"{", "mine.csv.json' has no"),
+    ],
+)
+def test_unreadable_file_is_refused_with_one_line(tmp_path, name, content, message):
+    (tmp_path / name).write_bytes(content)
+    refused(tmp_path / name, message)
+
+
+def test_absent_file_suggests_the_nearest(tmp_path):
+    with_tau().to_csv(tmp_path / "mine.csv", index=False)
+    refused(tmp_path / "mime.csv", "did you mean 'mine.csv'?")
+    refused(tmp_path, "log.csv is missing")
+
+
+def test_matlab_matrix_of_another_kind_is_refused(tmp_path):
+    savemat(tmp_path / "a.mat", {"cse1_data": np.zeros((5, 100))})
+    refused(tmp_path / "a.mat", "a matrix of shape (5, 100)")
+    savemat(tmp_path / "a.mat", {"other": np.zeros((5, 100))})
+    refused(tmp_path / "a.mat", "it has no 'cse1_data'")
+
+
+def refused(path, message):
+    with pytest.raises(diagnosis.InputError) as error:
+        diagnosis.read(path)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@needs_data
+def test_measured_runs_are_read():
+    for path in sorted((DATA / "cse1").glob("*.mat")):
+        run = diagnosis.read(path)
+        assert run.name == path.stem
+        assert run.five.shape == (run.time.size, 5)
+        assert np.median(np.diff(run.time)) == pytest.approx(0.05)
+        assert np.abs(run.tau_cmd[:, 0]).max() == pytest.approx(2.33, rel=0.01), "full ahead, once"

@@ -1,0 +1,244 @@
+"""The smoother: the same as Kalman's and Rauch's, honest about its uncertainty, hard on spikes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measured import DATA, NOISE, changed, needs_data, sail
+from scipy.linalg import cholesky_banded
+
+from diagnosis import InputError, Run, clean, read, smooth
+from diagnosis.spline import basis, gram, inverse_band, knots, penalty, third, variance
+
+RUN, NU = sail(60.0)
+SMOOTHED = smooth(clean(RUN))
+N = RUN.time.size
+INNER = slice(100, -100)
+JERK = np.array([2e-5, 5e-6, 2e-4])
+
+
+def white_jerk(time, seed):
+    """A run driven by white jerk, and its true pose, velocity and acceleration, each (n, 3)."""
+    rng = np.random.default_rng(seed)
+    state = np.zeros((3, 3))  # derivative, channel
+    truth = []
+    for h in np.diff(time, append=time[-1] + 0.02):
+        truth.append(state)
+        F, Q = transition(h)
+        state = F @ state + np.linalg.cholesky(Q) @ rng.standard_normal((3, 3)) * np.sqrt(JERK)
+    truth = np.array(truth).transpose(1, 0, 2)
+    pose = 1.0 + truth[0] + NOISE * rng.standard_normal((time.size, 3))
+    return Run("white", time, pose, np.zeros((time.size, 3))), truth
+
+
+def transition(h):
+    """Transition matrix and covariance of a third derivative that is white noise of density 1."""
+    F = np.array([[1.0, h, h**2 / 2], [0.0, 1.0, h], [0.0, 0.0, 1.0]])
+    Q = [[h**5 / 20, h**4 / 8, h**3 / 6], [h**4 / 8, h**3 / 3, h**2 / 2], [h**3 / 6, h**2 / 2, h]]
+    return F, np.array(Q)
+
+
+def kalman_and_rauch(time, z, valid, q, sigma):
+    """Mean (n, 3) and variance (n, 3) of value, rate and change, by the textbook."""
+    x, P = np.array([z[0], 0.0, 0.0]), np.diag([1.0, 1.0, 1.0])
+    predicted, filtered = [], []
+    for k in range(time.size):
+        F, Q = transition(time[k] - time[k - 1]) if k else (np.eye(3), np.zeros((3, 3)))
+        x, P = F @ x, F @ P @ F.T + q * Q
+        predicted.append((F, x, P))
+        if valid[k]:
+            gain = P[:, 0] / (P[0, 0] + sigma**2)
+            x, P = x + gain * (z[k] - x[0]), P - np.outer(gain, P[0])
+        filtered.append((x, P))
+    found = [(x, P)]
+    for (F, later, covariance), (x0, P0) in zip(predicted[:0:-1], filtered[-2::-1], strict=True):
+        G = P0 @ F.T @ np.linalg.inv(covariance)
+        x, P = x0 + G @ (x - later), P0 + G @ (P - covariance) @ G.T
+        found.append((x, P))
+    return np.array([x for x, _ in found[::-1]]), np.array([np.diag(P) for _, P in found[::-1]])
+
+
+def test_same_as_kalman_filter_and_rauch_smoother(monkeypatch):
+    monkeypatch.setattr("diagnosis.fitting.ADAPTIONS", 0)  # the jerk is equally strong throughout
+    time = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.03, 1000))
+    run, _ = white_jerk(time, 2)
+    run = changed(run, slice(400, 440), np.nan)
+    s = smooth(clean(run))
+    for c in range(3):
+        mean, var = kalman_and_rauch(time, s.track.pose[:, c], s.used, s.jerk[c], s.noise[c])
+        for k, (found, std) in enumerate(
+            [(s.eta, s.eta_std), (s.eta_dot, s.eta_dot_std), (s.eta_ddot, s.eta_ddot_std)]
+        ):
+            # Between its knots the spline has no jerk of its own: the acceleration differs a little.
+            near, same = (0.05, 0.02) if k < 2 else (0.3, 0.1)
+            off = np.abs(found[INNER, c] - mean[INNER, k]) / np.sqrt(var[INNER, k])
+            assert np.sqrt(np.mean(off**2)) < near
+            np.testing.assert_allclose(std[INNER, c], np.sqrt(var[INNER, k]), rtol=same)
+
+
+def test_uncertainty_is_honest_and_parameters_are_found():
+    time = 0.02 * np.arange(1000)
+    normalised, jerk, spikes = [], [], 0
+    for seed in range(12):
+        run, (eta, eta_dot, eta_ddot) = white_jerk(time, seed)
+        s = smooth(clean(run))
+        turns = 2.0 * np.pi * np.round((eta[0] + 1.0 - s.eta[0]) / (2.0 * np.pi))
+        normalised.append(
+            [
+                (s.eta + turns - 1.0 - eta) / s.eta_std,
+                (s.eta_dot - eta_dot) / s.eta_dot_std,
+                (s.eta_ddot - eta_ddot) / s.eta_ddot_std,
+            ]
+        )
+        jerk.append(s.jerk)
+        spikes += s.counts.spikes
+        np.testing.assert_allclose(s.noise, NOISE, rtol=0.15)
+    found = np.array(normalised)[:, :, INNER]
+    np.testing.assert_allclose(np.sqrt(np.mean(found**2, axis=(0, 2))), 1.0, atol=0.25)
+    assert np.abs(found.mean(axis=(0, 2))).max() < 0.25
+    np.testing.assert_allclose(np.median(jerk, axis=0), JERK, rtol=0.5)
+    assert spikes <= 2, "of 12,000 samples"
+
+
+def test_velocity_of_a_ship_is_unbiased_and_sharp():
+    error = (SMOOTHED.nu - NU)[INNER]
+    assert np.abs(error.mean(axis=0)).max() < 5e-5
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    assert (rms < (5e-4, 5e-4, 1e-3)).all(), "below half a millimetre per second"
+    normalised = np.sqrt(np.mean((error / SMOOTHED.nu_std[INNER]) ** 2, axis=0))
+    assert ((normalised > 0.5) & (normalised < 1.6)).all()
+
+
+def test_without_noise_nothing_is_lost():
+    run, nu = sail(30.0, noise=0.0)
+    s = smooth(clean(run))
+    assert s.counts.spikes == 0
+    assert np.abs(s.nu - nu)[INNER].max() < 2e-5
+
+
+def test_channel_that_rests_is_no_trouble():
+    pose = RUN.pose.copy()
+    pose[:, 1] = 2.0
+    s = smooth(clean(replace(RUN, pose=pose)))
+    assert np.abs(s.eta_dot[:, 1]).max() < 1e-9
+    assert np.abs(s.nu - SMOOTHED.nu)[INNER, 2].max() < 5e-4
+
+
+def test_same_ship_elsewhere_and_later_gives_the_same_velocity():
+    turn = 1.2
+    c, d = np.cos(turn), np.sin(turn)
+    x, y, psi = RUN.pose.T
+    pose = np.column_stack([40.0 + c * x - d * y, d * x + c * y - 7.0, psi + turn])
+    s = smooth(clean(replace(RUN, pose=pose, time=RUN.time + 1e5)))
+    assert np.abs(s.nu - SMOOTHED.nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
+    moved = smooth(clean(replace(RUN, pose=RUN.pose + np.array([40.0, -7.0, 0.0]))))
+    np.testing.assert_allclose(moved.nu, SMOOTHED.nu, atol=2e-5)
+
+
+def test_spikes_are_found_and_nothing_else():
+    sound = np.flatnonzero(SMOOTHED.spikes)
+    rows = np.arange(75, N, 150)
+    rows = rows[~np.isin(rows, sound)]
+    far = 12.0 * NOISE * np.random.default_rng(0).choice([-1, 1], (rows.size, 3))
+    s = smooth(clean(changed(RUN, rows, RUN.pose[rows] + far)))
+    assert set(np.flatnonzero(s.spikes)) == {*rows, *sound}
+    assert s.counts.used == N - rows.size - sound.size
+    assert np.abs(s.nu - SMOOTHED.nu).max() < 3e-3
+
+
+@pytest.mark.parametrize("size", [0.05, 1.0, 1e6, 1e300])
+def test_bursts_and_absurd_values_do_no_harm(size):
+    rows = np.r_[500:503, 1000, 1500:1506]
+    pose = RUN.pose[rows] + [size, 0.0, 0.0]
+    s = smooth(clean(changed(RUN, rows, pose)))
+    assert s.spikes[rows].all()
+    assert s.counts.spikes <= rows.size + 2
+    assert np.abs(s.nu - SMOOTHED.nu).max() < 5e-3
+
+
+def test_uncertainty_grows_in_a_gap_and_a_long_one_is_left_out():
+    s = smooth(clean(changed(RUN, np.r_[500:600, 1500:1800], np.nan)))
+    inside, outside = s.eta_std[550], s.eta_std[400]
+    assert (inside > 3.0 * outside).all()
+    assert (np.abs(s.eta[550, :2] - RUN.pose[550, :2]) < 6.0 * inside[:2] + 5.0 * NOISE[:2]).all()
+    assert np.isnan(s.eta[1500:1800]).all()
+    assert np.isfinite(s.eta[1800:]).all()
+    assert not s.used[1500:1800].any()
+
+
+def test_stretch_in_which_nothing_agrees_is_refused_as_spikes():
+    wild = changed(RUN, np.r_[1000:1200, 1400:1600], np.nan)
+    wild = changed(wild, slice(1200, 1400), 3.0 * np.random.default_rng(0).standard_normal((200, 3)))
+    s = smooth(clean(wild))
+    assert s.spikes[1200:1400].mean() > 0.9
+    assert np.abs(s.nu - SMOOTHED.nu)[:900].max() < 1e-3
+
+
+def test_run_of_crumbs_is_refused():
+    crumbs = np.full_like(RUN.pose, np.nan)
+    for k in range(0, N, 400):
+        crumbs[k : k + 10] = RUN.pose[k : k + 10]
+    with pytest.raises(InputError, match="nowhere 20 samples without a long gap"):
+        smooth(clean(replace(RUN, pose=crumbs)))
+
+
+def test_spline_is_exact_for_a_quintic():
+    grid = knots(np.array([2.0, 9.0]), np.array([5.0, 10.0]), 0.25)
+    time = np.r_[2.0:5.0:0.01, 9.0:10.0:0.01]
+    b = basis(grid, time)
+    np.testing.assert_allclose(b.values.sum(axis=1), 1.0)
+    dense = np.zeros((time.size, grid.size))
+    np.put_along_axis(dense, b.first[:, None] + np.arange(6), b.values, axis=1)
+    wanted = np.polynomial.Polynomial([1.0, -2.0, 0.3, 0.5, -0.2, 0.02])
+    c = np.linalg.lstsq(dense, wanted(time), rcond=None)[0][:, None]
+    np.testing.assert_allclose(b(c)[:, 0], wanted(time), atol=1e-8)
+    for k in (1, 2):
+        np.testing.assert_allclose(basis(grid, time, k)(c)[:, 0], wanted.deriv(k)(time), atol=1e-5)
+    middle = np.concatenate([2.125 + 0.25 * np.arange(12), 9.125 + 0.25 * np.arange(4)])
+    np.testing.assert_allclose(third(grid, c)[:, 0], wanted.deriv(3)(middle), atol=1e-3)
+    np.testing.assert_allclose(b.matrix.toarray(), dense)
+    band = gram(b, np.ones(time.size), grid.size)
+    np.testing.assert_allclose(full(band), dense.T @ dense, atol=1e-12)
+    square = (wanted.deriv(3) ** 2).integ()
+    integral = square(5.0) - square(2.0) + square(10.0) - square(9.0)
+    stiff = full(penalty(grid, np.ones(16))) / 0.25**5
+    assert (c.T @ stiff @ c).item() == pytest.approx(integral, rel=1e-5)
+    assert np.linalg.matrix_rank(stiff, tol=1e-9 * np.abs(stiff).max()) == grid.rank
+
+
+def full(band):
+    """The symmetric matrix of a lower band."""
+    lower = sum(np.diag(row[: row.size - k], -k) for k, row in enumerate(band))
+    return lower + np.tril(lower, -1).T
+
+
+def test_band_of_the_inverse_is_that_of_the_inverse():
+    rng = np.random.default_rng(0)
+    grid = knots(np.array([0.0]), np.array([40.0]), 0.05)
+    time = np.sort(rng.uniform(0.0, 40.0, 1500))
+    b = basis(grid, time[(time < 20.0) | (time > 22.5)])
+    bands = [
+        gram(b, np.ones(b.first.size), grid.size) + s * penalty(grid, np.ones(800))
+        for s in (1e-2, 1.0, 1e4)
+    ]
+    found = inverse_band(np.array([cholesky_banded(band, lower=True) for band in bands]))
+    for c, band in enumerate(bands):
+        inverse = np.linalg.inv(full(band))
+        for k in range(6):
+            np.testing.assert_allclose(
+                found[: grid.size - k, c, k], np.diag(inverse, -k), atol=1e-8 * np.abs(inverse).max()
+            )
+        rows = np.zeros((b.first.size, grid.size))
+        np.put_along_axis(rows, b.first[:, None] + np.arange(6), b.values, axis=1)
+        expected = (rows @ inverse * rows).sum(axis=1)
+        np.testing.assert_allclose(variance(b, found)[:, c], expected, rtol=1e-6)
+
+
+@needs_data
+def test_measured_runs_are_smoothed():
+    for path in sorted((DATA / "cse1").glob("*.mat")):
+        s = smooth(clean(read(path)))
+        assert s.counts.used > 0.8 * s.counts.samples
+        assert (s.noise < (2e-4, 2e-4, 1e-3)).all(), "a tenth of a millimetre"
+        assert np.nanmax(np.abs(s.nu)) < 2.0
+        assert sum(s.counts[1:]) == s.counts.samples
