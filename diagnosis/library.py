@@ -1,0 +1,145 @@
+"""The candidates: what each effect of the registry would add to the model error, as columns.
+
+The model error of a candidate is computed by the model itself with the effect switched on, so that a
+formula stands in the registry and nowhere else. An effect whose force is straight in its coefficients
+has one shape; any other has several, one for each value of a grid over what bends it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fmus.declare import variables
+from fmus.effects import EFFECTS, Effect
+from fmus.hull import Damping, Inertia
+from fmus.thrusters.chain import Plant
+
+from .model import Model
+from .weak import Integrals, omega
+
+# Step of a finite difference for a coefficient that the force may not be straight in.
+SMALL = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One way in which an effect may act.
+
+    Attributes:
+        given: parameter -> value that makes the shape, an addition to the model.
+        free: parameters that scale it.
+        offset: (K, 3), the force of what is given alone; None where that is nothing.
+        columns: (K, 3, p), force for one unit of each free parameter.
+    """
+
+    given: Mapping[str, float]
+    free: Sequence[str]
+    offset: np.ndarray | None
+    columns: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect with the shapes that it can take on these data."""
+
+    effect: Effect
+    shapes: Sequence[Shape] = field(default_factory=list)
+
+
+# What bends an effect that is not straight, and the values that are tried.
+GRIDS: dict[str, tuple[str, tuple[float, ...], tuple[str, ...]]] = {
+    "bow_speed_loss": ("bow_speed_loss", (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 15.0), ()),
+    "deadband": ("deadband", (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.13, 0.17, 0.22, 0.3), ()),
+    "thrust_curve": (
+        "thrust_curve_deadband",
+        (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4),
+        ("thrust_curve_ahead", "thrust_curve_astern"),
+    ),
+    "lag": ("lag", (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 2.0), ()),
+    "delay": ("delay", (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5), ()),
+    "clock_offset": ("clock_offset", (-0.5, -0.3, -0.2, -0.1, -0.05), ()),
+}
+SATURATIONS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
+# An effect that is not straight, but nearly so where it is small.
+NEARLY = ("current",)
+NEARLY_KINDS = ("inertia", "measurement")
+
+
+def nearly(parameter: str) -> bool:
+    """Whether an effect's parameter is taken as straight though it is so only where it is small."""
+    e = next(e for e in EFFECTS.values() if any(p.name == parameter for p in e.parameters))
+    return e.id in NEARLY or e.kind in NEARLY_KINDS
+
+
+def evaluate(data: Sequence[Integrals], model: Model) -> np.ndarray:
+    """Model error (K, 3) [N, N, N m] of all runs one after the other."""
+    return np.concatenate([omega(w, model) for w in data])
+
+
+def shape(
+    data: Sequence[Integrals],
+    model: Model,
+    base: np.ndarray,
+    given: Mapping[str, float],
+    free: Sequence[str],
+) -> Shape:
+    """What the model gains by an effect: minus the change of the model error."""
+    start = evaluate(data, model.plus(given)) if given else base
+    columns = []
+    for name in free:
+        step = SMALL if nearly(name) else 1.0
+        columns.append((start - evaluate(data, model.plus({**given, name: step}))) / step)
+    stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
+    return Shape(dict(given), list(free), base - start if given else None, stacked)
+
+
+def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect) -> Candidate:
+    """An effect's shapes on these data."""
+    if e.id in GRIDS:
+        name, values, free = GRIDS[e.id]
+        shapes = [shape(data, model, base, {name: v} if v else {}, free) for v in values]
+    elif e.id == "bow_failure":
+        longest = max(w.run.time[-1] for w in data)
+        times = np.arange(5.0, longest, 5.0)
+        shapes = [shape(data, model, base, {"bow_failure_time": float(t)}, ()) for t in times]
+    elif e.id == "saturation":
+        most = {"saturation_vsp": 1.165, "saturation_bow": 2.629}
+        shapes = [
+            shape(data, model, base, {name: share * full}, ())
+            for name, full in most.items()
+            for share in SATURATIONS
+        ]
+    elif e.id == "waves":
+        shapes = []
+    else:
+        free = [p.name for p in e.parameters if p.name in e.coefficients]
+        shapes = [shape(data, model, base, {}, free)]
+    return Candidate(e, shapes)
+
+
+def library(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[Candidate]:
+    """All effects of the registry as candidates."""
+    found = [candidate(data, model, base, e) for e in EFFECTS.values()]
+    return [c for c in found if c.shapes]
+
+
+# Coefficients that nobody knows exactly: those of the hull, the thrusters' forces and places.
+NOMINAL = {
+    v.name: v.start for group in (Inertia, Damping, Plant) for v in variables(group) if v.start != 0.0
+}
+
+
+def doubts(data: Sequence[Integrals], base: np.ndarray, model: Model, prior: float) -> np.ndarray:
+    """What a change of each nominal coefficient by its prior standard deviation adds, (K, 3, q).
+
+    Args:
+        data, model: the runs and the model that is right so far.
+        base: its model error (K, 3).
+        prior: relative standard deviation of every coefficient; 0 means that they are exact.
+    """
+    columns = []
+    for name, start in NOMINAL.items():
+        change = base - evaluate(data, model.plus({name: SMALL * start}))
+        columns.append(change / SMALL * prior)
+    return np.stack(columns, axis=2)

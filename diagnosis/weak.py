@@ -1,0 +1,133 @@
+"""The model error over windows, without ever forming an acceleration (weak form).
+
+The equation of motion is multiplied with a smooth kernel w over a window and integrated; by parts, the
+acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from fmus.frames import rotate_to_body
+from fmus.hull import mass_matrix
+from fmus.vessel.model_errors import IN_MEASUREMENT
+
+from .measurement import Run
+from .model import Model, acceleration, by_mass, thrust
+from .prediction import INSTANT, true_pose
+from .smoothing import Smoothed
+
+WIDTH = 3.0  # s
+EVERY = 0.5  # s
+BLOCK = 15.0  # s
+
+
+def kernel(s: np.ndarray) -> np.ndarray:
+    """(1 - s^2)^3 of unit area over [-1, 1]."""
+    return 35.0 / 32.0 * (1.0 - s * s) ** 3
+
+
+def kernel_rate(s: np.ndarray) -> np.ndarray:
+    return -6.0 * 35.0 / 32.0 * s * (1.0 - s * s) ** 2
+
+
+def kernel_integral(s: np.ndarray) -> np.ndarray:
+    return 35.0 / 32.0 * (s - s**3 + 0.6 * s**5 - s**7 / 7.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Integrals:
+    """The windows of one run that can be used, and the integrals over them.
+
+    Attributes:
+        smoothed: the run.
+        middle: (K,) [s].
+        block: (K,), number of the 15 s block that the middle lies in.
+        smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
+            times one that is held from each sample to the next.
+    """
+
+    smoothed: Smoothed
+    middle: np.ndarray
+    block: np.ndarray
+    smooth: csr_matrix
+    slope: csr_matrix
+    held: csr_matrix
+
+    @property
+    def run(self) -> Run:
+        return self.smoothed.track.run
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """(n,), samples at which there is a smoothed state; the others have weight zero."""
+        return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
+
+
+def integrals(smoothed: Smoothed) -> Integrals:
+    """The windows of a run in which at least half of the samples are there and thrusters at work."""
+    run = smoothed.track.run
+    t = run.time
+    middles = np.arange(t[0] + WIDTH / 2, t[-1] - WIDTH / 2 + 1e-9, EVERY)
+    known = np.isfinite(smoothed.nu).all(axis=1)
+    fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
+    gone = np.cumsum(np.concatenate([[0], ~known]))
+    busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
+    first = np.searchsorted(t, middles - WIDTH / 2, side="left")
+    last = np.searchsorted(t, middles + WIDTH / 2, side="right")
+    count = last - first
+    kept = (
+        (count > 3)
+        & (gone[last] == gone[first])
+        & (2 * (fresh[last] - fresh[first]) >= count)
+        & (busy[last] > busy[first])
+    )
+    middles, first, last = middles[kept], first[kept], last[kept]
+    rows = np.repeat(np.arange(middles.size), last - first)
+    columns = np.concatenate([rows[:0], *map(np.arange, first, last)])
+    half = WIDTH / 2
+    s = np.clip((t[columns] - middles[rows]) / half, -1.0, 1.0)
+    after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
+    gap = np.gradient(t)[columns]
+    shape = (middles.size, t.size)
+
+    def matrix(values: np.ndarray) -> csr_matrix:
+        return csr_matrix((values, (rows, columns)), shape=shape)
+
+    return Integrals(
+        smoothed,
+        middles,
+        np.floor((middles - t[0]) / BLOCK).astype(int),
+        matrix(kernel(s) / half * gap),
+        matrix(-kernel_rate(s) / half**2 * gap),
+        matrix(kernel_integral(after) - kernel_integral(s)),
+    )
+
+
+def true_motion(smoothed: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """True pose and velocity (n, 3), as the model believes of the measurement."""
+    p = model.hull.params
+    if not IN_MEASUREMENT.acting(p.seen):
+        return smoothed.eta, smoothed.nu
+    ahead, behind = (
+        np.concatenate(true_pose((smoothed.eta + way * INSTANT * smoothed.eta_dot).T, p))
+        for way in (1.0, -1.0)
+    )
+    eta = np.concatenate(true_pose(smoothed.eta.T, p))
+    x_dot, y_dot, r = (ahead - behind) / (2.0 * INSTANT)
+    return eta.T, np.column_stack([*rotate_to_body(eta[2], x_dot, y_dot), r])
+
+
+NOMINAL = np.array(mass_matrix(Model().hull.hull.inertia))
+
+
+def omega(w: Integrals, model: Model) -> np.ndarray:
+    """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window."""
+    eta, nu = true_motion(w.smoothed, model)
+    eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
+    free = acceleration(model, w.run.time, eta, nu)
+    driven = by_mass(model, thrust(w.run, model, nu))
+    lacking = w.slope @ nu - w.smooth @ free - w.held @ driven
+    return lacking @ NOMINAL.T
