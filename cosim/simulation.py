@@ -267,9 +267,11 @@ def _record(
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     with interruptible() as interrupted:
-        pace = Pace(realtime, system.scenario.step, interrupted) if realtime else None
+        pace: Pace | None = None
         try:
             with quiet_collector():
+                # Not before: collecting what is there takes several steps' time.
+                pace = Pace(realtime, system.scenario.step, interrupted) if realtime else None
                 stopped = _loop(system, master, recorder, pace, interrupted, progress)
             result.status = "interrupted" if stopped else "done"
         except (SimulationError, OSError, KeyboardInterrupt) as error:
