@@ -65,15 +65,17 @@ def vector(
     return made
 
 
-def bundle(typename: str, **groups: Any) -> type[Any]:
+def bundle(typename: str, base: type[Any] | None = None, **groups: Any) -> type[Any]:
     """A NamedTuple class that nests declared NamedTuples, for classes that differ only in a part.
 
     Args:
         typename: name of the class.
+        base: a declared NamedTuple class whose fields come first.
         groups: field -> the nested tuple with its start values.
     """
-    made = namedtuple(typename, list(groups), defaults=list(groups.values()))
-    made.__annotations__ = dict.fromkeys(groups, Any)
+    starts = {**(base._field_defaults if base else {}), **groups}
+    made = namedtuple(typename, list(starts), defaults=list(starts.values()))
+    made.__annotations__ = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Any)}
     return made
 
 

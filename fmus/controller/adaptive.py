@@ -8,7 +8,7 @@ measurement is frozen.
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import FIXED, Component, Range, bundle
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple
 from ..ops import Number, choose, not_, where
@@ -20,7 +20,6 @@ from .backstepping import (
     Inputs,
     control,
     control_errors,
-    joined,
     outputs,
     tracking_energy,
 )
@@ -63,7 +62,7 @@ class State(NamedTuple):
 def parameters(model: Parametrisation, **more: Any) -> type[Any]:
     """The Params class of a controller that learns a model."""
     groups = {"belief": model.belief, "phi": model.start(), "gamma": model.gamma()}
-    return joined("Params", Learner, **groups, truth=model.truth(), **more)
+    return bundle("Params", Learner, **groups, truth=model.truth(), **more)
 
 
 def attentive(e: Estimate, hold_frozen: Number) -> Number:

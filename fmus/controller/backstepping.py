@@ -8,6 +8,7 @@ from collections import namedtuple
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
+from ..declare import bundle
 from ..frames import rotate_to_body
 from ..hull import Inertia, Triple, inertia_force
 from ..ops import wrap
@@ -64,17 +65,6 @@ class Energy(NamedTuple):
     lyapunov: Annotated[float, "1", "Lyapunov function of errors and estimates, (4.14)"] = 0.0
 
 
-def joined(typename: str, base: type[Any], **groups: Any) -> type[Any]:
-    """A NamedTuple class with the fields of another and then groups of scalars."""
-    starts = {**base._field_defaults, **groups}
-    made = namedtuple(typename, list(starts), defaults=list(starts.values()))
-    made.__annotations__ = {
-        **base.__annotations__,
-        **{name: type(group) for name, group in groups.items()},
-    }
-    return made
-
-
 def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
     """A group of parameters in a class of its own, with other start values for those that are named."""
     values = {**base._field_defaults, **{k: x for k, x in starts.items() if k in base._fields}}
@@ -85,7 +75,7 @@ def starting(base: type[Any], starts: Mapping[str, float]) -> Any:
 
 def outputs(model: Parametrisation, learning: Any = Nothing()) -> type[Any]:  # noqa: B008 - immutable
     """The outputs of a controller with this parametrisation, and what its way of learning shows."""
-    return joined("Outputs", Demand, phi_hat=model.hat(), energy=Energy(), learning=learning)
+    return bundle("Outputs", Demand, phi_hat=model.hat(), energy=Energy(), learning=learning)
 
 
 def control_errors(e: Estimate, t: Target, k: Gains) -> tuple[Errors, Triple]:
