@@ -66,12 +66,6 @@ NEARLY = ("current",)
 NEARLY_KINDS = ("inertia", "measurement")
 
 
-def nearly(parameter: str) -> bool:
-    """Whether an effect's parameter is taken as straight though it is so only where it is small."""
-    e = next(e for e in EFFECTS.values() if any(p.name == parameter for p in e.parameters))
-    return e.id in NEARLY or e.kind in NEARLY_KINDS
-
-
 def evaluate(data: Sequence[Integrals], model: Model) -> np.ndarray:
     """Model error (K, 3) [N, N, N m] of all runs one after the other."""
     return np.concatenate([omega(w, model) for w in data])
@@ -83,13 +77,11 @@ def shape(
     base: np.ndarray,
     given: Mapping[str, float],
     free: Sequence[str],
+    step: float = 1.0,
 ) -> Shape:
-    """What the model gains by an effect: minus the change of the model error."""
+    """What the model gains by an effect: minus the change of the model error, by steps of ``step``."""
     start = evaluate(data, model.plus(given)) if given else base
-    columns = []
-    for name in free:
-        step = SMALL if nearly(name) else 1.0
-        columns.append((start - evaluate(data, model.plus({**given, name: step}))) / step)
+    columns = [(start - evaluate(data, model.plus({**given, name: step}))) / step for name in free]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
     return Shape(dict(given), list(free), base - start if given else None, stacked)
 
@@ -114,7 +106,8 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
         shapes = []
     else:
         free = [p.name for p in e.parameters if p.name in e.coefficients]
-        shapes = [shape(data, model, base, {}, free)]
+        nearly = e.id in NEARLY or e.kind in NEARLY_KINDS
+        shapes = [shape(data, model, base, {}, free, SMALL if nearly else 1.0)]
     return Candidate(e, shapes)
 
 

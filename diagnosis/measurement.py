@@ -18,7 +18,7 @@ from fmus.thrusters.allocation import Allocation, thrust
 
 from .columns import FIVE, LOG, POSE, TAU, THREE, Layout, read_layout, signals, to_si
 
-VSP_ASIDE = 0.055  # m; the first VSP sits to port by that, the second to starboard (inferred from data)
+ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from data)
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05
@@ -54,12 +54,17 @@ class Run:
         return Run(self.name, self.time[keep], self.pose[keep], self.tau_cmd[keep], u, five, self.notes)
 
 
+def propellers(five: np.ndarray) -> np.ndarray:
+    """Shares of full force (n, 2, 3) of the two thruster sets at ASIDE, by the five commands (n, 5)."""
+    bow = five[:, 4:]
+    return np.stack([np.hstack([five[:, :2], bow]), np.hstack([five[:, 2:4], 0.0 * bow])], axis=1)
+
+
 def force(five: np.ndarray) -> np.ndarray:
     """Nominal tau [N, N, N m], shape (n, 3), of the five commands of the real ship, shape (n, 5)."""
-    x1, y1, x2, y2, bow = five.T
-    port, starboard = Allocation(p_y=-VSP_ASIDE), Allocation(p_y=VSP_ASIDE)
-    both = np.array([thrust(x1, y1, bow, port), thrust(x2, y2, 0.0 * bow, starboard)])
-    return both.sum(axis=0).T
+    x, y, bow = propellers(five).T
+    both = [thrust(x[k], y[k], bow[k], Allocation(p_y=aside)) for k, aside in enumerate(ASIDE)]
+    return np.sum(both, axis=0).T
 
 
 def read(path: str | Path) -> Run:

@@ -23,7 +23,7 @@ from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 from fmus.vessel import vessel as ship
 from fmus.vessel.vessel import COMPONENT as VESSEL
 
-from .measurement import VSP_ASIDE, Run
+from .measurement import ASIDE, Run, propellers
 from .prediction import parameters
 
 Series = np.ndarray
@@ -104,11 +104,8 @@ def by_mass(model: Model, force: Series) -> Series:
 def shares(run: Run, model: Model) -> list[tuple[Series, float]]:
     """For each set of thrusters its shares of full force (n, 3), and where it sits to starboard [m]."""
     if run.five is not None:
-        x1, y1, x2, y2, bow = run.five.T
-        return [
-            (np.column_stack([x1, y1, bow]), -VSP_ASIDE),
-            (np.column_stack([x2, y2, 0.0 * bow]), VSP_ASIDE),
-        ]
+        both = propellers(run.five)
+        return [(both[:, k], aside) for k, aside in enumerate(ASIDE)]
     if run.u is not None:
         return [(run.u, 0.0)]
     X, Y, N = run.tau_cmd.T

@@ -22,7 +22,7 @@ from fmus.thrusters.chain import Inputs
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 from fmus.vessel import vessel
 
-from .measurement import VSP_ASIDE
+from .measurement import ASIDE, propellers
 from .smoothing import Smoothed
 
 Values = Mapping[str, Any]
@@ -91,12 +91,7 @@ class Starts:
 def held(smoothed: Smoothed, time: np.ndarray) -> np.ndarray:
     """Commands (steps, w, sets, 3) of a run at times (steps, w) [s]."""
     run = smoothed.track.run
-    if run.five is None:
-        asked = run.tau_cmd[:, None]
-    else:
-        bow = run.five[:, 4:]
-        port, starboard = run.five[:, :2], run.five[:, 2:4]
-        asked = np.stack([np.hstack([port, bow]), np.hstack([starboard, 0.0 * bow])], axis=1)
+    asked = run.tau_cmd[:, None] if run.five is None else propellers(run.five)
     row = np.searchsorted(run.time, time, side="right") - 1
     found = asked[np.maximum(row, 0)]
     known = np.isfinite(smoothed.nu[:, 0])
@@ -117,7 +112,7 @@ def predict(starts: Starts, ship: Values, thrusters: Values) -> np.ndarray:
     """
     p, plan = parameters(vessel.COMPONENT, ship), parameters(THRUSTERS, thrusters)
     if starts.five:  # each propeller pushes from its own side
-        aside = plan.plant.plant_p_y + np.array([-VSP_ASIDE, VSP_ASIDE])[:, None, None]
+        aside = plan.plant.plant_p_y + np.array(ASIDE)[:, None, None]
         plan = plan._replace(plant=plan.plant._replace(plant_p_y=aside))
     body, machine, h = vessel.prepare(p), THRUSTERS.prepared(plan), starts.h
     s = first_state(starts, p)
@@ -166,12 +161,17 @@ def memory(plan: Any) -> float:
 
 def first_state(starts: Starts, p: Any) -> vessel.State:
     """Where the smoother says that each window begins, seen through the model's measurement effects."""
-    eta, eta_dot = starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot)
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), p)
+    time = starts.first(lambda s: s.time) + 0.0 * pose[0]
+    return vessel.State._make([*pose, *nu, time])
+
+
+def true_motion(eta: Any, eta_dot: Any, p: Any) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
     x, y, psi = true_pose(eta, p)
     ahead, astern = true_pose(eta + INSTANT * eta_dot, p), true_pose(eta - INSTANT * eta_dot, p)
     x_dot, y_dot, r = ((a - b) / (2.0 * INSTANT) for a, b in zip(ahead, astern, strict=True))
-    u, v = rotate_to_body(psi, x_dot, y_dot)
-    return vessel.State(x, y, psi, u, v, r, starts.first(lambda s: s.time) + 0.0 * x)
+    return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
 def true_pose(measured: Any, p: Any) -> list[Any]:

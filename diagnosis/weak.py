@@ -10,13 +10,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fmus.frames import rotate_to_body
 from fmus.hull import mass_matrix
-from fmus.vessel.model_errors import IN_MEASUREMENT
 
 from .measurement import Run
 from .model import Model, acceleration, by_mass, thrust
-from .prediction import INSTANT, true_pose
+from .prediction import true_motion
 from .smoothing import Smoothed
 
 WIDTH = 3.0  # s
@@ -106,26 +104,13 @@ def integrals(smoothed: Smoothed) -> Integrals:
     )
 
 
-def true_motion(smoothed: Smoothed, model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """True pose and velocity (n, 3), as the model believes of the measurement."""
-    p = model.hull.params
-    if not IN_MEASUREMENT.acting(p.seen):
-        return smoothed.eta, smoothed.nu
-    ahead, behind = (
-        np.concatenate(true_pose((smoothed.eta + way * INSTANT * smoothed.eta_dot).T, p))
-        for way in (1.0, -1.0)
-    )
-    eta = np.concatenate(true_pose(smoothed.eta.T, p))
-    x_dot, y_dot, r = (ahead - behind) / (2.0 * INSTANT)
-    return eta.T, np.column_stack([*rotate_to_body(eta[2], x_dot, y_dot), r])
-
-
 NOMINAL = np.array(mass_matrix(Model().hull.hull.inertia))
 
 
 def omega(w: Integrals, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window."""
-    eta, nu = true_motion(w.smoothed, model)
+    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull.params)
+    eta, nu = (np.concatenate(part).T for part in motion)
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
     free = acceleration(model, w.run.time, eta, nu)
     driven = by_mass(model, thrust(w.run, model, nu))

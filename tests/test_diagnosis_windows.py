@@ -9,7 +9,7 @@ import pytest
 from measured import DATA, NOISE, changed, needs_data, sail
 
 from diagnosis import InputError, Windows, clean, read, smooth
-from diagnosis.prediction import THRUSTERS, VSP_ASIDE, parameters
+from diagnosis.prediction import ASIDE, THRUSTERS, parameters
 from diagnosis.windows import LENGTH
 from fmus.thrusters.allocation import Allocation, allocate
 
@@ -181,7 +181,7 @@ def test_propellers_that_differ_turn_the_ship():
     five[:, 0], five[:, 2] = 0.2, -0.2
     turning = windows_of(replace(RUN, five=five))
     pure = np.zeros_like(RUN.tau_cmd)
-    pure[:, 2] = 0.4 * 1.165 * VSP_ASIDE
+    pure[:, 2] = 0.4 * 1.165 * ASIDE[1]
     moment = windows_of(replace(RUN, tau_cmd=pure))
     np.testing.assert_allclose(turning.residuals(), moment.residuals(), atol=1e-9)
 
