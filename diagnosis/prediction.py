@@ -115,12 +115,12 @@ def predict(starts: Starts, ship: Values, thrusters: Values) -> np.ndarray:
         aside = plan.plant.plant_p_y + np.array(ASIDE)[:, None, None]
         plan = plan._replace(plant=plan.plant._replace(plant_p_y=aside))
     body, machine, h = vessel.prepare(p), THRUSTERS.prepared(plan), starts.h
-    s = first_state(starts, p)
+    s = first_state(starts, body)
     before = int(np.ceil(memory(plan) / h))
     past = THRUSTERS.init(Inputs(), plan)._replace(t=s.t - (before + 1) * h)
     found = np.empty((starts.steps + 1, 3, *np.broadcast_shapes(*sizes(p, plan), s.x.shape)))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        found[0] = vessel.measured(s, p)
+        found[0] = vessel.measured(s, body)
         for k, asked in enumerate(starts.commands(-before, before + starts.steps), -before):
             a, b, c = asked
             request = Force(*(thrust(a, b, c, plan.allocation) if starts.five else (a, b, c)))
@@ -130,7 +130,7 @@ def predict(starts: Starts, ship: Values, thrusters: Values) -> np.ndarray:
                 continue
             tau = Force(*[np.sum(f, axis=0) for f in (out.tau_act_X, out.tau_act_Y, out.tau_act_N)])
             s = moved(s, tau, body, h)
-            found[k + 1] = vessel.measured(s, p)
+            found[k + 1] = vessel.measured(s, body)
     return found
 
 
@@ -159,26 +159,26 @@ def memory(plan: Any) -> float:
     return min(LONGEST_MEMORY, float(np.max(delay + LAGS * np.asarray(lag) + slow)))
 
 
-def first_state(starts: Starts, p: Any) -> vessel.State:
+def first_state(starts: Starts, b: vessel.Prepared) -> vessel.State:
     """Where the smoother says that each window begins, seen through the model's measurement effects."""
-    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), p)
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), b)
     time = starts.first(lambda s: s.time) + 0.0 * pose[0]
     return vessel.State._make([*pose, *nu, time])
 
 
-def true_motion(eta: Any, eta_dot: Any, p: Any) -> tuple[list[Any], list[Any]]:
+def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
     """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
-    x, y, psi = true_pose(eta, p)
-    ahead, astern = true_pose(eta + INSTANT * eta_dot, p), true_pose(eta - INSTANT * eta_dot, p)
+    x, y, psi = true_pose(eta, b)
+    ahead, astern = true_pose(eta + INSTANT * eta_dot, b), true_pose(eta - INSTANT * eta_dot, b)
     x_dot, y_dot, r = ((a - b) / (2.0 * INSTANT) for a, b in zip(ahead, astern, strict=True))
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
-def true_pose(measured: Any, p: Any) -> list[Any]:
+def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
     """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
     pose = [m[None] for m in measured]
     for _ in range(8):
-        x, y, psi = vessel.measured(vessel.State(*pose), p)
+        x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
         pose = [a + b for a, b in zip(pose, off, strict=True)]
     return pose

@@ -109,7 +109,7 @@ NOMINAL = np.array(mass_matrix(Model().hull.hull.inertia))
 
 def omega(w: Integrals, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window."""
-    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull.params)
+    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
     eta, nu = (np.concatenate(part).T for part in motion)
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
     free = acceleration(model, w.run.time, eta, nu)

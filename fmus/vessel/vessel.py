@@ -125,6 +125,7 @@ class Prepared(NamedTuple):
     hull: Hull
     changes: tuple[Any, ...]
     outside: tuple[Any, ...]
+    seen: tuple[Any, ...]
     changed: Any
     stirred: Any
     heavier: Any
@@ -137,6 +138,7 @@ def prepare(p: Params) -> Prepared:
         hull(p),
         tuple([member.acting(p.change) for member in CHANGES.members]),
         tuple([member.acting(p.outside) for member in OUTSIDE.members]),
+        tuple([member.acting(p.seen) for member in IN_MEASUREMENT.members]),
         CHANGES.acting(p.change),
         OUTSIDE.acting(p.outside) | WATER.acting(p.water),
         INERTIA.acting(p.heavier),
@@ -218,11 +220,11 @@ def model_error(s: State, nu_dot: Triple, tau: Force, p: Params) -> Triple:
     return MX + CX - DX - tau[0], MY + CY - DY - tau[1], MN + CN - DN - tau[2]
 
 
-def measured(s: State, p: Params) -> Measurement:
+def measured(s: State, b: Prepared) -> Measurement:
     """The pose as the measurement system sees it."""
     pose = (s.x, s.y, s.psi)
-    for member in IN_MEASUREMENT.members:
-        pose = member.apply(member.acting(p.seen), p.seen, pose, pose)
+    for member, acts in zip(IN_MEASUREMENT.members, b.seen, strict=True):
+        pose = member.apply(acts, b.params.seen, pose, pose)
     return Measurement(pose[0], pose[1], wrap(pose[2]))
 
 
@@ -249,7 +251,7 @@ def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Ou
         u_dot,
         v_dot,
         r_dot,
-        measured(after, p),
+        measured(after, b),
         omega_X,
         omega_Y,
         omega_N,
