@@ -174,6 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "Find the point of attack of the thrust allocation from sway pushes (6.3.4).",
         "  python -m studies.allocation\n  python -m studies.allocation --hidden 0.18 --seeds 1",
         seeds=3,
+        jobs=False,
     )
     parser.add_argument(
         "--hidden", type=float, nargs="+", default=list(HIDDEN), metavar="M", help="hidden offsets [m]"

@@ -20,14 +20,17 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def study_parser(name: str, description: str, examples: str, seeds: int = 10) -> argparse.ArgumentParser:
-    """A parser with the options of every study: ``--out``, ``--seeds``, ``--jobs``, ``--quick``.
+def study_parser(
+    name: str, description: str, examples: str, seeds: int | None = 10, jobs: bool = True
+) -> argparse.ArgumentParser:
+    """A parser with the options that studies share: ``--out``, ``--seeds``, ``--jobs``, ``--quick``.
 
     Args:
         name: of the study's module.
         description: what it does.
         examples: lines for the end of the help.
-        seeds: how many by default.
+        seeds: how many by default; None where there is nothing to repeat.
+        jobs: whether several runs go on at a time.
     """
     parser = argparse.ArgumentParser(
         prog=f"python -m studies.{name}",
@@ -38,10 +41,14 @@ def study_parser(name: str, description: str, examples: str, seeds: int = 10) ->
     )
     out = Path("results") / f"study_{name}"
     parser.add_argument("--out", type=Path, metavar="DIR", default=out, help=f"report folder ({out})")
-    parser.add_argument(
-        "--seeds", type=_count, metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
-    )
-    parser.add_argument("--jobs", type=_count, metavar="N", help="runs at a time (one for each core)")
+    if seeds is not None:
+        parser.add_argument(
+            "--seeds", type=_count, metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
+        )
+    if jobs:
+        parser.add_argument(
+            "--jobs", type=_count, metavar="N", help="runs at a time (one for each core)"
+        )
     parser.add_argument(
         "--quick", action="store_true", help="few seeds and short runs, for a first look"
     )

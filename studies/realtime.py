@@ -112,7 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "realtime",
         "Pace a scenario to the wall clock and report deadline misses and jitter (6.3.2).",
         "  python -m studies.realtime\n  python -m studies.realtime --factor 1 2 5 --seconds 10",
-        seeds=1,
+        seeds=None,
+        jobs=False,
     )
     parser.add_argument(
         "--seconds", type=float, default=20.0, metavar="S", help="simulated time of a run (%(default)s)"
