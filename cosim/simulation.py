@@ -207,6 +207,8 @@ def simulate(
     Raises:
         InputError: the scenario cannot be run; nothing has been written.
     """
+    if realtime is not None and not 0.0 < realtime < math.inf:
+        raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
     system = prepare(scenario, overrides)
     try:
@@ -271,7 +273,7 @@ def _record(
         try:
             with quiet_collector():
                 # Not before: collecting what is there takes several steps' time.
-                pace = Pace(realtime, system.scenario.step, interrupted) if realtime else None
+                pace = None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
                 stopped = _loop(system, master, recorder, pace, interrupted, progress)
             result.status = "interrupted" if stopped else "done"
         except (SimulationError, OSError, KeyboardInterrupt) as error:

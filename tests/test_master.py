@@ -437,3 +437,10 @@ def test_numbers_too_large_for_an_integer_are_refused(plain_fmu, tmp_path):
     result, _ = run(content, tmp_path)
     assert result.status == "failed"
     assert "not a 32-bit number" in result.message
+
+
+@pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, math.inf])
+def test_pace_that_is_none_is_refused(factor, ellipse, tmp_path):
+    with pytest.raises(cosim.InputError, match="positive factor"):
+        cosim.simulate(cosim.load_scenario(ellipse), tmp_path / "out", realtime=factor)
+    assert not (tmp_path / "out").exists()
