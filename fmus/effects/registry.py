@@ -35,15 +35,18 @@ Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
 
 
 class Ship(NamedTuple):
-    """What a force on the hull may depend on: time, pose, and velocity through the water."""
+    """Pose, heading continuous over turns, velocity, and time.
 
-    t: Any = 0.0
+    A force on the hull may depend on all of it; to an effect the velocity is that through the water.
+    """
+
     x: Any = 0.0
     y: Any = 0.0
     psi: Any = 0.0
     u: Any = 0.0
     v: Any = 0.0
     r: Any = 0.0
+    t: Any = 0.0
 
 
 class Running(NamedTuple):

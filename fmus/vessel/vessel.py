@@ -69,16 +69,8 @@ class Params(NamedTuple):
     start: Start = Start()
 
 
-class State(NamedTuple):
-    """eta, nu over ground, and time; the heading is continuous over turns."""
-
-    x: Any = 0.0
-    y: Any = 0.0
-    psi: Any = 0.0
-    u: Any = 0.0
-    v: Any = 0.0
-    r: Any = 0.0
-    t: Any = 0.0
+# eta, nu over ground, and time.
+State = Ship
 
 
 class Pose(NamedTuple):
@@ -147,9 +139,8 @@ def prepare(p: Params) -> Prepared:
 
 def through_water(s: State, p: Params) -> tuple[Ship, Any, Any]:
     """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
-    ship = Ship(s.t, s.x, s.y, s.psi, s.u, s.v, s.r)
-    u_c, v_c = current(ship, *p.water)
-    return ship._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
+    u_c, v_c = current(s, *p.water)
+    return s._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
 
 
 def calm(s: State, tau: Force, b: Hull) -> Triple:
