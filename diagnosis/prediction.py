@@ -72,18 +72,19 @@ class Starts:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
-    def commands(self, first: int, steps: int) -> np.ndarray:
+    def commands(self, first: int, steps: int, clock: float) -> np.ndarray:
         """What is asked of the thrusters, held from sample to sample.
 
         Args:
             first: step to begin with; negative before the window.
             steps: how many.
+            clock: seconds by which a pose is older than its stamp.
 
         Returns:
             (steps, 3, sets, 1, w): shares of full force where there are five commands, else tau
             [N, N, N m].
         """
-        middle = (np.arange(first, first + steps)[:, None] + 0.5) * self.h
+        middle = (np.arange(first, first + steps)[:, None] + 0.5) * self.h - clock
         found = [held(smoothed, smoothed.time[rows] + middle) for smoothed, rows in self.runs]
         return np.concatenate(found, axis=1).transpose(0, 3, 2, 1)[:, :, :, None]
 
@@ -100,12 +101,13 @@ def held(smoothed: Smoothed, time: np.ndarray) -> np.ndarray:
     return found
 
 
-def predict(starts: Starts, ship: Values, thrusters: Values) -> np.ndarray:
+def predict(starts: Starts, ship: Values, thrusters: Values, clock: float = 0.0) -> np.ndarray:
     """The measured pose as the model foretells it.
 
     Args:
         starts: where to begin.
         ship, thrusters: parameters that are not nominal, see :func:`parameters`.
+        clock: seconds by which a pose is older than its stamp.
 
     Returns:
         (steps + 1, 3, p, w): pose [m, m, rad] at each step.
@@ -121,7 +123,7 @@ def predict(starts: Starts, ship: Values, thrusters: Values) -> np.ndarray:
     found = np.empty((starts.steps + 1, 3, *np.broadcast_shapes(*sizes(p, plan), s.x.shape)))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
         found[0] = vessel.measured(s, body)
-        for k, asked in enumerate(starts.commands(-before, before + starts.steps), -before):
+        for k, asked in enumerate(starts.commands(-before, before + starts.steps, clock), -before):
             a, b, c = asked
             request = Force(*(thrust(a, b, c, plan.allocation) if starts.five else (a, b, c)))
             speed = Velocity(s.u, s.v, s.r) if k >= 0 else Velocity()

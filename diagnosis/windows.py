@@ -85,12 +85,15 @@ class Windows:
             together = Starts(starts, h, int(np.ceil(LENGTH / h - 1e-6)), five)
             self._groups.append((together, np.flatnonzero(np.isin(self.run, alike))))
 
-    def residuals(self, vessel: Values | None = None, thrusters: Values | None = None) -> np.ndarray:
+    def residuals(
+        self, vessel: Values | None = None, thrusters: Values | None = None, clock: float = 0.0
+    ) -> np.ndarray:
         """Measured minus predicted pose at each sample that counts.
 
         Args:
             vessel, thrusters: name -> value of the parameters that are not nominal; an array (p, 1)
                 tries p models at once.
+            clock: seconds by which a pose is older than its stamp.
 
         Returns:
             (samples, 3) [m, m, rad], heading wrapped; (p, samples, 3) for p models.
@@ -107,14 +110,20 @@ class Windows:
             place[windows] = np.arange(windows.size)
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
-            pose = between_steps(predict(starts, ship, machine), column, self._since[mine] / starts.h)
+            steps = predict(starts, ship, machine, clock)
+            pose = between_steps(steps, column, self._since[mine] / starts.h)
             off[:, mine] = self.measured[mine] - pose
         off[..., 2] = wrap(off[..., 2])
         return off if models else off[0]
 
-    def errors(self, vessel: Values | None = None, thrusters: Values | None = None) -> WindowErrors:
+    def errors(
+        self, vessel: Values | None = None, thrusters: Values | None = None, clock: float = 0.0
+    ) -> WindowErrors:
         """The window prediction error of a model, arguments as of :meth:`residuals`."""
-        off = self.residuals(vessel, thrusters)
+        return self.summary(self.residuals(vessel, thrusters, clock))
+
+    def summary(self, off: np.ndarray) -> WindowErrors:
+        """Errors by window of what :meth:`residuals` gives."""
         samples = np.bincount(self.sample_window, minlength=self.run.size)
         edges = np.cumsum([0, *samples[:-1]])  # samples lie window by window
         with np.errstate(over="ignore", invalid="ignore"):
