@@ -62,6 +62,7 @@ class Windows:
         run, start: (w,), number of each window's run, and when it starts [s].
         sample_window: (samples,), the window of each sample that counts.
         measured: (samples, 3), the raw pose [m, m, rad].
+        since: (samples,), time since its window began [s].
 
     Raises:
         InputError: no run has a window with enough samples.
@@ -77,7 +78,7 @@ class Windows:
         self.start = np.concatenate([c.time[c.heads] for c in cuts])
         self.sample_window = np.concatenate([c.window + a for c, a in zip(cuts, before, strict=True)])
         self.measured = np.concatenate([c.smoothed.track.pose[c.rows] for c in cuts])
-        self._since = np.concatenate([c.time[c.rows] for c in cuts]) - self.start[self.sample_window]
+        self.since = np.concatenate([c.time[c.rows] for c in cuts]) - self.start[self.sample_window]
         self._groups: list[tuple[Starts, np.ndarray]] = []
         for h, five in sorted({c.kind for c in cuts if c.heads.size}):
             alike = [k for k, c in enumerate(cuts) if c.kind == (h, five)]
@@ -111,7 +112,7 @@ class Windows:
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
             steps = predict(starts, ship, machine, clock)
-            pose = between_steps(steps, column, self._since[mine] / starts.h)
+            pose = between_steps(steps, column, self.since[mine] / starts.h)
             off[:, mine] = self.measured[mine] - pose
         off[..., 2] = wrap(off[..., 2])
         return off if models else off[0]

@@ -1,0 +1,108 @@
+"""Matplotlib's figures as parts of a web page: real text, the page's colours, no two ids alike."""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH = 4.8  # in; as wide as a phone's page in CSS pixels, so that letters keep their size there
+# Okabe and Ito's colours, which people see apart who do not see all colours. The page has a variable of
+# each name, lighter ones for a dark screen.
+INK, GRID, BAND = "#1f2328", "#dde1e6", "#8a919a"
+BEFORE, AFTER, THIRD = "#d55e00", "#0072b2", "#009e73"
+PALETTE = {INK: "ink", GRID: "grid", BAND: "band", BEFORE: "before", AFTER: "after", THIRD: "third"}
+
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cybership",
+    "text.parse_math": False,  # a run may be called $x$
+    "font.size": 9.0,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+}
+
+SVG, XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
+HREF = f"{{{XLINK}}}href"
+LEFT_OUT = {f"{{{SVG}}}metadata", f"{{{SVG}}}style"}  # a date and maker; a style that would hit the page
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib as this page wants it, whatever the user has set."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def inline(figure: "Figure", key: str, label: str) -> str:
+    """A figure as an ``<svg>`` element that may stand in a page.
+
+    Args:
+        figure: drawn within :func:`style`.
+        key: letters and digits that no other figure of the page has.
+        label: what a reader who cannot see it is told.
+    """
+    made = io.BytesIO()
+    figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
+    root = ElementTree.fromstring(made.getvalue())
+    for parent in list(root.iter()):
+        for child in [c for c in parent if c.tag in LEFT_OUT]:
+            parent.remove(child)
+    _prefix(root, key)
+    for name in ("width", "height", "version"):
+        root.attrib.pop(name, None)
+    root.set("role", "img")
+    root.set("aria-label", label)
+    for element in root.iter():
+        for name in ("style", "fill", "stroke"):
+            if name in element.attrib:
+                element.set(name, _coloured(element.attrib[name]))
+    ElementTree.register_namespace("", SVG)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _prefix(root: ElementTree.Element, key: str) -> None:
+    """Give the ids that something refers to a name of their own, and take the others away."""
+    used = set()
+    for element in root.iter():
+        for name, value in list(element.attrib.items()):
+            used |= set(re.findall(r"url\(#([^)]+)\)", value))
+            value = re.sub(r"url\(#", f"url(#{key}-", value)
+            if name == HREF:
+                used.add(value[1:])
+                del element.attrib[name]
+                name, value = "href", f"#{key}-{value[1:]}"
+            element.set(name, value)
+    for element in root.iter():
+        own = element.attrib.pop("id", None)
+        if own in used:
+            element.set("id", f"{key}-{own}")
+
+
+def _coloured(text: str) -> str:
+    for colour, name in PALETTE.items():
+        text = text.replace(colour, f"var(--{name})")
+    return text
