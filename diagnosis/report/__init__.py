@@ -1,6 +1,6 @@
 """One page that shows where a model fails, what was learned, and how the error falls."""
 
-from .curves import Curve
 from .page import write_report
+from .shape import Curve, curves
 
-__all__ = ["Curve", "write_report"]
+__all__ = ["Curve", "curves", "write_report"]

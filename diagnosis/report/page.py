@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..evidence import Evidence
-from . import figures, words
-from .curves import Curve, curves
+from . import figures, tracks, words
 from .regions import QUANTITIES, regions
+from .shape import Curve, curves
 from .svg import inline, style
 
 PROVENANCE = {
@@ -23,11 +23,10 @@ PROVENANCE = {
     "versions": "versions",
     "command": "command",
 }
-ERROR_KEYS = ("window_position_rmse", "window_heading_rmse", "omega_rms")
 
 
 class Drawing(NamedTuple):
-    """A figure of the page: its ``<svg>`` element, what is written below, and whether it is large."""
+    """A figure of the page: its ``<svg>`` element, and what is written below it."""
 
     svg: Any
     caption: str
@@ -123,8 +122,8 @@ def _named(e: Evidence, learned: bool) -> str:
 def _tracks(evidence: Sequence[Evidence], learned: bool) -> Iterator[Drawing]:
     for k, e in enumerate(evidence):
         name = _named(e, learned)
-        yield _draw(figures.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
-        closer = figures.worst(e, learned)
+        yield _draw(tracks.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
+        closer = tracks.worst(e, learned)
         if closer is not None:
             caption = f"{name}: the worst window."
             yield _draw(closer, f"worst-{k}", f"The worst window of {e.name}", caption)
@@ -137,7 +136,7 @@ def _growth(evidence: Sequence[Evidence], learned: bool) -> Iterator[Drawing]:
             continue
         part = "held-out" if held_out else ("training" if learned else "all")
         caption = f"Error of prediction over time, {part} runs: median, and half of all samples."
-        figure = figures.growth(runs, learned)
+        figure = tracks.growth(runs, learned)
         yield _draw(figure, f"growth-{part}", caption, caption)
 
 
@@ -145,6 +144,8 @@ def _omega(
     evidence: Sequence[Evidence], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
     for k, e in enumerate(evidence):
+        if not e.integrals.middle.size:
+            continue
         figure = figures.model_error(e, None if std is None else std[k], learned)
         yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_named(e, learned)}.")
 
@@ -152,6 +153,8 @@ def _omega(
 def _where(
     evidence: Sequence[Evidence], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
+    if not any(e.integrals.middle.size for e in evidence):
+        return
     for k, quantity in enumerate(QUANTITIES):
         figure = figures.where(quantity, regions(quantity, evidence, std), learned)
         caption = f"Model error by {quantity.name}."
@@ -164,6 +167,9 @@ def _ranking(result: Mapping[str, Any]) -> Iterator[Drawing]:
         first = (result.get("effects") or [{}])[0]
         figure = figures.ranking(ranked, first.get("indistinguishable") or ())
         caption = f"The best of {len(ranked)} candidates."
+        if first.get("confidence") is not None:
+            share = words.percent(first["confidence"])
+            caption += f" {first['id']} comes first in {share} of the data drawn again by chance."
         yield _draw(figure, "ranking", "Candidates in the order of their loss", caption)
 
 
@@ -174,10 +180,12 @@ def _shapes(shapes: Sequence[Curve]) -> Iterator[Drawing]:
 
 
 def _tiles(result: Mapping[str, Any], learned: bool) -> Iterator[tuple[str, str, str]]:
-    """Label, number and remark of the numbers that come first: worst run, held out where there is one."""
+    """Label, number and remark of the numbers that come first: over held-out runs if there are any."""
     errors = result.get("errors") or []
     chosen = [e for e in errors if e.get("held_out")] or errors
-    part = "held-out" if any(e.get("held_out") for e in errors) else ("training" if learned else "measured")
+    part = (
+        "held-out" if any(e.get("held_out") for e in errors) else ("training" if learned else "measured")
+    )
     for key, label, factor, unit in (
         ("window_position_rmse", "position error of 8 s predictions", 1e3, "mm"),
         ("window_heading_rmse", "heading error of 8 s predictions", float(np.degrees(1.0)), "°"),
@@ -192,5 +200,5 @@ def _tiles(result: Mapping[str, Any], learned: bool) -> Iterator[tuple[str, str,
         if learned and all(a is not None for a in after):
             last = float(np.sqrt(np.mean(np.square(after))))
             shown += f" → {words.number(last, factor=factor)}"
-            remark += f", {words.times(before, last)} less"
+            remark += f", {words.times(before, last)} less" if last <= before else ", more than before"
         yield label, f"{shown} {unit}", remark

@@ -18,7 +18,8 @@ class Quantity(NamedTuple):
     """What the error may depend on.
 
     Attributes:
-        name, label: for people; the label with its unit, ``{}`` standing for what differs by axis.
+        name: for people.
+        labels: with the unit, one for each axis of the ship.
         values: (K,) or (K, 3), one for each axis, averaged over each window of the weak form.
         edges: of the bins; None: between the quantiles of the data.
     """
@@ -61,7 +62,7 @@ class Region:
     """RMS model error of one axis, bin by bin.
 
     Attributes:
-        edges: (b + 1,).
+        edges: (b + 1,), in the unit of the quantity.
         before, after: (b,) [N or N m]; NaN where there are few windows.
         unsure: (b,), RMS of its uncertainty; None if not known.
     """
@@ -75,7 +76,13 @@ class Region:
 def regions(
     quantity: Quantity, evidence: Sequence[Evidence], omega_std: Sequence[np.ndarray] | None
 ) -> list[Region]:
-    """The model error of each axis over a quantity, all runs together."""
+    """The model error of each axis over a quantity, all runs together.
+
+    Args:
+        quantity: what it is sorted by.
+        evidence: of the runs.
+        omega_std: standard deviation (K, 3) [N, N, N m] of each run's omega; None if not known.
+    """
     values = np.concatenate([quantity.values(e.integrals) for e in evidence])
     columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
     before = np.concatenate([e.before.omega for e in evidence])
@@ -88,13 +95,11 @@ def regions(
             low, high = np.quantile(columns[:, axis], COMMON)
             edges = np.linspace(low, max(high, low + 1e-6), BINS + 1)
         place = np.digitize(columns[:, axis], edges) - 1
-        rms = [
-            None if errors is None else _rms(place, errors[:, axis], edges.size - 1)
-            for errors in (before, after, unsure)
-        ]
-        assert rms[0] is not None
-        assert rms[1] is not None
-        found.append(Region(edges, rms[0], rms[1], rms[2]))
+
+        bins = edges.size - 1
+        noise = None if unsure is None else _rms(place, unsure[:, axis], bins)
+        first, last = (_rms(place, errors[:, axis], bins) for errors in (before, after))
+        found.append(Region(edges, first, last, noise))
     return found
 
 

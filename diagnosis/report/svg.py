@@ -4,7 +4,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ INK, GRID, BAND = "#1f2328", "#dde1e6", "#8a919a"
 BEFORE, AFTER, THIRD = "#d55e00", "#0072b2", "#009e73"
 PALETTE = {INK: "ink", GRID: "grid", BAND: "band", BEFORE: "before", AFTER: "after", THIRD: "third"}
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cybership",
     "text.parse_math": False,  # a run may be called $x$
@@ -65,9 +65,11 @@ def inline(figure: "Figure", key: str, label: str) -> str:
         key: letters and digits that no other figure of the page has.
         label: what a reader who cannot see it is told.
     """
-    made = io.BytesIO()
-    figure.savefig(made, format="svg", metadata={"Date": None, "Creator": None})
-    root = ElementTree.fromstring(made.getvalue())
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    made = io.StringIO()
+    FigureCanvasSVG(figure).print_svg(made, metadata={"Date": None, "Creator": None})  # drawn only once
+    root = ElementTree.fromstring(made.getvalue().encode())
     for parent in list(root.iter()):
         for child in [c for c in parent if c.tag in LEFT_OUT]:
             parent.remove(child)

@@ -133,7 +133,9 @@ def curves(effects: Sequence[Mapping[str, Any]], evidence: Sequence[Evidence]) -
         evidence: the runs, for where their data lie.
     """
     drawn = [
-        _curve(e, EFFECTS[e["id"]], sweep, evidence) for e in effects for sweep in SWEEPS.get(e["id"], ())
+        _curve(e, EFFECTS[e["id"]], sweep, evidence)
+        for e in effects
+        for sweep in SWEEPS.get(e["id"], ())
     ]
     return [c for c in drawn if not np.allclose(c.learned, c.nominal)]
 
@@ -168,5 +170,6 @@ def _with(effect: Effect, given: Mapping[str, float]) -> Callable[..., Any]:
 
 def _bound(coefficient: Mapping[str, Any], end: int) -> float:
     """An end of the interval of a coefficient; the value itself where there is none."""
-    interval = coefficient.get("ci95") or (None, None)
-    return coefficient["value"] if interval[end] is None else interval[end]
+    interval = coefficient.get("ci95")
+    bound = interval[end] if interval else None
+    return float(coefficient["value"] if bound is None else bound)

@@ -1,0 +1,337 @@
+"""The report: one page that is whole by itself, and what a browser makes of it."""
+
+import html
+import os
+import re
+import shutil
+import subprocess
+from collections import Counter
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from measured import sail
+
+from diagnosis import clean, smooth
+from diagnosis.evidence import Seen, examine
+from diagnosis.model import Model
+from diagnosis.report import Curve, curves, write_report
+from diagnosis.report.regions import QUANTITIES, regions
+from diagnosis.weak import integrals
+from fmus.effects import EFFECTS
+
+HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
+EVIL = "<script>alert(1)</script> & $x_1$ \" id=\"body' onload='x"
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.fixture(scope="module")
+def data():
+    runs = [sail(40.0, thrusters=HIDDEN, seed=k)[0] for k in range(2)]
+    return [integrals(smooth(clean(replace(r, name=n)))) for r, n in zip(runs, (EVIL, "b"), strict=True)]
+
+
+@pytest.fixture(scope="module")
+def evidence(data):
+    after = Model().plus(HIDDEN)
+    return [examine(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
+
+
+def errors(evidence, after=True):
+    sides = ("before", "after") if after else ("before",)
+    listed = []
+    for e in evidence:
+        seen = {side: getattr(e, side) for side in sides}
+        listed.append(
+            {
+                "run": e.name,
+                "held_out": e.held_out,
+                "window_position_rmse": {side: s.position for side, s in seen.items()},
+                "window_heading_rmse": {side: s.heading for side, s in seen.items()},
+                "omega_rms": {side: s.omega_rms.tolist() for side, s in seen.items()},
+            }
+        )
+    return listed
+
+
+def found(evidence):
+    """What diagnosis.json holds."""
+    values = {n: {"value": v, "unit": "1", "ci95": [v - 0.01, v + 0.01]} for n, v in HIDDEN.items()}
+    effect = {
+        "id": "thrust_curve",
+        "axis": "X",
+        "coefficients": values,
+        "confidence": 0.97,
+        "share_of_error": 0.9,
+        "indistinguishable": ["curve_vsp_x(c)"],
+        "advice": "run astern & <b>slowly</b>",
+    }
+    return {
+        "verdict": "ambiguous",
+        "effects": [effect],
+        "suspect_coefficients": [{"name": "N_r", "z": -4.2, "value": -2.3}],
+        "ranking": [
+            {"id": "thrust_curve", "score": 10.0, "q2": 0.99},
+            {"id": "curve_vsp_x(c)", "score": 12.0, "q2": 0.98},
+            {"id": "X_u", "score": 900.0, "q2": -0.1},
+        ],
+        "data": {"samples": 4000, "frozen": 0, "dropped": 0, "spikes": 0, "used": 4000},
+        "errors": errors(evidence),
+        "stability": {
+            "nominal_min_dissipation": 0.6,
+            "learned_min_dissipation": None,
+            "bounded": True,
+            "region": "|u| < 0.3 m/s",
+        },
+        "sentence": f"The propellers of {EVIL} give too little.",
+        "versions": {"cybership": "0.1.0"},
+    }
+
+
+@pytest.fixture(scope="module")
+def report(evidence, tmp_path_factory):
+    std = [np.full_like(e.before.omega, 0.01) for e in evidence]
+    return write_report(
+        tmp_path_factory.mktemp("report") / "report.html", found(evidence), evidence, std
+    )
+
+
+class Page(HTMLParser):
+    """Elements, attributes and text of a page."""
+
+    EMPTY = ("meta", "br", "link", "img")
+
+    def __init__(self, path):
+        super().__init__()
+        self.tags, self.attributes, self.text, self.open = Counter(), [], [], []
+        self.feed(path.read_text(encoding="utf-8"))
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.handle_startendtag(tag, attrs)
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags[tag] += 1
+        self.attributes += attrs
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+    def values(self, *names):
+        return [value for name, value in self.attributes if name in names]
+
+
+def test_page_is_whole_by_itself(report):
+    page = Page(report)
+    assert not page.open
+    assert page.tags["figure"] == page.tags["figcaption"] == page.tags["svg"] > 10
+    assert not page.tags["script"] + page.tags["link"] + page.tags["img"] + page.tags["iframe"]
+    ids = page.values("id")
+    assert ids
+    assert len(set(ids)) == len(ids)
+    references = page.values("href", "xlink:href", "src")
+    references += [
+        f"#{name}"
+        for v in page.values("clip-path", "style")
+        for name in re.findall(r"url\(#([^)]+)\)", v)
+    ]
+    assert references
+    assert {r[:1] for r in references} == {"#"}
+    assert {r[1:] for r in references} <= set(ids)
+    content = report.read_text(encoding="utf-8")
+    assert not re.search(r"url\((?!#)|@import", content)
+    assert report.stat().st_size < 3e6
+
+
+def test_nobodys_text_becomes_part_of_the_page(report):
+    page = Page(report)
+    text = "".join(page.text)
+    assert text.count(EVIL) >= 4
+    assert "run astern & <b>slowly</b>" in text
+    assert not [name for name, _ in page.attributes if name.startswith("on")]
+    assert "body" not in page.values("id")
+
+
+def test_page_says_what_the_result_says(report, evidence):
+    assert "after" in Page(report).text
+    text = " ".join("".join(Page(report).text).split())
+    for e in evidence:
+        assert f"{1e3 * e.before.position:.3g} → {1e3 * e.after.position:.3g}" in text
+    assert "curve_vsp_x(c)" in text
+    assert "97 %" in text
+    assert "more than one cause" in text
+    assert "−4.2" in text
+
+
+def test_every_colour_follows_the_page(report):
+    """No hexadecimal colour is left in a figure: on a dark screen it could not be seen."""
+    figures = re.findall(r"<svg.*?</svg>", report.read_text(encoding="utf-8"), re.DOTALL)
+    assert figures
+    assert not [
+        c for f in figures for c in re.findall(r'(?:style|fill|stroke)="[^"]*(#[0-9a-fA-F]{6})', f)
+    ]
+
+
+def test_same_input_gives_the_same_bytes(report, evidence, tmp_path):
+    std = [np.full_like(e.before.omega, 0.01) for e in evidence]
+    again = write_report(tmp_path / "again.html", found(evidence), evidence, std)
+    assert again.read_bytes() == report.read_bytes()
+
+
+def test_comparison_has_no_after(data, tmp_path):
+    evidence = [examine(w, Model()) for w in data[1:]]
+    result = {"data": {}, "errors": errors(evidence, after=False), "where": ["Surge is worst <astern>."]}
+    path = write_report(tmp_path / "report.html", result, evidence)
+    text = Page(path).text
+    assert "Surge is worst <astern>." in text
+    assert "model error" in text  # in a legend
+    assert "after" not in text
+
+
+def test_nothing_half_written_stays(evidence, tmp_path, monkeypatch):
+    (tmp_path / "report.html").write_text("old")
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_report(tmp_path / "report.html", found(evidence), evidence[:1], advance=stop)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "old"
+
+
+def test_model_that_runs_away_is_drawn(evidence, tmp_path):
+    e = evidence[0]
+    assert e.windows is not None
+    off = np.where(np.arange(len(e.before.off))[:, None] % 400 > 200, np.inf, e.before.off)
+    wild = replace(e, before=Seen(e.before.omega, off, e.windows.summary(off)))
+    result = {"errors": errors([wild]), "data": {}}
+    assert Page(write_report(tmp_path / "report.html", result, [wild])).tags["svg"]
+
+
+def test_error_by_region_adds_up(evidence):
+    """The mean square of all bins, weighted by their windows, is that of the windows in them."""
+    for quantity in QUANTITIES:
+        values = np.concatenate([quantity.values(e.integrals) for e in evidence])
+        columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
+        omega = np.concatenate([e.before.omega for e in evidence])
+        for axis, region in enumerate(regions(quantity, evidence, None)):
+            count, _ = np.histogram(columns[:, axis], region.edges)
+            known = np.isfinite(region.before)
+            assert known.any()
+            inside = np.digitize(columns[:, axis], region.edges) - 1
+            chosen = np.isin(inside, np.flatnonzero(known))
+            total = np.sum(omega[chosen, axis] ** 2)
+            last = columns[:, axis] == region.edges[-1]  # histogram counts it, bins do not
+            assert not last.any()
+            assert np.sum(count[known] * region.before[known] ** 2) == pytest.approx(total)
+
+
+SHAPES = {
+    "curve_X(u)": {"curve_X_u_4": 0.2},
+    "curve_vsp_x(c)": {"curve_vsp_x_c_11": -0.1},
+    "curve_bow(|u|)": {"curve_bow_u_1": -0.5},
+    "bow_speed_loss": {"bow_speed_loss": 2.0},
+    "deadband": {"deadband": 0.05},
+    "saturation": {"saturation_bow": 1.0},
+    "thrust_curve": HIDDEN,
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_is_that_of_the_effect(name, evidence, tmp_path):
+    given = {n: {"value": v, "unit": "1", "ci95": [v - 0.1, v + 0.1]} for n, v in SHAPES[name].items()}
+    drawn = curves([{"id": name, "coefficients": given}], evidence)
+    assert drawn
+    for c in drawn:
+        assert isinstance(c, Curve)
+        assert c.seen is not None
+        assert c.seen[0] < c.seen[1]
+        assert (c.sure is not None) == EFFECTS[name].linear
+        if c.sure is not None:
+            assert (c.sure[0] <= c.learned + 1e-12).all()
+            assert (c.learned <= c.sure[1] + 1e-12).all()
+    assert curves([{"id": name, "coefficients": {}}], evidence) == []
+
+
+def test_dead_band_is_seen_in_its_shape(evidence):
+    (vsp, bow) = curves([{"id": "deadband", "coefficients": {"deadband": {"value": 0.05}}}], evidence)
+    for c in (vsp, bow):
+        assert np.allclose(c.learned[np.abs(c.x) < 0.05], 0.0)
+        assert np.interp(0.5, c.x, c.learned) == pytest.approx(0.45, abs=1e-9)
+        assert np.allclose(c.learned, -c.learned[::-1])
+
+
+@pytest.fixture
+def browser(tmp_path):
+    """A function that runs headless Chromium without network, and gives what it printed."""
+    if BROWSER is None:
+        reason = "no chromium, chromium-browser or google-chrome on the PATH"
+        if "chromium" in os.environ.get("CYBERSHIP_REQUIRE", ""):
+            pytest.fail(reason)
+        pytest.skip(reason)
+
+    def run(page, *options):
+        command = [
+            BROWSER,
+            "--headless",
+            "--disable-gpu",
+            "--hide-scrollbars",
+            "--enable-logging=stderr",
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            "--virtual-time-budget=5000",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            *(["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []),
+            *options,
+            page.as_uri(),
+        ]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        assert not re.findall(r".*CONSOLE.*", done.stderr)
+        return done.stdout
+
+    return run
+
+
+MEASURE = """<!DOCTYPE html><html><body style="margin:0"><iframe style="border:0;width:{width}px;height:800px"
+srcdoc="{page}"></iframe><script>
+const frame = document.querySelector("iframe");
+window.onload = () => {{
+  const page = frame.contentDocument.documentElement;
+  const figures = [...page.querySelectorAll("svg")].map(f => f.getBoundingClientRect());
+  document.body.dataset.width = page.scrollWidth;
+  document.body.dataset.height = page.scrollHeight;
+  document.body.dataset.figures = figures.length;
+  document.body.dataset.thin = figures.filter(f => f.width < 250 || f.height < 100).length;
+  document.body.dataset.wide = figures.filter(f => f.right > {width}).length;
+}};
+</script></body></html>"""
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_path, width):
+    wrapped = tmp_path / "wrapped.html"
+    content = html.escape(report.read_text(encoding="utf-8"))
+    wrapped.write_text(MEASURE.format(width=width, page=content), encoding="utf-8")
+    seen = dict(re.findall(r'data-(\w+)="(\d+)"', browser(wrapped, "--dump-dom")))
+    assert int(seen["width"]) == width
+    assert int(seen["height"]) > 2000
+    assert int(seen["figures"]) == Page(report).tags["svg"]
+    assert seen["thin"] == seen["wide"] == "0"
+
+
+def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path):
+    dom = browser(report, "--dump-dom")
+    assert "thrust_curve" in dom
+    assert dom.count("<svg") == Page(report).tags["svg"]
+    printed = tmp_path / "report.pdf"
+    browser(report, f"--print-to-pdf={printed}")
+    content = printed.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", content)) >= 3
