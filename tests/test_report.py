@@ -194,6 +194,18 @@ def test_comparison_has_no_after(data, tmp_path):
     assert "after" not in text
 
 
+def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
+    evidence = [replace(examine(w, Model()), windows=None) for w in data[1:]]
+    listed = errors(evidence)
+    listed[0]["window_position_rmse"] = {"before": None, "after": None}
+    nothing = {"effects": [], "suspect_coefficients": [], "ranking": []}
+    result = {"verdict": "none", "data": {}, "errors": listed} | nothing
+    text = " ".join(Page(write_report(tmp_path / "report.html", result, evidence)).text)
+    assert "Nothing is missing" in text
+    assert "None" not in text
+    assert "nan" not in text
+
+
 def test_nothing_half_written_stays(evidence, tmp_path, monkeypatch):
     (tmp_path / "report.html").write_text("old")
 
