@@ -6,12 +6,13 @@ has one shape; any other has several, one for each value of a grid over what ben
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fmus.declare import variables
 from fmus.effects import EFFECTS, Effect
+from fmus.effects.curve import NODES
 from fmus.hull import Damping, Inertia
 from fmus.thrusters.chain import Plant
 
@@ -31,12 +32,16 @@ class Shape:
         free: parameters that scale it.
         offset: (K, 3), the force of what is given alone; None where that is nothing.
         columns: (K, 3, p), force for one unit of each free parameter.
+        moved: (q,), how far the offset also moves what is fitted along; None: nothing is moved.
+        stiff: (p, p), how unlikely the free ones are by themselves, a quadratic form; None: 0.
     """
 
     given: Mapping[str, float]
     free: Sequence[str]
     offset: np.ndarray | None
     columns: np.ndarray
+    moved: np.ndarray | None = None
+    stiff: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +91,26 @@ def shape(
     return Shape(dict(given), list(free), base - start if given else None, stacked)
 
 
+def stiffness(e: Effect, base: np.ndarray, columns: np.ndarray) -> np.ndarray | None:
+    """How unlikely the values of a free curve are by themselves; None for any other effect.
+
+    A bend between neighbouring nodes is likely up to the size at which the curve, were it the same
+    everywhere, would be as large as the whole model error: nodes without data follow their neighbours.
+
+    Args:
+        e: the effect.
+        base: (K, 3), model error.
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    if len(e.coefficients) != NODES:
+        return None
+    unit = np.square(columns.sum(axis=2))
+    axes = unit.sum(axis=0) > 0.0
+    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
+    bend = np.diff(np.eye(NODES), 2, axis=0) / size
+    return bend.T @ bend
+
+
 def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect) -> Candidate:
     """An effect's shapes on these data."""
     if e.id in GRIDS:
@@ -107,7 +132,8 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     else:
         free = [p.name for p in e.parameters if p.name in e.coefficients]
         nearly = e.id in NEARLY or e.kind in NEARLY_KINDS
-        shapes = [shape(data, model, base, {}, free, SMALL if nearly else 1.0)]
+        plain = shape(data, model, base, {}, free, SMALL if nearly else 1.0)
+        shapes = [replace(plain, stiff=stiffness(e, base, plain.columns))]
     return Candidate(e, shapes)
 
 
@@ -121,18 +147,3 @@ def library(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[C
 NOMINAL = {
     v.name: v.start for group in (Inertia, Damping, Plant) for v in variables(group) if v.start != 0.0
 }
-
-
-def doubts(data: Sequence[Integrals], base: np.ndarray, model: Model, prior: float) -> np.ndarray:
-    """What a change of each nominal coefficient by its prior standard deviation adds, (K, 3, q).
-
-    Args:
-        data, model: the runs and the model that is right so far.
-        base: its model error (K, 3).
-        prior: relative standard deviation of every coefficient; 0 means that they are exact.
-    """
-    columns = []
-    for name, start in NOMINAL.items():
-        change = base - evaluate(data, model.plus({name: SMALL * start}))
-        columns.append(change / SMALL * prior)
-    return np.stack(columns, axis=2)

@@ -113,11 +113,14 @@ def shares(run: Run, model: Model) -> list[tuple[Series, float]]:
 
 
 def delayed(time: Series, commands: Series, delay: float) -> Series:
-    """Commands (n, 3) of ``delay`` [s] ago, held in between, zero before the first."""
+    """Commands (n, 3) of ``delay`` [s] ago, mean over each interval, zero before the first."""
     if delay == 0.0:
         return commands
-    index = np.searchsorted(time, time - delay + 1e-9, side="right") - 1
-    return np.where((index >= 0)[:, None], commands[np.clip(index, 0, None)], 0.0)
+    dt = np.append(np.diff(time), np.median(np.diff(time)))
+    edges = np.append(time, time[-1] + dt[-1])
+    sums = np.vstack([np.zeros(3), np.cumsum(commands * dt[:, None], axis=0)])
+    at = np.column_stack([np.interp(edges - delay, edges, sums[:, k]) for k in range(3)])
+    return np.diff(at, axis=0) / dt[:, None]
 
 
 def lagged(time: Series, commands: Series, T: float) -> Series:

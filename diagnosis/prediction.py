@@ -29,7 +29,7 @@ Values = Mapping[str, Any]
 LONGEST_STEP = 0.02  # s
 LAGS = 10.0  # time constants after which a lag has forgotten
 LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond any windows of some seconds
-IDLE = (0.01, 0.01, 0.02)  # m/s, m/s, rad/s: below, the thrusters had not been at work before the run
+IDLE = (0.02, 0.02, 0.05)  # m/s, m/s, rad/s: below, the thrusters had not been at work before the run
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
 

@@ -1,30 +1,30 @@
 """Forward selection: the effect that is missing first, then the next, until nothing more is sure.
 
-After each finding the model takes the effect in, with its parameters refined by Gauss-Newton steps on
-the model error itself, so that the next search starts from a model that is right so far.
+After each finding the model takes the effect in, so that the next search starts from a model that is
+right so far; what was found is refitted along with each further candidate.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .library import Candidate, doubts, evaluate, library
+from .contest import Contest, Step, candidates, contend, same
+from .library import NOMINAL
 from .model import Model
-from .ranking import OVERLAP, Judged, Table, first_share, fit, judge, pieces, table
+from .ranking import RIDGE, Judged, first_share
+from .refining import Point, Problem
+from .waves import Waves, waves
 from .weak import Integrals
 
-GAIN = 0.05
-LEAST = 10.0  # twice a log likelihood ratio that chance does not give among so many candidates
-Q2 = 0.1
-MOST = 4
+WAVES = "waves"
+LEAST = 12.0  # twice a log likelihood ratio that chance does not give among so many candidates
+GAIN = 0.02
+Q2 = 0.05
+SURE = 2.0  # standard errors by which an effect must be better than none
+MOST = 6
 REPLICATES = 200
-SEPARATION = 0.05
-ROUNDS = 4
-# A moment cannot be refined by slopes.
-STEPWISE = ("bow_failure_time",)
-FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
+SUSPECT = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,15 @@ class Ranked:
 
 
 @dataclass(frozen=True, eq=False)
+class Suspect:
+    """A nominal coefficient that is wrong: by how many standard deviations, and what it seems to be."""
+
+    name: str
+    z: float
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
 class Finding:
     """One effect that was found.
 
@@ -46,7 +55,9 @@ class Finding:
         ci95: interval of each that is free, at the final step.
         confidence: share of bootstrap replicates in which it came first.
         alike: ids that these data cannot tell from it, itself not among them.
-        q2: cross-validated share of the model error that is explained.
+        q2: cross-validated share of the model error that is explained, with all found before.
+        share: how much of the cross-validated model error went with this finding.
+        model: with this and all earlier findings, as it was then.
     """
 
     id: str
@@ -55,15 +66,27 @@ class Finding:
     confidence: float
     alike: Sequence[str]
     q2: float
+    share: float
+    model: Model = field(default_factory=Model)
 
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What was learned: findings in order, ranking of the first step, the model that has them all."""
+    """What was learned.
+
+    Attributes:
+        findings: in order.
+        ranking: of the first step.
+        model: with all findings.
+        suspects: nominal coefficients that are wrong.
+        sigma: (3,), noise of each axis [N, N, N m].
+    """
 
     findings: Sequence[Finding] = field(default_factory=list)
     ranking: Sequence[Ranked] = field(default_factory=list)
     model: Model = field(default_factory=Model)
+    suspects: Sequence[Suspect] = field(default_factory=list)
+    sigma: np.ndarray = field(default_factory=lambda: np.ones(3))
 
 
 def learn(
@@ -82,126 +105,107 @@ def learn(
         advance: told what is being done.
         seed: of the bootstrap.
     """
-    model = model or Model()
-    blocks = np.concatenate([10_000 * k + w.block for k, w in enumerate(data)])
     rng = np.random.default_rng(seed)
+    start = model or Model()
+    advance("waves")
+    swell = waves([w.smoothed for w in data], start, rng)
+    blocks = np.concatenate([10_000 * k + w.block for k, w in enumerate(data)])
+    p, at = Problem(data, blocks, None, prior), Point(start)
+    advance("every effect as a candidate")
+    step = first = candidates(p, at, set())
+    p = replace(p, sigma=first.wide.sigma)
+    contest: Contest | None = None
+    ranking: list[Ranked] = []
     findings: list[Finding] = []
-    first: list[Ranked] = []
-    for step in range(MOST):
-        advance(f"step {step + 1}: every effect as a candidate")
-        base = evaluate(data, model)
-        done = {f.id for f in findings}
-        candidates = [c for c in library(data, model, base) if c.effect.id not in done]
-        t = table(base, blocks, candidates, doubts(data, base, model, prior), FLOOR)
-        ranked = sorted(
-            (judge(t, k, len(c.shapes)) for k, c in enumerate(candidates)), key=lambda j: j.score
-        )
-        if step == 0:
-            total = float(t.grams[:, 0, 0].sum())
-            first = [
-                Ranked(candidates[j.candidate].effect.id, j.score, 1.0 - j.blocks.sum() / total)
-                for j in ranked
-            ]
-        best = ranked[0]
-        if not accepted(t, judge(t, -1, 1), best):
+    while len(findings) < MOST:
+        advance(f"effect {len(findings) + 1}: the best candidates where they fit best")
+        contest = contend(p, at, step)
+        ranking = ranking or ranked(step, contest)
+        if not accepted(step.nothing, contest.judged[0], first.size):
             break
-        advance(f"step {step + 1}: how sure is it")
-        confidence = first_share(t, ranked[:10], REPLICATES, rng)[0]
-        found = candidates[best.candidate]
-        values, std = refine(data, model, start_values(t, found, best), t.sigma, prior)
-        ci95 = {n: (values[n] - 1.96 * s, values[n] + 1.96 * s) for n, s in std.items()}
-        alike = [candidates[j.candidate].effect.id for j in ranked[1:] if same(t, best, j)]
-        q2 = explained(t, best)
-        findings.append(Finding(found.effect.id, values, ci95, float(confidence), alike, q2))
-        model = model.plus(values)
-    return Learned(findings, first, model)
+        advance(f"effect {len(findings) + 1}: how sure is it")
+        findings.append(finding(step, contest, first.size, rng))
+        at = contest.winner
+        findings[-1] = replace(findings[-1], model=at.model(prior))
+        advance(f"effect {len(findings) + 1}: every effect as a candidate")
+        step = candidates(p, at, {f.id for f in findings})
+    shift, std = posterior(p, at, step)
+    names = at.fitted
+    ci95 = {n: interval(at.values[n], float(s)) for n, s in zip(names, std, strict=False)}
+    for k, f in enumerate(findings):  # as refitted along with the later ones
+        values = {n: at.values[n] for n in f.values}
+        findings[k] = replace(f, values=values, ci95={n: c for n, c in ci95.items() if n in values})
+    suspects = suspected(prior, shift[len(names) :], std[len(names) :]) if prior > 0.0 else []
+    if swell is not None:
+        findings.insert(0, of_waves(swell, start))
+        ranking = [Ranked(WAVES, 0.0, swell.share), *ranking]
+    return Learned(
+        findings, ranking, at.model(prior) if at.values else start, suspects, first.wide.sigma
+    )
 
 
-def explained(t: Table, j: Judged) -> float:
-    """Q2 = 1 - PRESS/SS, about zero."""
-    return 1.0 - float(j.blocks.sum()) / float(t.grams[:, 0, 0].sum())
+def ranked(step: Step, contest: Contest) -> list[Ranked]:
+    """Every candidate in order."""
+    best = [(contest.ids[j.candidate], j) for j in contest.judged]
+    rest = [(step.candidates[j.candidate].effect.id, j) for j in step.order[len(best) :]]
+    found = [Ranked(i, j.score, 1.0 - float(j.blocks.sum()) / step.size) for i, j in best + rest]
+    return sorted(found, key=lambda r: r.score)
 
 
-def accepted(t: Table, nothing: Judged, best: Judged) -> bool:
-    """Whether a candidate is more than chance and more than the nominal coefficients' doubt."""
-    gain = nothing.score - best.score
-    return gain > max(GAIN * nothing.score, LEAST) and explained(t, best) > Q2
-
-
-def same(t: Table, best: Judged, other: Judged) -> bool:
-    """Whether another candidate is within two paired standard errors, or can do what the best does."""
-    d = other.blocks - best.blocks
-    behind = float(d.sum()) + other.charge - best.charge
-    if behind <= 2.0 * float(np.sqrt(len(d)) * d.std()):
-        return True
-    return separation(t, best, other) < SEPARATION
-
-
-def separation(t: Table, best: Judged, other: Judged) -> float:
-    """Share of the best one's force that the other and the nominal coefficients cannot give."""
-    mine, its = (pieces(t, j.candidate, j.shape) for j in (best, other))
-    force = -mine.target
-    force[mine.free] += mine.fitted(t.total, t.nuisance).beta
-    force[0] = 0.0
-    given = its.target.copy()
-    given[0] = 0.0
-    alone = fit(t.total, force, [], t.nuisance)
-    with_other = fit(t.total, force + given, its.free, t.nuisance)
-    costs = [float(f.loss(t.total)) + f.unlikely for f in (alone, with_other)]
-    return costs[1] / max(costs[0], 1e-12)
-
-
-class Refined(NamedTuple):
-    """Parameters of an effect, and the standard deviation of those that were fitted."""
-
-    values: dict[str, float]
-    std: dict[str, float]
-
-
-def start_values(t: Table, candidate: Candidate, best: Judged) -> Refined:
-    """Parameters by the linear fit; those without any data stay out."""
-    shape = candidate.shapes[best.shape]
-    mine = pieces(t, best.candidate, best.shape)
-    beta = dict(zip(mine.free, mine.fitted(t.total, t.nuisance).beta, strict=True))
-    columns = t.place[best.candidate, best.shape][1]
-    found = {n: float(beta[k]) for n, k in zip(shape.free, columns, strict=True) if k in beta}
-    bent = {name: 0.0 for name in shape.given if name not in STEPWISE}
-    return Refined(dict(shape.given) | found, dict.fromkeys(found, 0.0) | bent)
-
-
-def refine(
-    data: Sequence[Integrals], model: Model, begin: Refined, sigma: np.ndarray, prior: float
-) -> Refined:
-    """Gauss-Newton steps on the model error, with the nominal coefficients in doubt.
+def finding(step: Step, contest: Contest, size: float, rng: np.random.Generator) -> Finding:
+    """What is to be said of the best candidate.
 
     Args:
-        data, model: the runs and the model without the effect.
-        begin: parameters to start from; those in ``std`` are fitted.
-        sigma: (3,), noise of each axis.
-        prior: relative standard deviation of the nominal coefficients.
+        step, contest: the step that found it.
+        size: sum of squares of the model error at first.
+        rng: for the bootstrap.
     """
-    values, live = dict(begin.values), list(begin.std)
-    if not live:
-        return begin
-    scale = 1.0 / sigma / np.sqrt(OVERLAP)
-    std = np.zeros(len(live))
-    for _ in range(ROUNDS):
-        now = model.plus(values)
-        left = evaluate(data, now)
-        slopes = []
-        for name in live:
-            small = 1e-3 * max(abs(values[name]), 1e-2)
-            moved = evaluate(data, model.plus(values | {name: values[name] + small}))
-            slopes.append((left - moved) / small)
-        A = np.concatenate([np.stack(slopes, axis=2), doubts(data, left, now, prior)], axis=2)
-        A = np.moveaxis(A * scale[:, None], 2, 0).reshape(A.shape[2], -1).T
-        H = A.T @ A
-        ridge = np.ones(len(H))
-        ridge[: len(live)] = 1e-9 * np.diag(H)[: len(live)]
-        H += np.diag(ridge)
-        delta = np.linalg.solve(H, A.T @ (left * scale).reshape(-1))[: len(live)]
-        std = np.sqrt(np.diag(np.linalg.inv(H))[: len(live)])
-        values |= {n: values[n] + float(d) for n, d in zip(live, delta, strict=True)}
-        if (np.abs(delta) < 0.1 * std).all():
-            break
-    return Refined(values, dict(zip(live, std.tolist(), strict=True)))
+    first, *others = contest.judged
+    left, before = float(first.blocks.sum()), float(step.nothing.blocks.sum())
+    return Finding(
+        contest.ids[first.candidate],
+        contest.starts[first.candidate].values,
+        {},
+        float(first_share(contest.table, contest.judged, REPLICATES, rng)[0]),
+        [contest.ids[j.candidate] for j in others if same(contest.table, first, j)],
+        1.0 - left / size,
+        (before - left) / size,
+    )
+
+
+def of_waves(swell: Waves, start: Model) -> Finding:
+    """Waves as a finding: the model stays as it is."""
+    values = {"wave_peak": swell.peak, "wave_force": swell.force}
+    return Finding(WAVES, values, {}, swell.confidence, [], swell.share, swell.share, start)
+
+
+def interval(value: float, std: float) -> tuple[float, float]:
+    """95 % interval."""
+    return value - 1.96 * std, value + 1.96 * std
+
+
+def posterior(p: Problem, at: Point, step: Step) -> tuple[np.ndarray, np.ndarray]:
+    """Where everything that was fitted is (q,), and its standard deviation."""
+    doubt, weight = step.doubt, p.weight
+    A = np.moveaxis(doubt.columns * weight[:, None], 2, 0).reshape(doubt.moved.size, -1).T
+    H = A.T @ A + doubt.stiff
+    H += RIDGE * np.diag(np.diag(H) + 1.0)
+    delta = np.linalg.solve(H, A.T @ (step.base * weight).reshape(-1) - doubt.stiff @ doubt.moved)
+    return doubt.moved + delta, np.sqrt(np.diag(np.linalg.inv(H)))
+
+
+def suspected(prior: float, shift: np.ndarray, std: np.ndarray) -> list[Suspect]:
+    """Nominal coefficients that lie far from what is believed of them, the surest first."""
+    found = [
+        Suspect(name, float(k / s), start * (1.0 + prior * float(k)))
+        for (name, start), k, s in zip(NOMINAL.items(), shift, std, strict=True)
+    ]
+    return sorted((s for s in found if abs(s.z) > SUSPECT), key=lambda s: -abs(s.z))
+
+
+def accepted(nothing: Judged, best: Judged, total: float) -> bool:
+    """Whether a candidate is more than chance and more than the nominal coefficients' doubt."""
+    gain = nothing.score - best.score
+    d = nothing.blocks - best.blocks
+    sure = float(d.sum()) > SURE * float(np.sqrt(len(d)) * d.std())
+    return gain > max(GAIN * nothing.score, LEAST) and sure and best.blocks.sum() < (1.0 - Q2) * total

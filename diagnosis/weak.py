@@ -4,12 +4,15 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from fmus.effects import EFFECTS
 from fmus.hull import mass_matrix
 
 from .measurement import Run
@@ -20,6 +23,7 @@ from .smoothing import Smoothed
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
 BLOCK = 15.0  # s
+MEASURED = [p.name for e in EFFECTS.values() if e.kind == "measurement" for p in e.parameters]
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -45,6 +49,7 @@ class Integrals:
         block: (K,), number of the 15 s block that the middle lies in.
         smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
             times one that is held from each sample to the next.
+        memory: parts of the model error that were computed lately.
     """
 
     smoothed: Smoothed
@@ -53,6 +58,7 @@ class Integrals:
     smooth: csr_matrix
     slope: csr_matrix
     held: csr_matrix
+    memory: dict[tuple[str, Any], Any] = field(default_factory=dict, repr=False)
 
     @property
     def run(self) -> Run:
@@ -62,6 +68,20 @@ class Integrals:
     def known(self) -> np.ndarray:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
+
+    def recall(self, what: str, key: Any, make: Callable[[], Any]) -> Any:
+        """A part of the model error, from memory if it was computed for the same parameters lately.
+
+        Of two models that differ in the hull alone the thrust is the same, and so on.
+        """
+        found = self.memory.pop((what, key), None)
+        if found is None:
+            found = make()
+            older = [k for k in self.memory if k[0] == what]
+            for k in older[: len(older) + 1 - KEPT]:
+                del self.memory[k]
+        self.memory[what, key] = found  # the last in order is the latest
+        return found
 
 
 def integrals(smoothed: Smoothed) -> Integrals:
@@ -105,14 +125,23 @@ def integrals(smoothed: Smoothed) -> Integrals:
 
 
 NOMINAL = np.array(mass_matrix(Model().hull.hull.inertia))
+KEPT = 3
 
 
 def omega(w: Integrals, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window."""
+    seen = tuple((name, model.vessel.get(name, 0.0)) for name in MEASURED)
+    ship = (seen, tuple(sorted(model.vessel.items())))
+    drive = (seen, tuple(sorted(model.thrusters.items())), model.clock)
+    eta, nu, moved = w.recall("motion", seen, lambda: _motion(w, model))
+    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+    driven = w.recall("driven", drive, lambda: w.held @ thrust(w.run, model, nu))
+    return (moved - free - by_mass(model, driven)) @ NOMINAL.T
+
+
+def _motion(w: Integrals, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
     motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
     eta, nu = (np.concatenate(part).T for part in motion)
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
-    free = acceleration(model, w.run.time, eta, nu)
-    driven = by_mass(model, thrust(w.run, model, nu))
-    lacking = w.slope @ nu - w.smooth @ free - w.held @ driven
-    return lacking @ NOMINAL.T
+    return eta, nu, w.slope @ nu

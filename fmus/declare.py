@@ -11,7 +11,7 @@ import pkgutil
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 
@@ -124,11 +124,13 @@ def _shape(cls: type[Any]) -> list[type[Any] | None]:
     return [_nested(cls, name, hint) for name, hint in get_type_hints(cls).items()]
 
 
+@cache
 def width(cls: type[Any]) -> int:
     """How many scalars a NamedTuple class holds, nested ones included."""
     return sum(1 if nested is None else width(nested) for nested in _shape(cls))
 
 
+@cache
 def packer(cls: type[Any]) -> Callable[[Sequence[Any]], Any]:
     """A function that turns a flat sequence of scalars into an instance of the class."""
     shape = _shape(cls)

@@ -1,0 +1,122 @@
+"""Waves, told by a peak in the spectrum of the model error.
+
+They come and go with no parameter of the ship, so they are looked for before anything is fitted, and no
+constant is fitted to them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import spectrogram
+
+from fmus.frames import rotate_to_body
+from fmus.hull import mass_matrix
+
+from .model import Model, acceleration, by_mass, thrust
+from .smoothing import Smoothed
+
+BAND = (0.25, 1.2)  # Hz, in which waves are looked for
+PEAK = 12.0  # times the spectrum around it
+AROUND = 0.9  # Hz, of the spectrum around
+SEGMENT = 25.0  # s
+NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
+REPLICATES = 200
+RATE = 10.0  # Hz; beyond half of it nothing is of interest
+MASS = np.array(mass_matrix(Model().hull.hull.inertia))
+
+
+@dataclass(frozen=True)
+class Waves:
+    """What the spectrum tells.
+
+    Attributes:
+        peak: frequency [rad/s].
+        force: standard deviation of the horizontal force around the peak [N].
+        share: of the model error's power, on the axis where they stand out most.
+        confidence: share of bootstrap replicates in which they stand out.
+    """
+
+    peak: float
+    force: float
+    share: float
+    confidence: float
+
+
+class Peak(NamedTuple):
+    """A peak above the spectrum around it: index of frequency and axis, how many times higher."""
+
+    row: int
+    axis: int
+    height: float
+
+
+def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> Waves | None:
+    """The waves in some runs, if there are any.
+
+    Args:
+        runs: smoothed runs.
+        model: what it leaves over is looked at.
+        rng: for the bootstrap.
+    """
+    parts = [part for run in runs for part in stretches(model_error(run, model), run.time)]
+    if not parts:
+        return None
+    length = round(SEGMENT * RATE)
+    frequency, _, _ = spectrogram(parts[0], RATE, nperseg=length, axis=0)
+    segments = np.concatenate(
+        [spectrogram(x, RATE, nperseg=length, axis=0, detrend="linear")[2] for x in parts], axis=-1
+    )
+    power = segments.mean(axis=-1)
+    level, found = peak(frequency, power)
+    if found.height < PEAK:
+        return None
+    count = segments.shape[-1]
+    draws = rng.integers(0, count, (REPLICATES, count))
+    heights = [peak(frequency, segments[..., d].mean(axis=-1))[1].height for d in draws]
+    at = float(frequency[found.row])
+    near = np.abs(frequency - at) < NEAR * at
+    extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
+    return Waves(
+        2.0 * np.pi * at,
+        float(np.sqrt(extra[:2].sum() * frequency[1])),
+        float(extra[found.axis] / power[:, found.axis].sum()),
+        float(np.mean(np.array(heights) >= PEAK)),
+    )
+
+
+def peak(frequency: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, Peak]:
+    """The spectrum around each frequency (m, 3), and the highest peak above it in the waves' band."""
+    width = 2 * int(AROUND / frequency[1] / 2.0) + 1
+    level = median_filter(power, size=(width, 1), mode="nearest")
+    inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
+    height = np.where(inside[:, None], power / np.maximum(level, 1e-12), 0.0)
+    row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
+    return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def model_error(run: Smoothed, model: Model) -> np.ndarray:
+    """omega (n, 3) [N, N, N m] by the smoothed acceleration, NaN where there is none."""
+    u_dot, v_dot = rotate_to_body(run.eta[:, 2], run.eta_ddot[:, 0], run.eta_ddot[:, 1])
+    u, v, r = run.nu.T
+    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, run.eta_ddot[:, 2]])
+    driven = by_mass(model, thrust(run.track.run, model, np.nan_to_num(run.nu)))
+    return (nu_dot - acceleration(model, run.time, run.eta, run.nu) - driven) @ MASS.T
+
+
+def stretches(error: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, at RATE."""
+    known = np.isfinite(error).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    found = []
+    for first, end in edges.reshape(-1, 2):
+        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / RATE)
+        if even.size < SEGMENT * RATE:
+            continue
+        # Means over each interval: what is quicker must not pass for something slow.
+        sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
+        at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
+        found.append(np.diff(at, axis=0) * RATE)
+    return found
