@@ -133,8 +133,9 @@ class Description:
 
     def variable(self, index: int | None) -> Variable | None:
         """By one-based index; None if there is none."""
-        known = index is not None and 1 <= index <= len(self.variables)
-        return self.variables[index - 1] if known else None
+        if index is None or not 1 <= index <= len(self.variables):
+            return None
+        return self.variables[index - 1]
 
     def unknowns(self, element: str) -> list[Unknown] | None:
         """Entries of Outputs, Derivatives or InitialUnknowns; None without that element."""
@@ -159,7 +160,8 @@ class Description:
     def time(self) -> tuple[float, float]:
         """Start [s] and step [s] of the default experiment, made up where it is silent."""
         start = number(self.experiment.get("startTime")) or 0.0
-        duration = (number(self.experiment.get("stopTime")) or start + 1.0) - start
+        duration = number(self.experiment.get("stopTime", "inf")) or 0.0
+        duration -= start
         step = number(self.experiment.get("stepSize")) or 0.0
         if not 0.0 < step < math.inf:
             step = duration / 100.0 if 0.0 < duration < math.inf else 0.01

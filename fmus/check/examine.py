@@ -74,6 +74,8 @@ def _prepare(fmu: Fmu, folder: Path) -> str:
         return f"there is no binary for {platform()}"
     if any(RULES["archive"].check(fmu)):
         return "its archive is not to be trusted"
+    if not all(v.type and v.reference is not None for v in fmu.description.variables):
+        return "variables have no type or no value reference"
     try:
         fmu.unpack(folder)
         (folder / "resources").mkdir(exist_ok=True)

@@ -2,6 +2,7 @@
 
 import sys
 import zipfile
+import zlib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -50,7 +51,7 @@ class Fmu:
                 text = archive.read("modelDescription.xml")
         except KeyError:
             raise BadFileError(f"'{path}' is not an FMU: it has no modelDescription.xml") from None
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError) as error:
             raise BadFileError(f"'{path}' is not an FMU: {error}") from None
         if b"<!ENTITY" in text:
             raise BadFileError(

@@ -66,7 +66,9 @@ def serialised_state(bench: Bench) -> Iterator[str]:
 
 @trial("2.1.5, 4.3.1")
 def instances(bench: Bench) -> Iterator[str]:
-    """Two instances do not disturb each other, unless canBeInstantiatedOnlyOncePerProcess is said."""
+    """Two instances do not disturb each other, unless canBeInstantiatedOnlyOncePerProcess is
+    declared.
+    """
     alone = bench.play(bench.ready(), STEPS, seed=0)
     one, other = bench.ready(), bench.ready()
     rows = []
