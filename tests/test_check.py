@@ -181,6 +181,8 @@ MISBEHAVING = [
                           ("((Lag *)c)->s = *(State *)s", "double k = ((Lag *)c)->s.hidden; ((Lag *)c)->s = *(State *)s; ((Lag *)c)->s.hidden = k")], [], "a new instance"),
     ("instances", [(STEP, "shared += s->u; s->y += shared + h")], [], "beside another instance"),
     ("initial-dependencies", [], [('index="3" dependencies="2"', 'index="3" dependencies="1"')], "y follows T while initialising"),
+    ("step-dependencies", [("double all[] = {s.u, y, s.T, s.T * s.u", "double all[] = {s.u, y, s.T, s.hidden"), (STEP, "s->hidden = s->T * s->u; s->y += h")],
+                          [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] over a step of no length"),
     ("output-dependencies", [], [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] without a step"),
 ]  # fmt: skip
 
@@ -229,6 +231,17 @@ def test_fmu_without_abilities_is_not_asked_for_them(tmp_path):
     )
     outcomes = examine(Fmu(path), [RULES[name] for name in ("state", "serialised-state", "step-size")])
     assert all(not o.found and "not declared" in o.skipped for o in outcomes.values())
+
+
+def test_plain_python_fmu_that_denies_what_its_step_does(plain_fmu):
+    lie = [('<Unknown index="2"/>', '<Unknown index="2" dependencies=""/>')]
+    gain = plain_fmu("Gain", GAIN, "self.y = 2.0 * self.x\nreturn True", lie)
+    assert "y follows x over a step" in found(gain, "step-dependencies")["step-dependencies"][0]
+    integral = plain_fmu("Integral", GAIN, "self.y += h * self.x\nreturn True", lie)
+    assert found(integral, "step-dependencies") == {}
+    sampled = plain_fmu("Sampled", GAIN, "self.y = 2.0 * self.x\nreturn True",
+                        [*lie, ('causality="input"', 'causality="input" variability="discrete"')])  # fmt: skip
+    assert found(sampled, "step-dependencies") == {}
 
 
 def test_plain_python_fmu_with_a_hidden_state_and_a_fatal_step(plain_fmu):

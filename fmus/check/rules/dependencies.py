@@ -2,9 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
+from ..api import StatusError
 from ..bench import Bench, near, same, start_value
 from ..description import Unknown, Variable
-from ..registry import trial
+from ..registry import NotApplicableError, trial
+
+# Two short steps, as shares of the usual one.
+SHORT, SHORTER = 1e-3, 1e-6
 
 
 def _told(bench: Bench, element: str) -> list[tuple[Variable, set[int | None]]]:
@@ -37,10 +41,7 @@ def initial_dependencies(bench: Bench) -> Iterator[str]:
 
 @trial("2.2.8")
 def output_dependencies(bench: Bench) -> Iterator[str]:
-    """At a communication point, before the next step, an output changes only with inputs that it lists.
-
-    What an input does during a step goes through the state, and is nothing that Outputs would list.
-    """
+    """At a communication point, before the next step, an output follows only inputs it lists."""
     told = _told(bench, "Outputs")
     outputs = [v for v, _ in told]
     one = bench.ready()
@@ -53,6 +54,47 @@ def output_dependencies(bench: Bench) -> Iterator[str]:
         one.set({v: _other(v, usual)})
         yield from _undeclared(told, v, _moved(outputs, before, one.get(outputs)), "without a step")
         one.set({v: usual})
+
+
+@trial("2.2.7, 2.2.8")
+def step_dependencies(bench: Bench) -> Iterator[str]:
+    """Over a step that shrinks to nothing, an output follows only inputs that it lists, or that are
+    discrete: those act at communication points by convention.
+
+    What follows an input through a state shrinks with the step, what follows it directly does not.
+    """
+    bench.needs("canHandleVariableCommunicationStepSize")
+    told = _told(bench, "Outputs")
+    outputs = [v for v, _ in told]
+    usual = [_after(bench, outputs, share) for share in (SHORT, SHORTER)]
+    for v in bench.description.inputs():
+        if v.type != "Real" or v.variability != "continuous":
+            continue
+        changed = [_after(bench, outputs, share, v) for share in (SHORT, SHORTER)]
+        moved = set()
+        for k, output in enumerate(outputs):
+            large, small = (abs(b[k] - a[k]) for a, b in zip(usual, changed, strict=True))
+            if small > 1e-8 * max(1.0, abs(usual[1][k])) and small > 0.1 * large:
+                moved.add(output.name)
+        yield from _undeclared(told, v, moved, "over a step of no length")
+
+
+def _after(
+    bench: Bench, outputs: Sequence[Variable], share: float, changed: Variable | None = None
+) -> list[float]:
+    """Outputs of a new instance after some steps and a short one, for which one input may be changed."""
+    one = bench.ready()
+    bench.play(one, 3, seed=0)
+    if changed is not None:
+        (usual,) = one.get([changed])
+        one.set({changed: _other(changed, usual)})
+    try:
+        one.step(bench.start + 3 * bench.step, share * bench.step)
+    except StatusError as refused:
+        raise NotApplicableError(f"so short a step is not for it: {refused}") from None
+    found = one.get(outputs)
+    one.free()
+    return found
 
 
 def _other(v: Variable, value: float) -> float:
