@@ -36,6 +36,7 @@ from .units import base_exponents
 ROOT = Path(__file__).parent
 FACE = "fmus.slave"
 EFFECTS = "fmus.effects"
+CHECKER = ROOT / "check"  # judges FMUs, and is in none
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -206,7 +207,7 @@ def _source_hash(own_file: Path | None) -> str:
     """Hash of everything that a build reads."""
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     own = [*registry.LOADED.values(), *([own_file] if own_file else [])]
-    for path in [*sorted(ROOT.rglob("*.py")), *own]:
+    for path in [*sorted(p for p in ROOT.rglob("*.py") if CHECKER not in p.parents), *own]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 

@@ -69,7 +69,9 @@ def _variables(root: Element, component: Component) -> None:
         if reference < parameters:
             kind = {"causality": "parameter", "variability": "fixed" if v.fixed else "tunable"}
         elif reference < parameters + inputs:
-            kind = {"causality": "input", "variability": "continuous"}
+            # What only counts at communication points is what the standard calls discrete.
+            held = v.name in component.held
+            kind = {"causality": "input", "variability": "discrete" if held else "continuous"}
         else:
             kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
         scalar = SubElement(

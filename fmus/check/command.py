@@ -1,0 +1,144 @@
+"""The command line."""
+
+import argparse
+import difflib
+import json
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+
+from ..build import BuildError, build
+from ..declare import DeclarationError
+from .examine import examine
+from .fmu import BadFileError, Fmu
+from .registry import RULES, Rule, in_order
+from .report import Outcomes, as_json, listing, show
+
+CLEAN, FINDINGS, BAD_INPUT = 0, 1, 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns 0 without findings, 1 with, 2 for bad input."""
+    options = _parser().parse_args(arguments)
+    if options.list:
+        print(listing(), end="")
+        return CLEAN
+    try:
+        fmus = [Fmu(path) for path in _paths(options.files)]
+        chosen = _chosen(options.only)
+    except (BadFileError, BuildError, DeclarationError, OSError) as error:
+        print("error:", " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    outcomes = _examine_all(fmus, chosen, options)
+    if options.json:
+        print(json.dumps(as_json(fmus, chosen, outcomes), indent=1))
+    else:
+        with suppress(BrokenPipeError):
+            show(fmus, chosen, outcomes)
+    return FINDINGS if any(o.found for of in outcomes for o in of.values()) else CLEAN
+
+
+def _paths(files: Sequence[str]) -> list[Path]:
+    """FMU files; a bare name is one of ours, and nothing means all of ours."""
+    if not files:
+        return build([])
+    return [Path(f) if Path(f).exists() or not _is_name(f) else build([f])[0] for f in files]
+
+
+def _is_name(text: str) -> bool:
+    return Path(text).name == text and not Path(text).suffix
+
+
+def _chosen(names: Sequence[str]) -> list[Rule]:
+    for name in names:
+        if name not in RULES:
+            near = difflib.get_close_matches(name, RULES, 1, 0.5)
+            hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(RULES)}"
+            raise BadFileError(f"no rule '{name}'; {hint}")
+    return [rule for rule in in_order() if not names or rule.name in names]
+
+
+def _examine_all(
+    fmus: Sequence[Fmu], chosen: Sequence[Rule], options: argparse.Namespace
+) -> list[Outcomes]:
+    """All FMUs, some at a time, with a bar on a terminal."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    stopped = threading.Event()
+    with (
+        Progress(console=console, transient=True, disable=not console.is_terminal) as bar,
+        ThreadPoolExecutor(options.jobs) as pool,
+    ):
+        task = bar.add_task("checking", total=len(fmus) * len(chosen))
+
+        def after_each_rule() -> None:
+            bar.advance(task)
+            if stopped.is_set():
+                raise KeyboardInterrupt
+
+        running = [
+            pool.submit(examine, fmu, chosen, options.timeout, not options.no_run, after_each_rule)
+            for fmu in fmus
+        ]
+        try:
+            return [future.result() for future in running]
+        except KeyboardInterrupt:
+            stopped.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"needs a positive number, not '{text}'")
+    return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"needs a whole number above zero, not '{text}'")
+    return int(text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m fmus.check",
+        description="Check FMI 2.0 co-simulation FMUs, ours or anybody's, against the standard.",
+        epilog="examples:  python -m fmus.check\n"
+        "           python -m fmus.check mine.fmu other.fmu\n"
+        "           python -m fmus.check vessel --json\n"
+        "           python -m fmus.check mine.fmu --no-run\n"
+        "exit codes: 0 no findings, 1 findings, 2 bad input, 130 interrupted\n"
+        "An FMU is a program, and checking it runs it: --no-run only reads it.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="FMU, or the name of one of ours (all of ours)"
+    )
+    parser.add_argument("--json", action="store_true", help="everything as JSON, no table")
+    parser.add_argument("--list", action="store_true", help="all rules as Markdown")
+    parser.add_argument(
+        "--only", metavar="RULE", action="append", default=[], help="only this rule; may be repeated"
+    )
+    parser.add_argument("--no-run", action="store_true", help="only read the FMU, run nothing of it")
+    parser.add_argument(
+        "--timeout", type=_positive, default=60.0, metavar="S", help="for each rule that runs it (60)"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=_count,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="FMUs at a time (processors)",
+    )
+    return parser

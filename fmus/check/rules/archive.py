@@ -1,0 +1,47 @@
+"""What lies in the archive (2.3)."""
+
+import stat
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+
+from ..fmu import Fmu, suffix
+from ..registry import rule
+
+
+@rule("2.3")
+def archive(fmu: Fmu) -> Iterator[str]:
+    """Every path in the archive is relative, stays inside, occurs once, is no link and has forward
+    slashes.
+    """
+    for member in fmu.members:
+        # ZipInfo.filename has been tidied already; what was written is in orig_filename.
+        name = member.orig_filename
+        path = PurePosixPath(name)
+        if "\\" in name:
+            yield f"'{name}' has a backslash"
+        if path.is_absolute() or ".." in path.parts or ":" in path.parts[:1]:
+            yield f"'{name}' leaves the folder that it is unpacked to"
+        if stat.S_ISLNK(member.external_attr >> 16):
+            yield f"'{name}' is a link"
+    for name, times in Counter(member.filename for member in fmu.members).items():
+        if times > 1:
+            yield f"'{name}' is there {times} times"
+
+
+@rule("2.3")
+def binaries(fmu: Fmu) -> Iterator[str]:
+    """Each folder of a platform holds the library that modelIdentifier names; without any, there are
+    sources.
+    """
+    names = {member.filename for member in fmu.members}
+    identifier = fmu.description.cs.get("modelIdentifier", "")
+    folders = {
+        PurePosixPath(n).parts[1] for n in names if n.startswith("binaries/") and n.count("/") > 1
+    }
+    for folder in sorted(folders):
+        library = f"binaries/{folder}/{identifier}{suffix(folder)}"
+        if suffix(folder) and library not in names:
+            yield f"'{library}' is missing"
+    if not any(map(suffix, folders)) and not any(n.startswith("sources/") for n in names):
+        yield "there are neither binaries of a platform that the standard names, nor sources"

@@ -1,0 +1,115 @@
+"""Dependencies held against what the FMU does when one value is changed (2.2.8)."""
+
+from collections.abc import Iterator, Sequence
+
+from ..api import StatusError
+from ..bench import Bench, near, same, start_value
+from ..description import Unknown, Variable
+from ..registry import NotApplicableError, trial
+
+# Two short steps, as shares of the usual one.
+SHORT, SHORTER = 1e-3, 1e-6
+
+
+def _told(bench: Bench, element: str) -> list[tuple[Variable, set[int | None]]]:
+    """Real unknowns that list their dependencies, with those; without a list, any may be."""
+    listed: list[Unknown] = bench.description.unknowns(element) or []
+    pairs = [(bench.description.variable(u.index), u.dependencies) for u in listed]
+    return [(v, set(d)) for v, d in pairs if v is not None and v.type == "Real" and d is not None]
+
+
+@trial("2.2.8")
+def initial_dependencies(bench: Bench) -> Iterator[str]:
+    """While initialising, an unknown changes only with what its dependencies in InitialUnknowns list."""
+    told = _told(bench, "InitialUnknowns")
+    unknowns = [v for v, _ in told]
+    one = bench.initialising()
+    for known in bench.description.variables:
+        if known.type != "Real" or not (known.causality == "input" or known.initial == "exact"):
+            continue
+        if not known.settable or start_value(known) is None:
+            continue
+        moved: set[str] = set()
+        for share in (1.0, -0.3):
+            before = one.get(unknowns)
+            one.set({known: near(known, share)})
+            moved |= _moved(unknowns, before, one.get(unknowns))
+            one.set({known: start_value(known)})
+        yield from _undeclared(told, known, moved, "while initialising")
+    one.free()
+
+
+@trial("2.2.8")
+def output_dependencies(bench: Bench) -> Iterator[str]:
+    """At a communication point, before the next step, an output follows only inputs it lists."""
+    told = _told(bench, "Outputs")
+    outputs = [v for v, _ in told]
+    one = bench.ready()
+    bench.play(one, 5, seed=0)
+    for v in bench.description.inputs():
+        if v.type != "Real":
+            continue
+        (usual,) = one.get([v])
+        before = one.get(outputs)
+        one.set({v: _other(v, usual)})
+        yield from _undeclared(told, v, _moved(outputs, before, one.get(outputs)), "without a step")
+        one.set({v: usual})
+
+
+@trial("2.2.7, 2.2.8")
+def step_dependencies(bench: Bench) -> Iterator[str]:
+    """Over a step that shrinks to nothing, an output follows only inputs that it lists, or that are
+    discrete: those act at communication points by convention.
+
+    What follows an input through a state shrinks with the step, what follows it directly does not.
+    """
+    bench.needs("canHandleVariableCommunicationStepSize")
+    told = _told(bench, "Outputs")
+    outputs = [v for v, _ in told]
+    usual = [_after(bench, outputs, share) for share in (SHORT, SHORTER)]
+    for v in bench.description.inputs():
+        if v.type != "Real" or v.variability != "continuous":
+            continue
+        changed = [_after(bench, outputs, share, v) for share in (SHORT, SHORTER)]
+        moved = set()
+        for k, output in enumerate(outputs):
+            large, small = (abs(b[k] - a[k]) for a, b in zip(usual, changed, strict=True))
+            if small > 1e-8 * max(1.0, abs(usual[1][k])) and small > 0.1 * large:
+                moved.add(output.name)
+        yield from _undeclared(told, v, moved, "over a step of no length")
+
+
+def _after(
+    bench: Bench, outputs: Sequence[Variable], share: float, changed: Variable | None = None
+) -> list[float]:
+    """Outputs of a new instance after some steps and a short one, for which one input may be changed."""
+    one = bench.ready()
+    bench.play(one, 3, seed=0)
+    if changed is not None:
+        (usual,) = one.get([changed])
+        one.set({changed: _other(changed, usual)})
+    try:
+        one.step(bench.start + 3 * bench.step, share * bench.step)
+    except StatusError as refused:
+        raise NotApplicableError(f"so short a step is not for it: {refused}") from None
+    found = one.get(outputs)
+    one.free()
+    return found
+
+
+def _other(v: Variable, value: float) -> float:
+    """A value of an input that is not the one it has."""
+    changed = near(v, 1.0)
+    return near(v, -0.5) if same(changed, value) else changed
+
+
+def _moved(names: Sequence[Variable], before: Sequence[float], after: Sequence[float]) -> set[str]:
+    return {v.name for v, a, b in zip(names, before, after, strict=True) if not same(a, b)}
+
+
+def _undeclared(
+    told: Sequence[tuple[Variable, set[int | None]]], known: Variable, moved: set[str], when: str
+) -> Iterator[str]:
+    for unknown, dependencies in told:
+        if unknown.name in moved and known.index not in dependencies:
+            yield f"{unknown.name} follows {known.name} {when}, but does not list it"

@@ -1,0 +1,72 @@
+"""What tools from the package index find."""
+
+import logging
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import tostring
+
+from ..fmu import Fmu
+from ..registry import NotInstalledError, rule
+
+
+@rule("2.2")
+def xsd(fmu: Fmu) -> Iterator[str]:
+    """The description is valid against the XML schema of FMI 2.0 (as FMPy ships it)."""
+    try:
+        import fmpy
+        from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  # made by C
+    except ImportError:
+        raise NotInstalledError("fmpy") from None
+    schema = etree.XMLSchema(
+        etree.parse(str(Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"))
+    )
+    schema.validate(etree.fromstring(tostring(fmu.description.root)))
+    for error in schema.error_log:
+        yield error.message
+
+
+@rule("2.2")
+def fmpy(fmu: Fmu) -> Iterator[str]:
+    """FMPy's validate_fmu finds nothing."""
+    try:
+        from fmpy.validation import validate_fmu
+    except ImportError:
+        raise NotInstalledError("fmpy") from None
+    for problem in validate_fmu(str(fmu.path)):
+        yield " ".join(str(problem).split())
+
+
+@rule("2.2")
+def fmutool(fmu: Fmu) -> Iterator[str]:
+    """The checkers of the FMU Manipulation Toolbox find nothing."""
+    try:
+        from fmu_manipulation_toolbox.checker import get_checkers
+        from fmu_manipulation_toolbox.operations import FMU
+    except ImportError:
+        raise NotInstalledError("fmu-manipulation-toolbox") from None
+    heard = _Ear()
+    logger = logging.getLogger("fmu_manipulation_toolbox")
+    logger.addHandler(heard)
+    try:
+        opened = FMU(str(fmu.path))
+        for checker in get_checkers():
+            opened.apply_operation(checker())
+    except Exception as error:
+        yield f"it fails: {error!r}"
+    finally:
+        logger.removeHandler(heard)
+    yield from heard.errors
+
+
+class _Ear(logging.Handler):
+    """Keeps what this thread logs as an error; others check other FMUs at the same time."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.errors: list[str] = []
+        self.thread = threading.get_ident()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.thread == self.thread:
+            self.errors.append(" ".join(record.getMessage().split()))

@@ -1,0 +1,74 @@
+"""Units (2.2.2)."""
+
+import math
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from ...units import base_exponents
+from ..description import number, whole
+from ..fmu import Fmu
+from ..registry import rule
+from .header import twice
+
+BASES = ("kg", "m", "s", "A", "K", "mol", "cd")  # and rad, which may be left out of an exponent
+
+
+@rule("2.2.2")
+def units(fmu: Fmu) -> Iterator[str]:
+    """Units and their display units have names of their own, and factors that can be divided by."""
+    for name in twice(u.get("name") for u in fmu.description.units):
+        yield f"unit '{name}' is defined twice"
+    for unit in fmu.description.units:
+        for name in twice(d.get("name") for d in unit.iterfind("DisplayUnit")):
+            yield f"display unit '{name}' of '{unit.get('name')}' is defined twice"
+        for element in [*unit.iterfind("BaseUnit"), *unit.iterfind("DisplayUnit")]:
+            yield from _conversion(element, f"{unit.get('name')}/{element.get('name', element.tag)}")
+
+
+def _conversion(element: Element, where: str) -> Iterator[str]:
+    factor, offset = number(element.get("factor", "1")), number(element.get("offset", "0"))
+    if factor is None or factor == 0.0 or not math.isfinite(factor):
+        yield f"{where}: factor is '{element.get('factor')}'"
+    if offset is None or not math.isfinite(offset):
+        yield f"{where}: offset is '{element.get('offset')}'"
+
+
+@rule("2.2.2")
+def base_units(fmu: Fmu) -> Iterator[str]:
+    """A unit whose name is made of SI symbols (m/s, N.m) has the exponents and the factor that it
+    says.
+    """
+    for unit in fmu.description.units:
+        base, name = unit.find("BaseUnit"), unit.get("name", "")
+        if base is None:
+            continue
+        try:
+            meant = base_exponents(name)
+        except ValueError:
+            continue  # another notation than ours
+        told = {b: whole(base.get(b, "0")) for b in BASES}
+        wrong = [b for b in BASES if told[b] != meant.get(b, 0)]
+        if wrong:
+            yield f"unit '{name}': " + ", ".join(
+                f"exponent of {b} is {told[b]}, not {meant.get(b, 0)}" for b in wrong
+            )
+        elif number(base.get("factor", "1")) != 1.0 or number(base.get("offset", "0")) != 0.0:
+            yield f"unit '{name}' is SI, but has a factor or an offset"
+
+
+@rule("2.2.2, 2.2.7")
+def units_defined(fmu: Fmu) -> Iterator[str]:
+    """Every unit and display unit that is used is defined, and a display unit stands beside a unit."""
+    known = {
+        u.get("name"): {d.get("name") for d in u.iterfind("DisplayUnit")} for u in fmu.description.units
+    }
+    used = [(v.name, v.all) for v in fmu.description.variables]
+    used += [(f"type {t.get('name')}", t[0].attrib) for t in fmu.description.types if len(t)]
+    for name, attributes in used:
+        unit, shown = attributes.get("unit"), attributes.get("displayUnit")
+        if unit is not None and unit not in known:
+            yield f"{name}: unit '{unit}' is not defined"
+        elif shown is not None and unit is None:
+            yield f"{name}: display unit '{shown}' without a unit"
+        elif shown is not None and shown != unit and shown not in known[unit]:
+            yield f"{name}: display unit '{shown}' of '{unit}' is not defined"

@@ -1,0 +1,62 @@
+"""Getting and setting values (2.1.7)."""
+
+from collections.abc import Iterator
+
+from ..api import Instance
+from ..bench import Bench, near, same, start_value
+from ..description import Variable
+from ..registry import trial
+
+
+@trial("2.1.7, 2.2.7")
+def start_values(bench: Bench) -> Iterator[str]:
+    """Before anything is set, inputs and exact values are what the description says that they start
+    at.
+    """
+    one = bench.initialising()
+    told = [v for v in bench.description.variables if v.initial == "exact" or v.causality == "input"]
+    told = [v for v in told if start_value(v) is not None]
+    for v, value in zip(told, one.get(told), strict=True):
+        if not same(value, start_value(v)):
+            yield f"{v.name} starts at {value!r}, not at {v.start}"
+    one.free()
+
+
+@trial("2.1.7, 4.2.4")
+def read_back(bench: Bench) -> Iterator[str]:
+    """What a master sets while initialising, inputs and parameters, reads back as it was set."""
+    one = bench.initialising()
+    settable = [
+        v
+        for v in bench.description.variables
+        if v.type == "Real" and v.settable and v.causality in ("input", "parameter")
+    ]
+    for v in settable:
+        value = near(v, 0.1)
+        one.set({v: value})
+        (got,) = one.get([v])
+        if not same(got, value):
+            yield f"{v.name} was set to {value:g} and reads {got:g}"
+    one.free()
+
+
+@trial("2.2.7")
+def range_of_values(bench: Bench) -> Iterator[str]:
+    """Outputs keep to their min and max, as initialised and after each step."""
+    outputs = [v for v in bench.description.outputs() if v.type in ("Real", "Integer", "Enumeration")]
+    one = bench.ready()
+    told: set[str] = set()
+    for k in range(20):
+        for text in _outside(one, outputs):
+            name = text.split(" ", 1)[0]
+            if name not in told:
+                told.add(name)
+                yield f"{text} at step {k}"
+        bench.advance(one, k)
+
+
+def _outside(one: Instance, outputs: list[Variable]) -> Iterator[str]:
+    for v, value in zip(outputs, one.get(outputs), strict=True):
+        low, high = v.limits
+        if value < low or value > high:
+            yield f"{v.name} is {value:g}, outside of {low:g} to {high:g},"

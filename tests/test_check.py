@@ -1,0 +1,347 @@
+"""The checker: each rule fires on an FMU that breaks it, none on ours nor on one without a fault."""
+
+import json
+import os
+import stat
+import subprocess
+import sys
+import zipfile
+
+import ccode
+import lag
+import pytest
+from conftest import COMPONENTS, GAIN, ROOT
+
+from fmus.build import _sources
+from fmus.check.examine import examine
+from fmus.check.fmu import BadFileError, Fmu
+from fmus.check.registry import RULES, in_order
+from fmus.check.report import listing
+from fmus.declare import discover
+
+READING = [rule.name for rule in in_order() if not rule.runs]
+RUNNING = [rule.name for rule in in_order() if rule.runs]
+compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+
+
+def found(path, *names, timeout=30.0):
+    """Name of the rule -> what it found; rules that say nothing are left out."""
+    outcomes = examine(Fmu(path), [RULES[name] for name in names or RULES], timeout)
+    return {name: outcome.found for name, outcome in outcomes.items() if outcome.found}
+
+
+def link():
+    member = zipfile.ZipInfo("resources/link")
+    member.create_system = 3
+    member.external_attr = (stat.S_IFLNK | 0o777) << 16
+    return member
+
+
+U = '<ScalarVariable name="in.u[1]" valueReference="0" causality="input"><Real declaredType="Speed" start="0"/></ScalarVariable>'
+T = '<Real unit="s" start="1" min="0.01" nominal="1"/>'
+ENUM = '<Item name="on" value="1"/><Item name="off" value="2"/>'
+SECOND = '<ScalarVariable name="v" valueReference="0" causality="input"><Real declaredType="Speed" {}/></ScalarVariable>'
+CONSTANT = '<ScalarVariable name="c{0}" valueReference="9" variability="constant"><Real start="{0}"/></ScalarVariable>'
+TIME = '<ScalarVariable name="{}" valueReference="{}" causality="independent"><Real/></ScalarVariable>'
+
+# Rule, edits of the description, what the rule says.
+BROKEN = [
+    ("header", [('guid="{lag}"', 'guid=""')], "guid is missing"),
+    ("header", [("2024-05-06T07:08:09Z", "6 May 2024")], "'6 May 2024'"),
+    ("capabilities", [('modelIdentifier="lag"', 'modelIdentifier="1 lag"')], "no name that C"),
+    ("capabilities", [('canGetAndSetFMUstate="true" ', "")], "no state to serialise"),
+    ("capabilities", [('<File name="lag.c"/>', '<File name="lag.c"/>' * 2)], "listed twice"),
+    ("capabilities", [('<File name="lag.c"/>', '<File name="other.c"/>')], "not in the archive"),
+    ("log-categories", [('<Category name="errors"/>', '<Category name="errors"/>' * 2)], "twice"),
+    ("experiment", [('stopTime="1"', 'stopTime="0"')], "stops at 0 s"),
+    ("experiment", [('stopTime="1"', 'stopTime="INF"')], "stopTime is 'INF'"),
+    ("experiment", [('stepSize="0.01"', 'stepSize="2"')], "longer than the whole"),
+    ("experiment", [('stepSize="0.01"', 'stepSize="-1"')], "stepSize is -1"),
+    ("annotations", [('<Tool name="here"/>', '<Tool name="here"/>' * 2)], "two entries"),
+    ("units", [('<Unit name="s"><BaseUnit s="1"/></Unit>', '<Unit name="s"/>' * 2)], "defined twice"),
+    ("units", [('factor="3.6"', 'factor="0"')], "factor is '0'"),
+    ("base-units", [('m="1" s="-1"', 'm="1" s="1"')], "exponent of s is 1, not -1"),
+    ("base-units", [('m="1" s="-1"', 'm="1" s="-1" factor="0.5"')], "has a factor"),
+    ("units-defined", [('<Real unit="s" ', '<Real unit="h" ')], "unit 'h' is not defined"),
+    ("units-defined", [('displayUnit="km/h"', 'displayUnit="mph"')], "'mph' of 'm/s' is not defined"),
+    ("units-defined", [('<Real unit="s" ', '<Real displayUnit="h" ')], "without a unit"),
+    ("types", [('<SimpleType name="Speed">', '<SimpleType name="Mode">')], "defined twice"),
+    ("types", [('"Mode"', '"T"')], "is a type and a variable"),
+    ("types", [('min="-100" max="100"', 'min="100" max="-100"')], "is above max"),
+    ("types", [(ENUM, ENUM.replace('"2"', '"1"'))], "value '1' is there twice"),
+    ("declared-types", [('<Enumeration declaredType="Mode" ', "<Enumeration ")], "without a declared type"),
+    ("declared-types", [('<Enumeration declaredType="Mode" ', '<Enumeration declaredType="Speed" ')], "a Real"),
+    ("declared-types", [('declaredType="Mode"', 'declaredType="mode"')], "is not defined"),
+    ("declared-types", [('max="50"', 'max="500"')], "above that of its type"),
+    ("names", [('name="direct"', 'name="y"')], "several variables"),
+    ("names", [('name="direct"', 'name="2y"')], "no structured name"),
+    ("names", [('"structured"', '"flat"'), ('name="direct"', 'name="a&#9;b"')], "is no name"),
+    ("names", [('name="mode"', 'name="der(T)"')], "is a derivative, but"),
+    ("causality", [('causality="parameter" variability="fixed"', 'causality="parameter"')], "variability continuous"),
+    ("causality", [('causality="input">', 'causality="input" initial="exact">')], "initial exact"),
+    ("causality", [(U, U + TIME.format("t", 9) + TIME.format("t2", 10))], "several independent"),
+    ("causality", [('variability="constant"><Enum', 'causality="output"><Enum')], "by default continuous"),
+    ("start", [('declaredType="Speed" start="0"', 'declaredType="Speed"')], "has no start value"),
+    ("start", [('initial="calculated"><Real', 'initial="calculated"><Real start="1"')], "though it is calculated"),
+    ("start", [('start="0"', 'start="NaN"')], "no finite Real"),
+    ("limits", [('min="0.01"', 'min="2"')], "outside of 2"),
+    ("limits", [('min="0.01"', 'min="2" max="0"')], "min 2, max 0"),
+    ("limits", [('nominal="1"', 'nominal="0"')], "nominal is '0'"),
+    ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "can be set"),
+    ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "has a start"),
+    ("aliases", [("</ModelVariables>", CONSTANT.format(1) + CONSTANT.format(2) + "</ModelVariables>")], "start diff"),
+    ("aliases", [('"4"><Real', '"2"><Real')], "not the unit"),
+    ("derivatives", [('derivative="3"', 'derivative="9"')], "no other variable"),
+    ("derivatives", [('derivative="3"', 'derivative="7"')], "not both are continuous"),
+    ("derivatives", [('<Real unit="s" start', '<Real reinit="true" unit="s" start')], "reinit belongs"),
+    ("derivatives", [('causality="input"', 'causality="input" canHandleMultipleSetPerTimeInstant="true"')], "canHandle"),
+    ("outputs", [('<Unknown index="4" dependencies="1" dependenciesKind="fixed"/>', "")], "direct is an output"),
+    ("outputs", [('<Outputs><Unknown index="3"', '<Outputs><Unknown index="5"')], "but no output"),
+    ("state-derivatives", [(' derivative="3"', "")], "no attribute derivative"),
+    ("state-derivatives", [("canSer", 'providesDirectionalDerivative="true" canSer'),
+                           ('<Derivatives><Unknown index="5" dependencies="1 3"/></Derivatives>', "")], "not listed"),
+    ("initial-unknowns", [('<InitialUnknowns><Unknown index="3" dependencies="2"/>', "<InitialUnknowns>")], "y is missing"),
+    ("initial-unknowns", [('<Unknown index="5"/>', "")], "der(y) is missing"),
+    ("initial-unknowns", [('<Unknown index="5"/>', '<Unknown index="5"/><Unknown index="2"/>')], "T does not belong"),
+    ("initial-unknowns", [('<Unknown index="5"/>', '<Unknown index="2"/><Unknown index="5"/>')], "not in ascending"),
+    ("structure", [('<Outputs><Unknown index="3"', '<Outputs><Unknown index="4"')], "lists variable 4 twice"),
+    ("structure", [('index="3" dependencies="2"', 'index="99" dependencies="2"')], "does not exist"),
+    ("structure", [('dependencies="1 2"', 'dependencies="1 99"')], "depends on variable 99"),
+    ("structure", [('dependencies="1 2"', 'dependencies="2 1"')], "not in ascending order"),
+    ("structure", [('dependencies="1" dependenciesKind="fixed"', 'dependenciesKind="fixed"')], "without dependencies"),
+    ("structure", [('dependenciesKind="fixed"', 'dependenciesKind="fixed fixed"')], "2 kinds for 1"),
+    ("dependencies", [('dependencies="1" dependenciesKind', 'dependencies="2" dependenciesKind')], "depends on T"),
+    ("dependencies", [('dependenciesKind="constant"', 'dependenciesKind="tunable"')], "at initialisation only"),
+    ("dependencies", [('dependencies="1 2"', 'dependencies="1 4"')], "depends on direct, which is not known"),
+    ("xsd", [("<VendorAnnotations>", "<Surprise/><VendorAnnotations>")], "Surprise"),
+    ("fmpy", [('name="direct"', 'name="y"')], "not unique"),
+    ("fmutool", [('name="direct"', 'name="y"')], "used by several"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("rule", "edits", "text"), BROKEN)
+def test_each_rule_fires_on_a_description_that_breaks_it(rule, edits, text, tmp_path):
+    if rule == "fmutool":
+        pytest.importorskip("fmu_manipulation_toolbox")
+    said = found(lag.pack(tmp_path, edits, compiled=False), rule)
+    assert any(text in line for line in said[rule]), said
+
+
+def test_a_description_without_a_fault_passes(tmp_path):
+    assert found(lag.pack(tmp_path, compiled=False), *READING) == {}
+
+
+@pytest.mark.parametrize(
+    ("member", "text"),
+    [("../evil", "leaves the folder"), ("/etc/evil", "leaves the folder"), ("a\\b", "backslash"),
+     (link(), "is a link"), ("sources/lag.c", "there 2 times")],
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path):
+    path = lag.pack(tmp_path, compiled=False, extra=[(member, "x")])
+    outcomes = examine(Fmu(path), [RULES["archive"], RULES["life"]])
+    assert any(text in line for line in outcomes["archive"].found)
+    assert "not to be trusted" in outcomes["life"].skipped
+
+
+def test_missing_library_is_told(tmp_path):
+    path = lag.pack(tmp_path, [('modelIdentifier="lag"', 'modelIdentifier="other"')], compiled=False)
+    assert any("is missing" in line for line in found(path, "binaries")["binaries"])
+    outcomes = examine(Fmu(path), [RULES["life"]])
+    assert "no binary" in outcomes["life"].skipped
+
+
+def test_variable_without_a_type_is_told_and_not_run(tmp_path):
+    path = lag.pack(tmp_path, [('<Real derivative="3"/>', "")], compiled=False)
+    outcomes = examine(Fmu(path), [RULES["xsd"], RULES["life"]])
+    assert outcomes["xsd"].found
+    assert "no type" in outcomes["life"].skipped
+
+
+STEP = "s->y += h"
+# Rule, edits of the source, edits of the description, what the rule says.
+MISBEHAVING = [
+    ("exports", [("fmi2CancelStep", "cancel")], [], "fmi2CancelStep is not exported"),
+    ("exports", [('return "2.0"', 'return "1.0"')], [], "fmi2GetVersion returns"),
+    ("life", [("return NULL", "return NULL; return NULL"), ('"{lag}"', '"{gal}"')], [], "fmi2Instantiate returned"),
+    ("life", [("fmi2Terminate(void *c) {", "fmi2Terminate(void *c) { raise(SIGSEGV);")], [], "fmi2Terminate: the process ended by SIGSEGV"),
+    ("life", [(STEP, "return 3; s->y += h")], [], "fmi2DoStep returned error"),
+    ("life", [(STEP, 'm->callbacks->logger(0, "", 1, "gossip", "hm"); s->y += h')], [], "category 'gossip'"),
+    ("free", [("alive--;", "if (!m->s.running) abort(); alive--;")], [], "fmi2FreeInstance: the process ended by SIGABRT"),
+    ("logging", [("const char *const k[]) { return 0; }", "const char *const k[]) { return 3; }")], [], "fmi2SetDebugLogging returned error"),
+    ("step-size", [(STEP, "if (h < 0.004) return 3; s->y += h")], [], "fmi2DoStep returned error"),
+    ("start-values", [("{0.0, 0.0, 1.0, 0.0, 0}", "{0.0, 0.0, 3.0, 0.0, 0}")], [], "T starts at 3.0, not at 1"),
+    ("read-back", [("m->s.T = v[k]", "m->s.T = 1.0")], [], "T was set to 1.01 and reads 1"),
+    ("range-of-values", [], [('max="50"', 'min="20" max="50"')], "direct is 0, outside of 20 to 50"),
+    ("reset", [("begin(c); return 0;", "Lag *m = c; m->s.running = 0; m->s.hidden += 1; return 0;"),
+               (STEP, "s->y += s->hidden + h")], [], "differs: y from step 1"),
+    ("state", [(STEP, "shared += 1.0; s->y += shared + h")], [], "after fmi2SetFMUstate the run differs"),
+    ("serialised-state", [("memcpy(b, s, n)", "memset(b, 0, n)")], [], "the same instance"),
+    ("serialised-state", [(STEP, "if (!s->hidden) s->hidden = alive; s->y += s->hidden * h"),
+                          ("((Lag *)c)->s = *(State *)s", "double k = ((Lag *)c)->s.hidden; ((Lag *)c)->s = *(State *)s; ((Lag *)c)->s.hidden = k")], [], "a new instance"),
+    ("instances", [(STEP, "shared += s->u; s->y += shared + h")], [], "beside another instance"),
+    ("initial-dependencies", [], [('index="3" dependencies="2"', 'index="3" dependencies="1"')], "y follows T while initialising"),
+    ("step-dependencies", [("double all[] = {s.u, y, s.T, s.T * s.u", "double all[] = {s.u, y, s.T, s.hidden"), (STEP, "s->hidden = s->T * s->u; s->y += h")],
+                          [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] over a step of no length"),
+    ("output-dependencies", [], [('dependencies="1" dependenciesKind="fixed"', 'dependencies=""')], "direct follows in.u[1] without a step"),
+]  # fmt: skip
+
+
+@compiled
+@pytest.mark.parametrize(("rule", "c", "xml", "text"), MISBEHAVING)
+def test_each_trial_fires_on_an_fmu_that_breaks_it(rule, c, xml, text, tmp_path):
+    said = found(lag.pack(tmp_path, xml, c), rule)
+    assert any(text in line for line in said[rule]), said
+
+
+def test_every_rule_has_a_broken_fmu():
+    covered = {case[0] for case in [*BROKEN, *MISBEHAVING]} | {"archive", "binaries"}
+    assert covered == set(RULES)
+
+
+@compiled
+def test_an_fmu_in_c_without_a_fault_passes(tmp_path):
+    assert found(lag.pack(tmp_path)) == {}
+
+
+@compiled
+def test_hanging_fmu_is_a_finding(tmp_path):
+    path = lag.pack(tmp_path, c=[(STEP, "pause(); s->y += h")])
+    said = found(path, "life", timeout=1.0)
+    assert said == {"life": ["fmi2DoStep: it did not return within 1 s"]}
+
+
+@compiled
+def test_single_instance_per_process_is_respected(tmp_path):
+    once = [("canGetAnd", 'canBeInstantiatedOnlyOncePerProcess="true" canGetAnd')]
+    path = lag.pack(tmp_path, once, [("alive++;", "if (alive++) abort();"), ("alive--;", "")])
+    outcomes = examine(Fmu(path), [RULES[name] for name in RUNNING])
+    assert {name: o.found for name, o in outcomes.items() if o.found} == {}
+    assert "OnlyOncePerProcess" in outcomes["instances"].skipped
+
+
+@compiled
+def test_fmu_without_abilities_is_not_asked_for_them(tmp_path):
+    xml = [(f'{name}="true"', "") for name in
+           ("canGetAndSetFMUstate", "canSerializeFMUstate", "canHandleVariableCommunicationStepSize")]  # fmt: skip
+    path = lag.pack(
+        tmp_path,
+        xml,
+        [("fmi2GetFMUstate(void *c, void **s) {", "fmi2GetFMUstate(void *c, void **s) { abort();")],
+    )
+    outcomes = examine(Fmu(path), [RULES[name] for name in ("state", "serialised-state", "step-size")])
+    assert all(not o.found and "not declared" in o.skipped for o in outcomes.values())
+
+
+def test_plain_python_fmu_that_denies_what_its_step_does(plain_fmu):
+    lie = [('<Unknown index="2"/>', '<Unknown index="2" dependencies=""/>')]
+    gain = plain_fmu("Gain", GAIN, "self.y = 2.0 * self.x\nreturn True", lie)
+    assert "y follows x over a step" in found(gain, "step-dependencies")["step-dependencies"][0]
+    integral = plain_fmu("Integral", GAIN, "self.y += h * self.x\nreturn True", lie)
+    assert found(integral, "step-dependencies") == {}
+    sampled = plain_fmu("Sampled", GAIN, "self.y = 2.0 * self.x\nreturn True",
+                        [*lie, ('causality="input"', 'causality="input" variability="discrete"')])  # fmt: skip
+    assert found(sampled, "step-dependencies") == {}
+
+
+def test_plain_python_fmu_with_a_hidden_state_and_a_fatal_step(plain_fmu):
+    able = [('canGetAndSetFMUstate="false"', 'canGetAndSetFMUstate="true"')]
+    step = "self.memory += self.x\nself.y = self.memory\nreturn True"
+    hidden = plain_fmu("Hidden", GAIN + "self.memory = 0.0", step, able)
+    assert "differs: y" in found(hidden, "state")["state"][0]
+    fatal = plain_fmu("Fatal", GAIN, "raise ValueError('no')")
+    assert "fmi2DoStep returned fatal" in found(fatal, "life")["life"][0]
+
+
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_ours_read_well(name, fmus):
+    assert found(fmus[name], *READING) == {}
+
+
+def test_one_of_ours_runs_well(fmus):
+    assert found(fmus["guidance_setpoint"], *RUNNING) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMPONENTS)
+def test_ours_run_well(name, fmus):
+    assert found(fmus[name], *RUNNING) == {}
+
+
+def run_check(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "fmus.check", *map(str, arguments)],
+        capture_output=True, text=True, cwd=ROOT, check=False, **options,
+    )  # fmt: skip
+
+
+def test_command_tells_findings_with_their_clause(tmp_path):
+    path = lag.pack(tmp_path, [('stopTime="1"', 'stopTime="0"')], compiled=False)
+    done = run_check(path, "--no-run")
+    assert done.returncode == 1
+    assert "experiment (FMI 2.0.4, 2.2.5)" in done.stdout
+    assert "lag: it stops at 0 s" in done.stdout
+    assert "1 finding in 1 FMU" in done.stdout
+    told = json.loads(run_check(path, "--no-run", "--json").stdout)
+    assert told["findings"] == 1
+    assert told["fmus"][0]["checks"]["experiment"]["found"] == ["it stops at 0 s, but starts at 0 s"]
+    assert told["fmus"][0]["checks"]["life"]["skipped"]
+
+
+def test_command_is_content_with_a_sound_fmu(tmp_path):
+    done = run_check(lag.pack(tmp_path, compiled=False), "--no-run", "--only", "xsd")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "no findings in 1 FMU" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing.fmu"], "no such FMU"),
+        ([__file__], "is not an FMU"),
+        (["vesel"], "did you mean 'vessel'"),
+        (["vessel", "--only", "reste"], "did you mean 'reset'"),
+    ],
+)
+def test_command_refuses_with_one_line(arguments, message):
+    done = run_check(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (('fmiVersion="2.0"', 'fmiVersion="3.0"'), "is for FMI 3.0"),
+        (("<?xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><?xml"), "defines entities"),
+        (("</fmiModelDescription>", ""), "is not XML"),
+        (("CoSimulation", "ModelExchange"), "not for co-simulation"),
+    ],
+)
+def test_what_is_no_fmu_for_this_is_refused(edit, message, tmp_path):
+    with pytest.raises(BadFileError, match=message):
+        Fmu(lag.pack(tmp_path, [edit], compiled=False))
+
+
+def test_absent_tool_is_told(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fmu_manipulation_toolbox.checker", None)
+    path = lag.pack(tmp_path, compiled=False)
+    outcome = examine(Fmu(path), [RULES["fmutool"]])["fmutool"]
+    assert outcome.missing
+    assert "fmu-manipulation-toolbox is not installed" in outcome.skipped
+
+
+def test_documented_rules_are_the_rules():
+    assert (ROOT / "docs" / "checks.md").read_text() == listing()
+    assert all(rule.demand.endswith(".") and rule.clause for rule in RULES.values())
+
+
+def test_fmus_do_not_carry_the_checker_and_trials_start_light():
+    for module, _ in discover():
+        assert not [inside for inside in _sources(module, None) if inside.startswith("check")]
+    heavy = "import sys, fmus.check.child, fmus.check.rules; print({'fmpy', 'numpy', 'rich', 'lxml'} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", heavy], capture_output=True, text=True, cwd=ROOT, env=os.environ
+    )
+    assert done.stdout.strip() == "set()", done.stderr
