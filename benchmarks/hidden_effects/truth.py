@@ -24,7 +24,8 @@ from fmus.vessel import vessel
 from .runs import HEADING, POSITION, STEP, Voyage
 
 VESSEL = vessel.COMPONENT
-WINDOW, EVERY = 151, 25  # samples of a window, and from one to the next
+WINDOW, EVERY = 3.0, 0.5  # s, width of a window and from one to the next
+THIN = 5  # samples in a step for forces on the hull, which change slowly
 MASS = np.array(mass_matrix(vessel.Params().inertia))
 # An acceleration of pose noise, as a force: how much a newton counts on each axis.
 WEIGHTS = 1.0 / (np.diag(MASS) * [POSITION, POSITION, HEADING])
@@ -54,6 +55,11 @@ class Motion:
     nu: np.ndarray
     nu_dot: np.ndarray
     asked: np.ndarray
+
+    @cached_property
+    def thin(self) -> "Motion":
+        """Every fifth sample."""
+        return Motion(*(x[::THIN] for x in (self.time, self.eta, self.nu, self.nu_dot, self.asked)))
 
     @cached_property
     def tau(self) -> np.ndarray:
@@ -152,27 +158,17 @@ def force(m: Motion, values: Values) -> np.ndarray:
     return m.lacking - lack(m, values)
 
 
-def windows(x: np.ndarray) -> np.ndarray:
-    """Means (K, 3) of a signal (n, 3) over windows of 3 s, every 0.5 s."""
-    s = np.linspace(-1.0, 1.0, WINDOW)
+def windows(x: np.ndarray, step: float = STEP) -> np.ndarray:
+    """Means (K, 3) of a signal (n, 3), one sample each ``step`` [s], over windows of 3 s, every 0.5 s."""
+    width = round(WINDOW / step) + 1
+    s = np.linspace(-1.0, 1.0, width)
     weights = (1.0 - s * s) ** 3
-    parts = np.lib.stride_tricks.sliding_window_view(x, WINDOW, axis=0)[::EVERY]
+    parts = np.lib.stride_tricks.sliding_window_view(x, width, axis=0)[:: round(EVERY / step)]
     return parts @ (weights / weights.sum())
 
 
 def over(runs: Sequence[Motion], values: Values) -> np.ndarray:
     """Windows (K, 3) of what effects add, over some runs one after the other."""
-    return np.concatenate([windows(force(m, values)) for m in runs])
-
-
-def acted(voyage: Voyage, values: Values) -> np.ndarray:
-    """The force (n, 3) that hidden effects had in the simulation, as its log tells.
-
-    Args:
-        voyage: the run.
-        values: effects of the measurement, whose force is an error of the model on what was measured.
-    """
-    m = motion(voyage, values)
-    if values:
-        return force(m, values)
-    return voyage.omega + voyage.tau - m.tau
+    if set(values) <= NAMES["thrusters"]:
+        return np.concatenate([windows(force(m, values)) for m in runs])
+    return np.concatenate([windows(force(m.thin, values), THIN * STEP) for m in runs])
