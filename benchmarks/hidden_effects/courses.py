@@ -66,7 +66,14 @@ def _eight(rng: np.random.Generator) -> dict[str, float]:
     }
 
 
-SWINGS = {"slow_x": 1.3, "slow_y": 1.3, "slow_psi": 1.6, "quick_x": 0.3, "quick_y": 0.3, "quick_psi": 0.5}
+SWINGS = {
+    "slow_x": 1.3,
+    "slow_y": 1.3,
+    "slow_psi": 1.6,
+    "quick_x": 0.3,
+    "quick_y": 0.3,
+    "quick_psi": 0.5,
+}
 
 
 def _rich(rng: np.random.Generator) -> dict[str, float]:

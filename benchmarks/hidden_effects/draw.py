@@ -78,7 +78,9 @@ def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:
     force that an effect on the hull takes, too.
     """
     if effect == "waves":
-        added, tau = (np.concatenate(x) for x in zip(*[(force(m, values), m.tau) for m in pilot], strict=True))
+        added, tau = (
+            np.concatenate(x) for x in zip(*[(force(m, values), m.tau) for m in pilot], strict=True)
+        )
     else:
         added = added_force(pilot, effect, values)
         tau = np.concatenate([windows(m.tau) for m in pilot])

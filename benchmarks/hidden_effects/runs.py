@@ -125,7 +125,8 @@ def scenario(course: Course, hidden: Hidden, noise: float, seed: int, fmus: Path
         "vessel": {"path": str(fmus / f"{ship}.fmu"), "parameters": course.start | dict(hidden.vessel)},
         "thrusters": {"path": str(fmus / f"{machine}.fmu"), "parameters": dict(hidden.thrusters)},
         "observer": {"path": str(fmus / "observer_kalman.fmu"), "parameters": filtering} | every,
-        "guidance": {"path": str(fmus / f"{course.fmu}.fmu"), "parameters": dict(course.parameters)} | every,
+        "guidance": {"path": str(fmus / f"{course.fmu}.fmu"), "parameters": dict(course.parameters)}
+        | every,
         "controller": {"path": str(fmus / "controller_abs.fmu")} | every,
     }
     faults = [

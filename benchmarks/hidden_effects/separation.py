@@ -52,7 +52,15 @@ GRIDS: dict[str, list[dict[str, float]]] = {
 SCALES = {"thrust_curve": ("thrust_curve_ahead", "thrust_curve_astern")}
 ROUNDS = 3  # of effects that are straight where they are small
 SMALL = 1e-3
-CURVED = {"current", "mass", "added_mass_X", "added_mass_Y", "added_mass_N", "marker_offset", "heading_offset"}
+CURVED = {
+    "current",
+    "mass",
+    "added_mass_X",
+    "added_mass_Y",
+    "added_mass_N",
+    "marker_offset",
+    "heading_offset",
+}
 
 
 @dataclass(eq=False)
@@ -70,7 +78,9 @@ class Rivals:
     R: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        changes = [self._force({name: (1.0 + SMALL) * x}) / SMALL for name, x in self.coefficients.items()]
+        changes = [
+            self._force({name: (1.0 + SMALL) * x}) / SMALL for name, x in self.coefficients.items()
+        ]
         none = np.zeros((self._force({}).size, 0))
         self.Q, self.R = np.linalg.qr(np.column_stack([*changes, none]))
 

@@ -75,7 +75,9 @@ def plant(cell: Cell, hidden: Sequence[Draw]) -> Hidden:
     values = {name: x for d in hidden for name, x in d.values.items()}
     if cell.wrong:
         rng = cell.rng(2)
-        values |= {name: x * float(rng.uniform(1.0 - DOUBT, 1.0 + DOUBT)) for name, x in COEFFICIENTS.items()}
+        values |= {
+            name: x * float(rng.uniform(1.0 - DOUBT, 1.0 + DOUBT)) for name, x in COEFFICIENTS.items()
+        }
     other = any(d.effect in FOREIGN for d in hidden)
     ship = {n: x for n, x in values.items() if n in NAMES["vessel"] or n == "drag_1_5"}
     machine = {n: x for n, x in values.items() if n in NAMES["thrusters"] or n == "bow_exp"}
