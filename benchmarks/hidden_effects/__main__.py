@@ -1,0 +1,156 @@
+"""Does the diagnosis find an effect that it was not told of? ``python -m benchmarks.hidden_effects``."""
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from cosim import InputError, SimulationError
+from cosim.command import BAD_INPUT, FAILED, run_command
+from cosim.errors import nearest
+from studies.command import progress
+
+from .cost import Cost, measure
+from .draw import SINGLE
+from .report import write
+from .results import Results
+from .runs import NOISE, build
+from .trial import Cell, trial
+
+OUT = Path("docs") / "benchmarks" / "hidden_effects"
+NONES, PAIRS = (
+    5,
+    4,
+)  # cells without an effect and with two, for each noise, kind of coefficients and seed
+QUICK = ("X_u", "N_r", "loss_yaw", "bow_failure", "current", "delay")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def cells(
+    effects: Sequence[str], noises: Sequence[str], wrong: Sequence[bool], seeds: Sequence[int]
+) -> Iterator[Cell]:
+    """The cells of a benchmark; with all effects also those with none and with two."""
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 4])
+        pairs = [tuple(rng.choice(effects, 2, replace=False).tolist()) for _ in range(PAIRS)]
+        for noise in noises:
+            for off in wrong:
+                yield from (Cell((e,), noise, off, seed) for e in effects)
+                if len(effects) > 1:
+                    # The course is that of the seed; all else is drawn anew.
+                    yield from (Cell((), noise, off, seed + 100 * k) for k in range(NONES))
+                    yield from (Cell(pair, noise, off, seed) for pair in pairs)
+
+
+def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
+    """Run cells in processes of their own, and keep each as it comes.
+
+    Raises:
+        InputError: the FMUs cannot be built.
+    """
+    for name in THREADS:
+        os.environ[name] = "1"  # inherited: the processes are as many as the cores
+    with TemporaryDirectory() as folder, progress(len(todo), "cells") as advance:
+        build(Path(folder))
+        # Forking a process that has loaded FMUs would copy their threads' locks.
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"))
+        try:
+            futures: list[Future] = [pool.submit(trial, cell, Path(folder), peers) for cell in todo]
+            for future in as_completed(futures):
+                results.add(future.result())
+                advance()
+        finally:
+            with suppress(KeyboardInterrupt):
+                pool.shutdown(cancel_futures=True)
+
+
+def cost() -> Cost:
+    """Time and memory of the diagnosis."""
+    with TemporaryDirectory() as folder:
+        build(Path(folder))
+        return measure(Path(folder))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        todo = list(cells(*_chosen(options)))
+        results = Results(options.out / "results.csv")
+        left = [cell for cell in todo if cell.key not in results.done]
+        if len(left) < len(todo):
+            print(f"{len(todo) - len(left)} of {len(todo)} cells are there already", file=sys.stderr)
+        try:
+            if left:
+                run(left, results, options.jobs, not options.no_peers)
+        finally:
+            path = write(options.out, results.rows, None)
+        if options.cost:
+            path = write(options.out, results.rows, cost())
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except SimulationError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return FAILED
+    print(path)
+    return 0
+
+
+def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list[bool], range]:
+    """Effects, noises, kinds of coefficients and seeds that are asked for."""
+    for e in options.effects:
+        if e not in SINGLE:
+            raise InputError(f"no effect '{e}'{nearest(e, SINGLE)}")
+    effects = options.effects or (QUICK if options.quick else SINGLE)
+    noises = options.noise or (["n4"] if options.quick else list(NOISE))
+    wrong = [False] * options.exact + [True] * options.wrong or [False] + [True] * (not options.quick)
+    return effects, noises, wrong, range(options.seeds)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 100:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to 100, not '{text}'")
+    return int(text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.hidden_effects",
+        description="Hide an effect in a ship, and see whether the diagnosis finds it.",
+        epilog="examples:\n"
+        "  python -m benchmarks.hidden_effects --quick --out /tmp/hidden\n"
+        "  python -m benchmarks.hidden_effects --effects X_u 'Y_|v|v' --noise n1 n10 --exact --seeds 3\n"
+        "  python -m benchmarks.hidden_effects --cost\n"
+        "Cells that are in DIR/results.csv are not run again: after Ctrl-C, the same command goes on.\n"
+        "exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--effects", nargs="+", default=[], metavar="ID", help="what is hidden (everything)"
+    )
+    parser.add_argument("--noise", nargs="+", choices=list(NOISE), help="levels of noise (all)")
+    parser.add_argument(
+        "--exact", action="store_true", help="exact coefficients (both, if neither is given)"
+    )
+    parser.add_argument("--wrong", action="store_true", help="coefficients up to 10 %% wrong")
+    parser.add_argument("--seeds", type=_count, default=1, metavar="N", help="seeds 0 to N-1 (1)")
+    parser.add_argument(
+        "--jobs", type=_count, default=os.cpu_count(), metavar="N", help="processes (one for each core)"
+    )
+    parser.add_argument("--out", type=Path, default=OUT, metavar="DIR", help=f"where results go ({OUT})")
+    parser.add_argument("--no-peers", action="store_true", help="without PySINDy and PLS")
+    parser.add_argument("--cost", action="store_true", help="measure time and memory, too")
+    parser.add_argument("--quick", action="store_true", help="few effects, n4, exact coefficients")
+    return parser
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,57 @@
+"""A ship that the analysis does not share: drag by |u|^1.5, integrated by the semi-implicit Euler method.
+
+A component file: ``python -m fmus.build benchmarks/hidden_effects/other_vessel.py --out fmu``.
+"""
+
+from typing import Annotated, NamedTuple
+
+from fmus.declare import POSITIVE, Component
+from fmus.frames import rotate_to_earth
+from fmus.ops import Number, sqrt
+from fmus.signals import Force, Velocity
+from fmus.vessel import vessel
+
+
+class Drag(NamedTuple):
+    drag_1_5: Annotated[float, "N", "surge drag at 1 m/s, growing as |u|^1.5", POSITIVE] = 0.0
+
+
+class Params(NamedTuple):
+    ship: vessel.Params = vessel.Params()
+    drag: Drag = Drag()
+
+
+def motion(s: vessel.State, tau: Force, p: Params, b: vessel.Prepared) -> tuple[Number, Number, Number]:
+    """nu_dot [m/s2, m/s2, rad/s2]."""
+    drag = p.drag.drag_1_5 * s.u * sqrt(abs(s.u))
+    return vessel.stirred(s, tau._replace(tau_X=tau.tau_X - drag), b)
+
+
+def step(s: vessel.State, i: Force, p: Params, h: Number) -> tuple[vessel.State, vessel.Outputs]:
+    b = vessel.prepare(p.ship)
+    du, dv, dr = motion(s, i, p, b)
+    u, v, r = s.u + h * du, s.v + h * dv, s.r + h * dr
+    x_dot, y_dot = rotate_to_earth(s.psi + h * r, u, v)
+    after = vessel.State(s.x + h * x_dot, s.y + h * y_dot, s.psi + h * r, u, v, r, s.t + h)
+    nu_dot = motion(after, i, p, b)
+    omega = vessel.model_error(after, nu_dot, i, p.ship)
+    pose, speed = vessel.Pose(after.x, after.y, after.psi), Velocity(u, v, r)
+    return after, vessel.Outputs(pose, speed, *nu_dot, vessel.measured(after, b), *omega, *omega)
+
+
+def init(i: Force, p: Params) -> vessel.State:
+    return vessel.init(i, p.ship)
+
+
+COMPONENT = Component(
+    name="other_vessel",
+    description="Hull with drag by |u|^1.5, integrated by the semi-implicit Euler method",
+    params=Params,
+    state=vessel.State,
+    inputs=Force,
+    outputs=vessel.Outputs,
+    init=init,
+    step=step,
+    sampled=False,
+    max_step=0.005,
+)

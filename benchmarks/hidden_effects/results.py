@@ -1,0 +1,129 @@
+"""The table of results: one row for each cell, written as it comes."""
+
+import csv
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from cosim import InputError
+
+BETWEEN = "; "
+
+
+@dataclass
+class Row:
+    """What became of one cell.
+
+    Attributes:
+        effect, noise, coefficients, seed: which cell; ``none`` where nothing was hidden.
+        values: parameters of what was hidden.
+        size: share of the force on its axis, of each effect.
+        redrawn: how often the ship ran away and the effect was drawn smaller.
+        found: ids in order of acceptance.
+        reported: the first id, and those that the diagnosis cannot tell from it.
+        confidence: of the first.
+        alike: ids that could do the same within 5 %, by the truth; "" is no effect at all.
+        separable: there are none.
+        doubtful: the doubted coefficients alone could do the same.
+        right: the right effect came first; of two, both within two steps.
+        in_set: the right effect is in the reported set.
+        before_mm, after_mm: window position error of the run held out.
+        seconds: from three measured runs to the answer.
+        sindy, pls: the first effect of PySINDy and of PLS.
+        note: why there is no result.
+    """
+
+    effect: str
+    noise: str
+    coefficients: str
+    seed: int
+    values: str = ""
+    size: str = ""
+    redrawn: int = 0
+    found: list[str] = field(default_factory=list)
+    reported: list[str] = field(default_factory=list)
+    confidence: float = 0.0
+    alike: list[str] = field(default_factory=list)
+    separable: bool = False
+    doubtful: bool = False
+    right: bool = False
+    in_set: bool = False
+    before_mm: float = float("nan")
+    after_mm: float = float("nan")
+    seconds: float = float("nan")
+    sindy: str = ""
+    pls: str = ""
+    note: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str, int]:
+        return self.effect, self.noise, self.coefficients, self.seed
+
+    @property
+    def fall(self) -> float:
+        """How many times smaller the error became."""
+        return self.before_mm / self.after_mm
+
+
+NAMES = [f.name for f in fields(Row)]
+KINDS = {f.name: f.type for f in fields(Row)}
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return BETWEEN.join(value)
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def _value(text: str, kind: Any) -> Any:
+    if kind == list[str]:
+        return text.split(BETWEEN) if text else []
+    return text == "True" if kind is bool else kind(text)
+
+
+class Results:
+    """A CSV file that grows row by row, so that nothing that was computed is ever lost."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows = _read(path) if path.is_file() else []
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_text("", encoding="utf-8")
+        _write(part, [dict(zip(NAMES, NAMES, strict=True)), *map(_cells, self.rows)])
+        os.replace(part, path)
+
+    @property
+    def done(self) -> set[tuple[str, str, str, int]]:
+        """Keys of the cells that are there."""
+        return {row.key for row in self.rows}
+
+    def add(self, row: Row) -> None:
+        """Keep a row."""
+        self.rows.append(row)
+        _write(self.path, [_cells(row)])
+
+
+def _cells(row: Row) -> dict[str, str]:
+    return {name: _text(getattr(row, name)) for name in NAMES}
+
+
+def _write(path: Path, lines: Iterable[dict[str, str]]) -> None:
+    with path.open("a", encoding="utf-8", newline="") as file:
+        csv.DictWriter(file, NAMES).writerows(lines)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _read(path: Path) -> list[Row]:
+    with path.open(encoding="utf-8", newline="") as file:
+        table = csv.DictReader(file)
+        if table.fieldnames != NAMES:
+            raise InputError(f"'{path}' is a table of another version; name another folder or remove it")
+        lines = [line for line in table if None not in line.values()]  # the last may be cut off
+    try:
+        return [Row(**{name: _value(line[name], KINDS[name]) for name in NAMES}) for line in lines]
+    except ValueError as error:
+        raise InputError(f"'{path}' cannot be read: {error}") from None

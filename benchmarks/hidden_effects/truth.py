@@ -1,0 +1,174 @@
+"""What a hidden effect did, and which other effects could have done the same: from the truth alone.
+
+Nothing here comes from the diagnosis: forces are computed with :mod:`fmus` on the true motion and the
+true commands, without noise. They are averaged over windows of 3 s, as a force that moves the ship is.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from fmus.declare import packer, variables
+from fmus.effects.registry import Running
+from fmus.hull import mass_matrix
+from fmus.signals import Force
+from fmus.thrusters import chain
+from fmus.thrusters.allocation import Allocation, allocate
+from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
+from fmus.vessel import vessel
+
+from .runs import HEADING, POSITION, STEP, Voyage
+
+VESSEL = vessel.COMPONENT
+WINDOW, EVERY = 3.0, 0.5  # s, width of a window and from one to the next
+THIN = 5  # samples in a step for forces on the hull, which change slowly
+MASS = np.array(mass_matrix(vessel.Params().inertia))
+# An acceleration of pose noise, as a force: how much a newton counts on each axis.
+WEIGHTS = 1.0 / (np.diag(MASS) * [POSITION, POSITION, HEADING])
+WEIGHTS = WEIGHTS / WEIGHTS[0]
+Values = Mapping[str, float]
+NAMES = {c.name: {v.name for v in variables(c.params)} for c in (VESSEL, THRUSTERS)}
+
+
+def filled(component: Any, values: Values) -> Any:
+    """Parameters of a component, nominal but for the values that it has."""
+    declared = variables(component.params)
+    return packer(component.params)([float(values.get(v.name, v.start)) for v in declared])
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the camera would have seen without noise, and what was asked of the thrusters.
+
+    Attributes:
+        time: (n,) [s].
+        eta, nu, nu_dot: (n, 3), SI.
+        asked: (n, 3), shares of full force of VSP surge, VSP sway and bow.
+    """
+
+    time: np.ndarray
+    eta: np.ndarray
+    nu: np.ndarray
+    nu_dot: np.ndarray
+    asked: np.ndarray
+
+    @cached_property
+    def thin(self) -> "Motion":
+        """Every fifth sample."""
+        return Motion(*(x[::THIN] for x in (self.time, self.eta, self.nu, self.nu_dot, self.asked)))
+
+    @cached_property
+    def tau(self) -> np.ndarray:
+        """(n, 3), force of nominal thrusters [N, N, N m]."""
+        return thrust(self, self.nu, {})
+
+    @cached_property
+    def lacking(self) -> np.ndarray:
+        """(n, 3), force that the nominal model lacks."""
+        return lack(self, {})
+
+
+def motion(voyage: Voyage, values: Values) -> Motion:
+    """The motion of a run as it is measured where the measurement has the effects in ``values``."""
+    time = voyage.measured.time
+    asked = np.column_stack(allocate(*voyage.measured.tau_cmd.T, Allocation()))
+    true = Motion(time, voyage.eta, voyage.nu, voyage.nu_dot, asked)
+    eta, nu, nu_dot = behind(true, {name: -value for name, value in values.items()})
+    return Motion(time, eta, nu, nu_dot, asked)
+
+
+def behind(m: Motion, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pose, velocity and acceleration behind what a measurement with these effects has seen."""
+    late = values.get("clock_offset", 0.0)
+    eta, nu, nu_dot = (ahead(m.time, x, late) for x in (m.eta, m.nu, m.nu_dot))
+    turn = values.get("heading_offset", 0.0)
+    dx, dy = values.get("marker_offset_dx", 0.0), values.get("marker_offset_dy", 0.0)
+    x, y, psi = eta.T
+    psi = psi - turn
+    u, v = turned(turn, *nu.T[:2])
+    u_dot, v_dot = turned(turn, *nu_dot.T[:2])
+    r, r_dot = nu.T[2], nu_dot.T[2]
+    c, s = np.cos(psi), np.sin(psi)
+    return (
+        np.column_stack([x - c * dx + s * dy, y - s * dx - c * dy, psi]),
+        np.column_stack([u + r * dy, v - r * dx, r]),
+        np.column_stack([u_dot + r_dot * dy, v_dot - r_dot * dx, r_dot]),
+    )
+
+
+def turned(angle: float, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A body-fixed vector seen from a heading that is less by ``angle``."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * a - s * b, s * a + c * b
+
+
+def ahead(time: np.ndarray, x: np.ndarray, by: float) -> np.ndarray:
+    """A signal (n, 3) ``by`` seconds later."""
+    if by == 0.0:
+        return x
+    return np.column_stack([np.interp(time + by, time, column) for column in x.T])
+
+
+def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
+    """tau (n, 3) from each sample to the next, of thrusters with these effects."""
+    p = filled(THRUSTERS, values)
+    delay, lag = p.dynamics
+    asked = m.asked
+    if delay:
+        asked = np.where((m.time >= delay)[:, None], held(m.time, asked, delay), 0.0)
+    now = Running._make([m.time, *nu.T, *asked.T])
+    if lag:
+        share = 1.0 - np.exp(-STEP / lag)
+        asked = lfilter([share], [1.0, share - 1.0], asked, axis=0)
+    acting = [member.acting(p.wrong) for member in chain.IN_THRUSTERS.members]
+    tau = chain.act(tuple(asked.T), now, p.plant, acting, p.wrong)
+    return np.column_stack(np.broadcast_arrays(*tau))
+
+
+def held(time: np.ndarray, x: np.ndarray, delay: float) -> np.ndarray:
+    """Mean over each interval of a signal (n, 3) that is held between samples, ``delay`` [s] ago."""
+    whole, part = divmod(delay / STEP + 1e-9, 1.0)
+    rows = np.arange(time.size) - int(whole)
+    return (1.0 - part) * x[np.maximum(rows, 0)] + part * x[np.maximum(rows - 1, 0)]
+
+
+def lack(m: Motion, values: Values) -> np.ndarray:
+    """Force (n, 3) that a model with these additions lacks for the motion."""
+    eta, nu, nu_dot = behind(m, values)
+    body = vessel.prepare(filled(VESSEL, values))
+    # A late pose leaves the commands where they are.
+    tau = thrust(m, nu, values) if NAMES["thrusters"] & set(values) else thrust(m, nu, {})
+    free = vessel.stirred(vessel.State(*eta.T, *nu.T, m.time), Force(*tau.T), body)
+    return (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ MASS.T
+
+
+def force(m: Motion, values: Values) -> np.ndarray:
+    """What effects add to the nominal model, (n, 3) [N, N, N m].
+
+    Args:
+        m: motion and commands.
+        values: parameters of vessel and thrusters, and ``clock_offset``.
+    """
+    if set(values) <= NAMES["thrusters"]:
+        return thrust(m, m.nu, values) - m.tau
+    return m.lacking - lack(m, values)
+
+
+def windows(x: np.ndarray, step: float = STEP) -> np.ndarray:
+    """Means (K, 3) of a signal (n, 3), one sample each ``step`` [s], over windows of 3 s, every 0.5 s."""
+    width = round(WINDOW / step) + 1
+    s = np.linspace(-1.0, 1.0, width)
+    weights = (1.0 - s * s) ** 3
+    parts = np.lib.stride_tricks.sliding_window_view(x, width, axis=0)[:: round(EVERY / step)]
+    return parts @ (weights / weights.sum())
+
+
+def over(runs: Sequence[Motion], values: Values) -> np.ndarray:
+    """Windows (K, 3) of what effects add, over some runs one after the other."""
+    if set(values) <= NAMES["thrusters"]:
+        return np.concatenate([windows(force(m, values)) for m in runs])
+    return np.concatenate([windows(force(m.thin, values), THIN * STEP) for m in runs])
