@@ -25,6 +25,7 @@ ENOUGH = 0.05  # of cost, below which no further step is taken
 # A moment cannot be refined by slopes: it is searched around, with these steps [s].
 MOMENT = "bow_failure_time"
 MOMENT_STEPS = (1.0, 0.2)
+LIKELY = 3.84  # of cost, above the least: what 95 % of the time is less
 DECLARED: dict[str, Variable] = {p.name: p for e in EFFECTS.values() for p in e.parameters}
 
 
@@ -150,12 +151,14 @@ class Refined:
         left: (K, 3), its model error.
         columns: (K, 3, p), slopes by the parameters that were fitted.
         cost: loss and unlikeliness together.
+        span: 95 % interval of a moment [s]; None without one.
     """
 
     point: Point
     left: np.ndarray
     columns: np.ndarray
     cost: float
+    span: tuple[float, float] | None = None
 
 
 def refine(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:
@@ -208,14 +211,20 @@ def refine(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:
 def moment(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:
     """The failure's time, searched around a first guess [s]."""
 
+    def best(of: Sequence[Refined]) -> Refined:
+        return min(of, key=lambda r: r.cost)
+
     def tried(time: float) -> Refined:
         return refine(p, at, doubt, replace(begin, values={MOMENT: max(time, MOMENT_STEPS[-1])}))
 
-    found = tried(begin.values[MOMENT])
+    all_tried = [tried(begin.values[MOMENT])]
     for size in MOMENT_STEPS:
-        middle = found.point.values[MOMENT]
-        found = min([found, *[tried(middle + k * size) for k in range(-5, 6)]], key=lambda r: r.cost)
-    return found
+        middle = best(all_tried).point.values[MOMENT]
+        all_tried += [tried(middle + k * size) for k in range(-5, 6)]
+    found = best(all_tried)
+    likely = [r.point.values[MOMENT] for r in all_tried if r.cost < found.cost + LIKELY]
+    reach = MOMENT_STEPS[-1]
+    return replace(found, span=(min(likely) - reach, max(likely) + reach))
 
 
 def polished(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:

@@ -13,7 +13,7 @@ from .contest import Contest, Step, candidates, contend, same
 from .library import NOMINAL
 from .model import Model
 from .ranking import RIDGE, Judged, first_share
-from .refining import Point, Problem
+from .refining import MOMENT, Point, Problem
 from .waves import Waves, waves
 from .weak import Integrals
 
@@ -133,7 +133,8 @@ def learn(
     ci95 = {n: interval(at.values[n], float(s)) for n, s in zip(names, std, strict=False)}
     for k, f in enumerate(findings):  # as refitted along with the later ones
         values = {n: at.values[n] for n in f.values}
-        findings[k] = replace(f, values=values, ci95={n: c for n, c in ci95.items() if n in values})
+        mine = {n: c for n, c in ci95.items() if n in values}
+        findings[k] = replace(f, values=values, ci95=dict(f.ci95) | mine)
     suspects = suspected(prior, shift[len(names) :], std[len(names) :]) if prior > 0.0 else []
     if swell is not None:
         findings.insert(0, of_waves(swell, start))
@@ -160,11 +161,12 @@ def finding(step: Step, contest: Contest, size: float, rng: np.random.Generator)
         rng: for the bootstrap.
     """
     first, *others = contest.judged
+    moment = contest.refined[first.candidate].span
     left, before = float(first.blocks.sum()), float(step.nothing.blocks.sum())
     return Finding(
         contest.ids[first.candidate],
         contest.starts[first.candidate].values,
-        {},
+        {} if moment is None else {MOMENT: moment},
         float(first_share(contest.table, contest.judged, REPLICATES, rng)[0]),
         [contest.ids[j.candidate] for j in others if same(contest.table, first, j)],
         1.0 - left / size,
