@@ -30,13 +30,13 @@ SPEEDS = np.linspace(0.02, 1.0, 25)
 class Region(NamedTuple):
     """Largest |u|, |v| [m/s] and |r| [rad/s] at which the ship operates.
 
-    The default holds 99 % of what NTNU measured of CyberShip Enterprise 1; the thesis' paths stay below
-    half of it.
+    The default holds 99 % of each of the four runs that NTNU published of CyberShip Enterprise 1; the
+    thesis' paths stay below half of it.
     """
 
-    u: float = 0.35
-    v: float = 0.15
-    r: float = 0.4
+    u: float = 0.4
+    v: float = 0.2
+    r: float = 0.6
 
     @classmethod
     def of(cls, nu: np.ndarray) -> "Region":
