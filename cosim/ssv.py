@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from .archive import check_xml
 from .errors import InputError
 
 NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -32,7 +33,9 @@ def read_parameters(path: Path) -> dict[str, dict[str, Parameter]]:
         InputError: missing, no parameter set, a name twice, or a value that is no number.
     """
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        content = path.read_bytes()
+        check_xml(content, path, "a parameter set")
+        root = ElementTree.fromstring(content)
     except FileNotFoundError:
         raise InputError(f"no such parameter set: '{path}'") from None
     except (OSError, ElementTree.ParseError, LookupError, ValueError) as error:
