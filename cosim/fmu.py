@@ -33,6 +33,7 @@ from .errors import InputError, SimulationError
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 DESCRIPTION = "modelDescription.xml"
+SLAVE_MODULE = "resources/slavemodule.txt"  # of a Python FMU: which module it is
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
 
 # FMPy's logger proxy knows one logger for the whole process: ours finds the instance by its number.
@@ -243,14 +244,14 @@ class Instance:
             os.chdir(here)
             there = sorted(path.name for path in (folder / "binaries").glob("*"))
             why = f"{error}" if fmpy.platform in there else f"it has {', '.join(there) or 'no binaries'}"
-            why += _tool_hint(model)
+            why += _tool_hint(model, folder)
             raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {why}") from error
 
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others
         # may work in threads of their own and must not find it held.
         self.is_python = hasattr(self._fmu.dll, "finalizePythonInterpreter")
-        if self.is_python and not (folder / "resources" / "slavemodule.txt").is_file():
-            raise InputError(f"'{model.path}' is a Python FMU without its resources/slavemodule.txt")
+        if self.is_python and not (folder / SLAVE_MODULE).is_file():
+            raise InputError(f"'{model.path}' is a Python FMU without its {SLAVE_MODULE}")
         # A Python FMU saves its state in many small pieces, and does not tell how far it got.
         self.can_redo = bool(
             not self.is_python and cs.canGetAndSetFMUstate and cs.canHandleVariableCommunicationStepSize
@@ -275,7 +276,7 @@ class Instance:
         # pythonfmu undoes no escapes but that of the space.
         uri = f"file://{str(resources).replace(' ', '%20')}" if self.is_python else resources.as_uri()
         # A module of the same name that is there already would be taken for the FMU's own.
-        script = resources / "slavemodule.txt"
+        script = folder / SLAVE_MODULE
         module = script.read_text().strip() if self.is_python else ""
         other = sys.modules.pop(module, None)
         component = self._fmu.fmi2Instantiate(
@@ -294,7 +295,7 @@ class Instance:
             sys.modules[module] = other
         if not component:
             why = f": {self.complaint}" if self.complaint else ""
-            why += _tool_hint(self.model)
+            why += _tool_hint(self.model, folder)
             raise InputError(f"'{self.model.path}' cannot be instantiated as '{self.name}'{why}")
         return int(component)
 
@@ -407,8 +408,9 @@ class Instance:
         self._fmu.freeLibrary()
 
 
-def _tool_hint(model: Model) -> str:
-    """What may be the reason why an FMU does not start."""
+def _tool_hint(model: Model, folder: Path) -> str:
+    """What may be the reason why an FMU does not start; a Python FMU's tool is there, it is Python."""
     cs = model.description.coSimulation
-    needs_tool = cs is not None and cs.needsExecutionTool
-    return "; it needs the tool that it was made with to be installed" if needs_tool else ""
+    if cs is None or not cs.needsExecutionTool or (folder / SLAVE_MODULE).is_file():
+        return ""
+    return "; it needs the tool that it was made with to be installed"

@@ -180,21 +180,18 @@ def _fmu_builder(*arguments: str) -> list[str]:
 
 
 def _check_processes(system: System) -> None:
-    """An FMU may want a process for each instance, or a tool that it was made with."""
+    """Some FMUs want a process for each instance."""
     together: dict[str, str] = {}
     for name, model in system.models.items():
         capabilities = model.description.coSimulation
-        if capabilities is None:
+        if system.scenario.fmus[name].isolate or capabilities is None:
             continue
-        if capabilities.needsExecutionTool:
-            system.warnings.append(f"{name}: '{model.path}' needs the tool that it was made with")
-        if capabilities.canBeInstantiatedOnlyOncePerProcess and not system.scenario.fmus[name].isolate:
-            other = together.setdefault(model.sha256, name)
-            if other != name:
-                raise InputError(
-                    f"fmus.{name}: '{model.path}' can be instantiated only once per process, and "
-                    f'{other} does; give one of them "isolate": true'
-                )
+        other = together.setdefault(model.sha256, name)
+        if other != name and capabilities.canBeInstantiatedOnlyOncePerProcess:
+            raise InputError(
+                f"fmus.{name}: '{model.path}' can be instantiated only once per process, and "
+                f'{other} does; give one of them "isolate": true'
+            )
 
 
 def whole(ratio: float) -> int | None:

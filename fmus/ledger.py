@@ -1,7 +1,7 @@
 """What was built here: the hash of every program file that a build on this computer put into an FMU.
 
-A file with such a hash came from this project's source, from a component file that was given to the build,
-or from the installed pythonfmu: nothing in it is a stranger's. The model description holds no program and
+A file with such a hash came from this project's source, from a component file given to the build, or
+from the installed pythonfmu: nothing in it is a stranger's. The model description holds no program and
 does not count, so an FMU whose start values were changed is still one of ours.
 """
 
