@@ -377,8 +377,15 @@ class Instance:
         return float(values[0])
 
     def set_up(self, stop: float) -> None:
-        """Announce the experiment."""
-        self.call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=0.0, stopTime=stop))
+        """Announce the experiment, from 0 to stop [s], with the tolerance that the FMU suggests."""
+        suggested = self.model.description.defaultExperiment
+        tolerance = None if suggested is None else suggested.tolerance
+        self.call(
+            "fmi2SetupExperiment",
+            lambda: self._fmu.setupExperiment(
+                tolerance=None if tolerance is None else float(tolerance), startTime=0.0, stopTime=stop
+            ),
+        )
 
     def enter_initialization(self) -> None:
         self.call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)

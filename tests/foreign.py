@@ -13,6 +13,7 @@ STATE = 'canGetAndSetFMUstate="true"'
 
 SOURCE = r"""
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
