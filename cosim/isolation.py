@@ -16,7 +16,7 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from .access import WARNING, Access, Memory, Port
-from .channel import CALL, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
+from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
 from .errors import InputError, SimulationError
 from .fmu import Model, Variable
 
@@ -24,6 +24,7 @@ from .fmu import Model, Variable
 TIMEOUT = 60.0
 # For a process that has nothing more to do to end [s].
 PATIENCE = 5.0
+START = "its instantiation"
 
 
 class IsolatedInstance:
@@ -73,7 +74,7 @@ class IsolatedInstance:
         self._closed = threading.Event()
         threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
         path = str(model.path.resolve())
-        self._send("its instantiation", CALL, json.dumps(["start", name, path, str(folder)]).encode())
+        self._send(START, CALL, json.dumps(["start", name, path, str(folder)]).encode())
 
     def _watch(self) -> None:
         """End the process when it takes too long to answer; the one who waits for it notices."""
@@ -117,12 +118,12 @@ class IsolatedInstance:
         except EOFError:
             self._give_up()
         self._waiting_since = None
-        self._talking, self._asked = False, ""
-        if kind == REFUSED:
-            raise InputError(body.decode())
-        if kind == FAILED:
-            raise SimulationError(body.decode())
-        return body
+        what, self._talking, self._asked = self._asked, False, ""
+        if kind == DONE:
+            return body
+        if what == START:
+            self._lost = body.decode()  # nothing there to be terminated or freed
+        raise (InputError if kind == REFUSED else SimulationError)(body.decode())
 
     def _give_up(self) -> NoReturn:
         """The process is gone: tell why.
@@ -131,6 +132,7 @@ class IsolatedInstance:
             SimulationError: always.
         """
         self._waiting_since = None
+        self._closed.set()
         try:
             code = self._process.wait(PATIENCE)
         except subprocess.TimeoutExpired:  # closed its pipes and lives on

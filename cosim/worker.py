@@ -106,9 +106,9 @@ def main() -> None:
         sys.stdout.reconfigure(line_buffering=True)  # a crash must not swallow what was said before
     try:
         Worker(channel).serve()
-        sys.stdout.flush()
-    except BrokenPipeError:
-        pass  # the master is gone
+    except OSError:
+        os._exit(1)  # the master is gone, or the FMU has closed the pipes
+    sys.stdout.flush()
     # Libraries of FMUs that clean up when the process ends sometimes crash there.
     os._exit(0)
 

@@ -153,14 +153,17 @@ def test_crash_at_the_end_does_not_spoil_the_run(plain_fmu, tmp_path):
     assert any("died in fmi2Terminate (exit code 3)" in line for line in shown)
 
 
-def test_refused_instantiation_is_bad_input(plain_fmu, tmp_path):
+def test_refused_instantiation_is_bad_input(plain_fmu, tmp_path, capfd):
     fmu = plain_fmu(
         "Refuses",
         GAIN + "\nif 'pytest' not in __import__('sys').modules: raise ValueError('not today')\n",
     )
     with pytest.raises(cosim.InputError, match="cannot be instantiated as 'a'"):
-        cosim.simulate(cosim.load_scenario(one(fmu)), tmp_path / "out")
+        cosim.simulate(cosim.load_scenario(one(fmu)), tmp_path / "out", show=print)
     assert not (tmp_path / "out").exists()
+    told = "".join(capfd.readouterr())
+    assert "died" not in told
+    assert "AttributeError" not in told
 
 
 def test_two_versions_that_share_module_names_run_side_by_side(plain_fmu, tmp_path):
