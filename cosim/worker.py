@@ -96,8 +96,10 @@ def main() -> None:
     """Keep the pipes to the master for this module alone: what the FMU prints goes to standard error."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the master's to handle
     if sys.platform == "linux":
+        libc = ctypes.CDLL(None)
         # Without it, an FMU that hangs would outlive a master that was killed.
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        libc.setlinebuf(ctypes.c_void_p.in_dll(libc, "stdout"))  # as below, for FMUs in C
     channel = Channel(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)

@@ -156,6 +156,14 @@ def test_steps_never_vary_for_an_fmu_that_wants_them_constant(tmp_path):
     assert cosim.simulate(cosim.load_scenario(content), tmp_path / "out").status == "done"
 
 
+def test_last_words_of_a_crashing_fmu_are_heard(tmp_path, capfd):
+    fmu = build_lag(tmp_path, "lag", 'if (t > 0.45) { printf("so it ends\\n"); abort(); }')
+    content = alone(fmu)
+    content["fmus"]["lag"]["isolate"] = True
+    cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+    assert capfd.readouterr().err.count("so it ends") == 1
+
+
 @pytest.mark.parametrize("habit", ["abort();", "raise(11);", "_exit(0);", "for (;;) sleep(1);"])
 def test_compiled_fmu_that_crashes_or_hangs_is_one_message(tmp_path, habit):
     fmu = build_lag(tmp_path, "lag", f"if (t > 0.45) {{ {habit} }}")

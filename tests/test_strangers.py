@@ -15,11 +15,11 @@ import cosim
 
 FOLDER = os.environ.get("CYBERSHIP_FMUS", "")
 FOREIGN = sorted(Path(FOLDER).glob("*.fmu")) if FOLDER else []
+if FOLDER and not FOREIGN:
+    raise FileNotFoundError(f"CYBERSHIP_FMUS names '{FOLDER}', where no FMU is")
 
 
-@pytest.mark.skipif(
-    not FOREIGN, reason="no FMUs of other tools: CYBERSHIP_FMUS names no folder with any"
-)
+@pytest.mark.skipif(not FOREIGN, reason="no FMUs of other tools: CYBERSHIP_FMUS names no folder")
 @pytest.mark.parametrize("isolate", [False, True])
 @pytest.mark.parametrize("path", FOREIGN, ids=lambda p: p.stem)
 def test_fmu_of_others_does_what_fmpy_makes_it_do(path, isolate, tmp_path):

@@ -153,13 +153,27 @@ def test_master_has_no_way_to_run_text():
     """No call of eval, exec, compile or __import__, nothing that unpickles; modules are imported by constants."""
     forbidden = {"eval", "exec", "compile", "__import__"}
     modules = {"pickle", "marshal", "shelve", "yaml", "dill", "code", "runpy"}
-    for path in (ROOT / "cosim").glob("*.py"):
+    for path in (ROOT / "cosim").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id not in forbidden, (path, node.lineno)
             if isinstance(node, (ast.Import, ast.ImportFrom)):
                 names = {a.name for a in node.names} | {getattr(node, "module", "") or ""}
                 assert not modules & {n.partition(".")[0] for n in names}, (path, node.lineno)
+
+
+def test_whoever_reads_xml_or_unpacks_looks_first():
+    """Parsing goes with check_xml in the same module; archives are unpacked by cosim.archive alone."""
+    parsers = ("ElementTree.fromstring(", "ElementTree.parse(", "ElementTree.iterparse(", "etree.XML(")
+    readers = []
+    for path in (ROOT / "cosim").rglob("*.py"):
+        source = path.read_text()
+        assert ".extractall(" not in source, path
+        assert ".extract(" not in source, path
+        if any(parser in source for parser in parsers):
+            assert "check_xml(" in source, path
+            readers.append(path.name)
+    assert {"fmu.py", "ssv.py"} <= set(readers)
 
 
 def test_text_in_a_scenario_stays_text(ellipse, tmp_path):
