@@ -243,6 +243,19 @@ def test_no_native_refuses_one_changed_program_file(fmus, tmp_path, prefix, suff
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("library", ["../../documentation/evil", "/tmp/evil", "C:evil", ""])
+def test_library_is_never_looked_for_elsewhere(fmus, tmp_path, library):
+    """The hashes cover the folder of libraries; a model description could point out of it."""
+
+    def edit(name, data):
+        old, new = b'modelIdentifier="vessel"', f'modelIdentifier="{library}"'.encode()
+        return data.replace(old, new) if name == "modelDescription.xml" else data
+
+    done = no_native(tmp_path, edited(fmus["vessel"], tmp_path / "other.fmu", edit))
+    assert done.returncode == 2
+    assert "is no identifier" in done.stderr
+
+
 def test_no_native_refuses_a_python_fmu_of_others(plain_fmu, tmp_path):
     """Its binaries are those of the installed pythonfmu; the program is its Python."""
     fmu = plain_fmu("Stranger", GAIN)
