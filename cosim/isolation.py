@@ -20,7 +20,8 @@ from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, 
 from .errors import InputError, SimulationError
 from .fmu import Model, Variable
 
-# Longest wall time of one call [s], where the scenario does not tell.
+# Longest wall time of one call [s], where the scenario does not tell. Instantiation, for which a process
+# is started, may always take that long.
 TIMEOUT = 60.0
 # For a process that has nothing more to do to end [s].
 PATIENCE = 5.0
@@ -79,10 +80,13 @@ class IsolatedInstance:
     def _watch(self) -> None:
         """End the process when it takes too long to answer; the one who waits for it notices."""
         while not self._closed.wait(min(0.5, self._timeout / 4)):
-            since = self._waiting_since
-            if since is not None and time.monotonic() - since > self._timeout:
+            since, allowed = self._waiting_since, self._allowed()
+            if since is not None and time.monotonic() - since > allowed:
                 self._is_late = True
                 self._kill()
+
+    def _allowed(self) -> float:
+        return max(self._timeout, TIMEOUT) if self._asked == START else self._timeout
 
     def _kill(self) -> None:
         with suppress(OSError):
@@ -139,7 +143,7 @@ class IsolatedInstance:
             self._kill()
             code = self._process.wait()
         if self._is_late:
-            how = f"{self._asked} took longer than {self._timeout:g} s; its process was ended"
+            how = f"{self._asked} took longer than {self._allowed():g} s; its process was ended"
         else:
             how = f"its process died in {self._asked} ({_reason(code)})"
         self._lost = f"{self.name}: {how}"
