@@ -47,6 +47,8 @@ class Finding:
         confidence: share of bootstrap replicates in which it came first.
         alike: ids that these data cannot tell from it, itself not among them.
         q2: cross-validated share of the model error that is explained.
+        model: with this and all earlier findings.
+        share: cross-validated share of the first model error's sum of squares that this one explains.
     """
 
     id: str
@@ -55,15 +57,42 @@ class Finding:
     confidence: float
     alike: Sequence[str]
     q2: float
+    model: Model = field(default_factory=Model)
+    share: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """A nominal coefficient that is likely wrong.
+
+    Attributes:
+        name: of the coefficient.
+        z: standard deviations of its prior by which the data move it.
+        value: the new total.
+    """
+
+    name: str
+    z: float
+    value: float
 
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What was learned: findings in order, ranking of the first step, the model that has them all."""
+    """What was learned.
+
+    Attributes:
+        findings: in the order of acceptance.
+        ranking: of the first step.
+        model: that has all findings.
+        suspects: nominal coefficients that are likely wrong.
+        sigma: (3,), noise of each axis at the first step [N, N, N m].
+    """
 
     findings: Sequence[Finding] = field(default_factory=list)
     ranking: Sequence[Ranked] = field(default_factory=list)
     model: Model = field(default_factory=Model)
+    suspects: Sequence[Suspect] = field(default_factory=list)
+    sigma: np.ndarray = field(default_factory=FLOOR.copy)
 
 
 def learn(
@@ -87,6 +116,7 @@ def learn(
     rng = np.random.default_rng(seed)
     findings: list[Finding] = []
     first: list[Ranked] = []
+    left, sigma = 1.0, FLOOR
     for step in range(MOST):
         advance(f"step {step + 1}: every effect as a candidate")
         base = evaluate(data, model)
@@ -97,6 +127,7 @@ def learn(
             (judge(t, k, len(c.shapes)) for k, c in enumerate(candidates)), key=lambda j: j.score
         )
         if step == 0:
+            sigma = t.sigma
             total = float(t.grams[:, 0, 0].sum())
             first = [
                 Ranked(candidates[j.candidate].effect.id, j.score, 1.0 - j.blocks.sum() / total)
@@ -112,9 +143,12 @@ def learn(
         ci95 = {n: (values[n] - 1.96 * s, values[n] + 1.96 * s) for n, s in std.items()}
         alike = [candidates[j.candidate].effect.id for j in ranked[1:] if same(t, best, j)]
         q2 = explained(t, best)
-        findings.append(Finding(found.effect.id, values, ci95, float(confidence), alike, q2))
         model = model.plus(values)
-    return Learned(findings, first, model)
+        share, left = left * q2, left * (1.0 - q2)
+        findings.append(
+            Finding(found.effect.id, values, ci95, float(confidence), alike, q2, model, share)
+        )
+    return Learned(findings, first, model, sigma=sigma)
 
 
 def explained(t: Table, j: Judged) -> float:
