@@ -1,8 +1,8 @@
-"""From files to runs that can be judged: read all, then clean and smooth, several at a time if it pays."""
+"""From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
 
 import signal
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -16,17 +16,12 @@ from cosim import InputError
 from .cleaning import clean
 from .measurement import Run, read
 from .smoothing import Smoothed, smooth
+from .steps import Advance, silent
 from .weak import Integrals, integrals
 
 PROCESSES = 2
 # Rows in all; below, a second process takes longer to start than it saves.
 WORTH = 60_000
-
-Advance = Callable[[str], None]
-
-
-def silent(what: str) -> None:
-    """Where nobody wants to know what is being done."""
 
 
 def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integrals]:

@@ -1,4 +1,4 @@
-"""Where the model fails: by time, speed, yaw rate, thruster level and heading, and only where it is sure.
+"""Where the model fails: by time, speed, yaw rate, thruster level and heading, where that is sure.
 
 Neighbouring windows share samples, so that stretches of 30 s are what counts as independent: errors of
 means are cluster-robust over blocks (Liang and Zeger 1986). A region is named only if the logarithm of
@@ -8,11 +8,10 @@ test, Bonferroni).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
+from .clusters import Mean, chance, clustered
 from .covariates import AXES, Course, Kind, courses
 from .weak import Integrals
 
@@ -25,32 +24,6 @@ BEYOND = 1.4
 WORSE = 1.4
 LEAST_SHARE, MOST_SHARE = 0.05, 0.6
 FEWEST_BLOCKS = 4
-
-
-class Mean(NamedTuple):
-    """A mean with its variance and the degrees of freedom of that."""
-
-    mean: float
-    variance: float
-    free: int
-
-
-def clustered(total: np.ndarray, count: np.ndarray) -> Mean:
-    """Mean over blocks that are independent, for the sum and the number (blocks,) of what is in each."""
-    there = count > 0
-    n, blocks = float(count.sum()), int(there.sum())
-    mean = float(total.sum()) / max(n, 1.0)
-    off = total[there] - count[there] * mean
-    return Mean(mean, float(off @ off) / max(n, 1.0) ** 2 * blocks / max(blocks - 1, 1), blocks - 1)
-
-
-def chance(a: Mean, b: Mean) -> float:
-    """Probability that a is as far above b, or further, though they are the same (Welch)."""
-    variance = a.variance + b.variance
-    if a.free < 1 or b.free < 1 or variance <= 0.0:
-        return 1.0
-    free = variance**2 / (a.variance**2 / a.free + b.variance**2 / b.free)
-    return float(stats.t.sf((a.mean - b.mean) / np.sqrt(variance), free))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,29 +113,27 @@ def where(data: Sequence[Integrals], omega: Sequence[np.ndarray], std: Sequence[
         std: of each run its uncertainty (K, 3).
     """
     squares, noise = np.concatenate(omega) ** 2, np.concatenate(std) ** 2
-    blocks = np.unique(
-        np.concatenate([10_000 * k + w.block // TOGETHER for k, w in enumerate(data)]),
-        return_inverse=True,
-    )
+    stretches = np.concatenate([10_000 * k + w.block // TOGETHER for k, w in enumerate(data)])
+    block = np.unique(stretches, return_inverse=True)[1]
     many = len(data) > 1
     sentences: list[str] = []
     regions: list[Region] = []
     profiles: list[Profile] = []
     for k, by in enumerate(courses(data)):
         axis = AXES[k]
-        tables = [_Table.of(axis, c, squares[:, k], noise[:, k], blocks[1], many) for c in by]
+        tables = [_Table.of(axis, c, squares[:, k], noise[:, k], block, many) for c in by]
         profiles += [t.profile for t in tables]
         ms, own = squares[:, k].mean(), noise[:, k].mean()
         rms, sure = f"{np.sqrt(ms):.2g}", f"{np.sqrt(own):.1g}"
-        if not seen(squares[:, k], noise[:, k], blocks[1]):
+        if not seen(squares[:, k], noise[:, k], block):
             sentences.append(
                 f"{NAMES[axis]}: no error seen, {rms} {UNITS[axis]} is within the uncertainty of {sure}."
             )
             continue
         named = sorted(filter(None, (t.worst() for t in tables)), key=lambda r: -r.contrast)
         regions += named
-        throughout = f"{NAMES[axis]}: {rms} {UNITS[axis]} (uncertainty {sure}), nowhere clearly worse than elsewhere."
-        sentences.append(named[0].sentence if named else throughout)
+        throughout = f"{rms} {UNITS[axis]} (uncertainty {sure}), nowhere clearly worse than elsewhere."
+        sentences.append(named[0].sentence if named else f"{NAMES[axis]}: {throughout}")
     return Where(sentences, regions, profiles)
 
 
@@ -175,7 +146,7 @@ def seen(squares: np.ndarray, noise: np.ndarray, blocks: np.ndarray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """Sums of squares, of the noise alone too, and windows (bins, blocks) of an axis over a covariate."""
+    """Sums of squares, of the noise alone, and numbers of windows (bins, blocks) of an axis."""
 
     profile: Profile
     total: np.ndarray
@@ -212,7 +183,7 @@ class _Table:
                     yield first, after
 
     def worst(self) -> Region | None:
-        """Of the regions that are surely worse than the rest the one that parts best; None if none is."""
+        """Of the regions that are surely worse than the rest the one that parts best."""
         bins = len(self.total)
         options = list(self.candidates())
         best: Region | None = None
