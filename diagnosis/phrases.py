@@ -140,7 +140,7 @@ for _name, _who in (("loss_vsp", "propellers give"), ("loss_bow", "bow thruster 
 for _name, _what in (("surge", "surge force"), ("sway", "sway force"), ("yaw", "yaw moment")):
     _lost(
         f"loss_{_name}",
-        f"{{}} of the commanded {_what} does not arrive.",
+        f"Of the commanded {_what} {{}} do not arrive.",
         f"The {_what} is {{}} larger than commanded.",
     )
 

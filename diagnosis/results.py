@@ -108,21 +108,16 @@ class WhereResult(Part):
     profiles: list[ProfileResult]
 
 
-class Made(Part):
-    """What a result was made with."""
-
-    runs: list[str]
-    model: str | None
-    files: list[str]
-    versions: dict[str, str]
-
-
-class Comparison(Made):
-    """The content of ``comparison.json``."""
+class Comparison(Part):
+    """The content of ``comparison.json``; at its end what it was made with."""
 
     data: Data
     errors: list[RunErrors]
     where: WhereResult
+    runs: list[str]
+    model: str | None
+    files: list[str]
+    versions: dict[str, str]
 
 
 class Coefficient(Part):
@@ -175,8 +170,8 @@ class StabilityResult(Part):
     warnings: list[str]
 
 
-class Diagnosis(Made):
-    """The content of ``diagnosis.json``."""
+class Diagnosis(Part):
+    """The content of ``diagnosis.json``; at its end what it was made with."""
 
     verdict: Literal["found", "ambiguous", "none"]
     sentence: str
@@ -190,3 +185,7 @@ class Diagnosis(Made):
     stability: StabilityResult
     prior: Number
     seed: int
+    runs: list[str]
+    model: str | None
+    files: list[str]
+    versions: dict[str, str]

@@ -1,6 +1,6 @@
 """What the commands show on a terminal of 80 columns, or in a pipe."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import degrees
 
 from rich.console import RenderableType
@@ -17,7 +17,7 @@ def show_comparison(r: Comparison, out: str) -> Iterator[RenderableType]:
     """All that ``diagnosis.compare`` shows."""
     yield from _data(r.data)
     yield from _lines("Where the model fails", r.where.sentences)
-    yield from _titled("Errors of the model", _errors(r.errors, learned=False))
+    yield from _errors(r.errors, learned=False)
     yield from _files(r.files, out)
 
 
@@ -38,10 +38,9 @@ def show_diagnosis(r: Diagnosis, out: str) -> Iterator[RenderableType]:
         ]
         yield from _lines("Suspect coefficients", suspects)
     if r.effects:
-        best = ", ".join(f"{c.id} {_number(c.q2, 2)}" for c in r.ranking[:BEST])
+        best = ", ".join(f"{c.id} {_percent(c.q2, 1)}" for c in r.ranking[:BEST])
         yield from _lines("Best candidates, share of the model error explained", [best])
-    title = "Errors before -> after" if r.effects else "Errors of the model"
-    yield from _titled(title, _errors(r.errors, learned=bool(r.effects)))
+    yield from _errors(r.errors, learned=bool(r.effects))
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)
 
@@ -51,7 +50,7 @@ def _titled(title: str, body: RenderableType) -> Iterator[RenderableType]:
     yield Padding(body, (0, 0, 1, 2))
 
 
-def _lines(title: str, lines: Sequence[str]) -> Iterator[RenderableType]:
+def _lines(title: str, lines: Iterable[str]) -> Iterator[RenderableType]:
     yield from _titled(title, Text("\n".join(lines)))
 
 
@@ -90,22 +89,26 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield from filter(None, (e.separation, e.advice))
 
 
-def _errors(errors: Sequence[RunErrors], learned: bool) -> Table:
-    table = _table("run", "position [mm]", "heading [°]", "X [N]", "Y [N]", "N [N m]")
+def _errors(errors: Sequence[RunErrors], learned: bool) -> Iterator[RenderableType]:
+    """What predictions over 8 s miss, and the RMS of the model error."""
+    missed, lacking = (
+        _table("run", "position [mm]", "heading [°]"),
+        _table("run", "X [N]", "Y [N]", "N [N m]"),
+    )
 
     def cell(before: float | None, after: float | None, scale: float = 1.0) -> str:
         parts = (before, after) if learned else (before,)
         return " -> ".join(_number(None if x is None else scale * x, 2) for x in parts)
 
     for e in errors:
-        position, heading, omega = e.window_position_rmse, e.window_heading_rmse, e.omega_rms
-        table.add_row(
-            _run(e.run, e.held_out),
-            cell(position.before, position.after, 1e3),
-            cell(heading.before, heading.after, degrees(1.0)),
-            *(cell(b, a) for b, a in zip(omega.before, omega.after, strict=True)),
-        )
-    return table
+        run, position, heading = _run(e.run, e.held_out), e.window_position_rmse, e.window_heading_rmse
+        far = cell(position.before, position.after, 1e3)
+        missed.add_row(run, far, cell(heading.before, heading.after, degrees(1.0)))
+        forces = zip(e.omega_rms.before, e.omega_rms.after, strict=True)
+        lacking.add_row(run, *(cell(b, a) for b, a in forces))
+    when = ", before -> after" if learned else ""
+    yield from _titled(f"Predictions over 8 s miss by{when}", missed)
+    yield from _titled(f"Force that the model lacks{when}", lacking)
 
 
 def _stability(r: Diagnosis) -> Iterator[str]:
@@ -130,5 +133,5 @@ def _number(x: float | None, digits: int = 3) -> str:
     return f"{x:.0f}" if abs(x) >= 10.0**digits else f"{x:.{digits}g}"
 
 
-def _percent(x: float | None) -> str:
-    return "-" if x is None else f"{100.0 * x:.0f} %"
+def _percent(x: float | None, decimals: int = 0) -> str:
+    return "-" if x is None else f"{100.0 * x:.{decimals}f} %"
