@@ -60,7 +60,7 @@ def diagnosis(found: Diagnosed, model: Path | None, files: Sequence[str]) -> res
             bounded=s.bounded,
             region=s.region,
             mass_definite=s.mass_definite,
-            warnings=list(s.warnings),
+            notes=list(s.notes),
         ),
         prior=found.prior,
         seed=found.seed,

@@ -167,7 +167,7 @@ class StabilityResult(Part):
     bounded: bool
     region: str | None
     mass_definite: bool
-    warnings: list[str]
+    notes: list[str]
 
 
 class Diagnosis(Part):

@@ -81,7 +81,7 @@ class Diagnosed:
     @property
     def sound(self) -> bool:
         """Whether the learned model has a mass and stays bounded in closed loop."""
-        return bool(self.stability.mass_definite and self.stability.bounded)
+        return bool(self.stability.safe)
 
 
 def confront(

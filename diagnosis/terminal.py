@@ -118,12 +118,12 @@ def _stability(r: Diagnosis) -> Iterator[str]:
     bounded = "stays bounded" if s.bounded else "does NOT stay bounded"
     yield f"In closed loop the learned model {bounded} on the reference paths."
     yield (
-        f"smallest dissipation {_number(s.learned_min_dissipation)}, "
-        f"of the model at first {_number(s.nominal_min_dissipation)}"
+        f"smallest dissipation {_number(s.learned_min_dissipation)} 1/s, "
+        f"of the model at first {_number(s.nominal_min_dissipation)} 1/s"
     )
     if s.region:
-        yield f"warning: it dissipates less {s.region}"
-    yield from (f"warning: {text}" for text in s.warnings)
+        yield f"warning: less dissipation than at first: {s.region}"
+    yield from s.notes
 
 
 def _number(x: float | None, digits: int = 3) -> str:

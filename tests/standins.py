@@ -38,7 +38,8 @@ def check(model, nominal, advance):
         bounded=bounded,
         region=None,
         mass_definite=True,
-        warnings=(),
+        notes=(),
+        safe=bounded,
     )
 
 

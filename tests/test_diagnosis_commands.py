@@ -214,7 +214,7 @@ def test_a_model_that_is_not_sound_is_written_only_on_demand(
 ):
     stability = import_module("diagnosis.stability").check(found.learned.model, found.start, print)
     values = {n: getattr(stability, n) for n in results.StabilityResult.model_fields}
-    loose = type("Stability", (), values | {"bounded": False})
+    loose = type("Stability", (), values | {"bounded": False, "safe": False})
     monkeypatch.setattr(session, "diagnose", lambda *_: replace(found, stability=loose))
     (tmp_path / "model.ssv").write_text("of yesterday")
     files = [runs / "a.csv", "--test", runs / "b.csv"]
