@@ -31,6 +31,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 }
 FAMILY = {name: family for family, names in FAMILIES.items() for name in names}
 OTHER = "other"
+MOST_TOLD = 4
 
 # What brings out each family.
 EXCITE = {
@@ -115,20 +116,30 @@ def tell_apart(one: str, other: str) -> str:
     """
     families = family(one), family(other)
     found = BY_ID.get(frozenset((one, other))) or BY_FAMILY.get(frozenset(families))
-    return found or "run " + ", and ".join(dict.fromkeys(EXCITE[f] for f in families))
+    return found or "run " + "; and ".join(dict.fromkeys(EXCITE[f] for f in families))
 
 
 def advice(name: str, alike: Sequence[str]) -> str:
-    """What to run next, for an effect and those that the data cannot tell from it; empty if none."""
+    """What to run next, for an effect and those that the data cannot tell from it; empty if none.
+
+    Args:
+        name: id of the effect.
+        alike: ids of the others, the most likely first; what is told is for the first few.
+    """
     texts: dict[str, list[str]] = {}
-    for other in alike:
+    for other in alike[:MOST_TOLD]:
         texts.setdefault(tell_apart(name, other), []).append(other)
-    return " ".join(f"To tell {name} from {listed(ids)}: {text}." for text, ids in texts.items())
+    told = [f"To tell {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
+    if len(alike) > MOST_TOLD:
+        told.append("So many causes fit that the data hold too little: vary speed, turn and drift more.")
+    return " ".join(told)
 
 
-def listed(names: Iterable[str]) -> str:
-    """Names in a row: a, b or c."""
-    *most, last = names
+def listed(names: Sequence[str]) -> str:
+    """Names in a row: a, b or c; of many the first few, and how many more."""
+    shown = [*names[:MOST_TOLD]]
+    more = len(names) - len(shown)
+    *most, last = [*shown, f"{more} others"] if more else shown
     return f"{', '.join(most)} or {last}" if most else last
 
 

@@ -150,12 +150,12 @@ def diagnose(
 def _shares(learned: Learned, start: Model, held_out: Sequence[Integrals]) -> list[float]:
     """Fall of the sum of squares by each finding, as a part of that at first; axes weighted by noise."""
     if not held_out:
-        return [float(np.clip(f.share, 0.0, 1.0)) for f in learned.findings]
+        return [min(1.0, max(0.0, f.share)) for f in learned.findings]
     models = [start, *(f.model for f in learned.findings)]
     sums = np.array(
         [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
     )
-    return np.clip(-np.diff(sums) / sums[0], 0.0, 1.0).tolist()
+    return [min(1.0, max(0.0, share)) for share in (-np.diff(sums) / sums[0]).tolist()]
 
 
 def _reached(runs: Sequence[Integrals]) -> tuple[float, float, float]:

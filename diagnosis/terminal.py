@@ -11,6 +11,7 @@ from rich.text import Text
 from .results import Comparison, Data, Diagnosis, EffectResult, RunErrors
 
 BEST = 5
+LITTLE = 0.01
 
 
 def show_comparison(r: Comparison, out: str) -> Iterator[RenderableType]:
@@ -86,6 +87,8 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield e.equation
     share = _percent(e.share_of_error)
     yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error"
+    if not (e.share_of_error or 0.0) >= LITTLE:
+        yield "warning: with it the error hardly falls, which is no reason to believe it"
     yield from filter(None, (e.separation, e.advice))
 
 

@@ -103,3 +103,11 @@ def test_known_pairs():
     said = advice("lag", ["delay", "clock_offset"])
     assert said.count("To tell lag from") == 2
     assert separation_note("lag", ["delay", "mass", "X_u"]).endswith("from delay, mass or X_u.")
+
+
+def test_of_many_others_the_likeliest_are_told():
+    others = [name for name in EFFECTS if name != "X_u"]
+    assert separation_note("X_u", others).endswith(f"or {len(others) - 4} others.")
+    said = advice("X_u", others)
+    assert said.count("To tell") <= 4
+    assert said.endswith("vary speed, turn and drift more.")
