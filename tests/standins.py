@@ -8,7 +8,10 @@ from types import ModuleType, SimpleNamespace
 
 from cosim import InputError, ssv
 
-EMPTY = f'<ParameterSet xmlns="{ssv.NAMESPACE}" version="1.0" name="model"><Parameters>%s</Parameters></ParameterSet>'
+HOME = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+EMPTY = (
+    f'<ParameterSet xmlns="{HOME}" version="1.0" name="model"><Parameters>%s</Parameters></ParameterSet>'
+)
 
 
 def write_model(path, model):
