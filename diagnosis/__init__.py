@@ -9,6 +9,12 @@ A measured run goes through three steps, each model-free, before a model sees it
     windows = diagnosis.Windows([smoothed])
     nominal = windows.errors()
     slower = windows.errors(vessel={"delta_X_u": -4.0})
+
+or all at once, as ``python -m diagnosis.learn`` does it::
+
+    runs = diagnosis.gather(["run1.csv", "run2.csv"])
+    found = diagnosis.diagnose(runs[:1], held_out=runs[1:])
+    print(found.verdict, [f.id for f in found.learned.findings])
 """
 
 from importlib import import_module
@@ -18,19 +24,28 @@ if TYPE_CHECKING:
     from cosim import InputError
 
     from .cleaning import Counts, Track, clean
+    from .gathering import gather
     from .measurement import Run, read
+    from .model import Model
+    from .session import Confronted, Diagnosed, confront, diagnose
     from .smoothing import Smoothed, smooth
     from .windows import WindowErrors, Windows
 
 __all__ = [
+    "Confronted",
     "Counts",
+    "Diagnosed",
     "InputError",
+    "Model",
     "Run",
     "Smoothed",
     "Track",
     "WindowErrors",
     "Windows",
     "clean",
+    "confront",
+    "diagnose",
+    "gather",
     "read",
     "smooth",
 ]
@@ -40,6 +55,12 @@ _HOME = {
     "Counts": "diagnosis.cleaning",
     "Track": "diagnosis.cleaning",
     "clean": "diagnosis.cleaning",
+    "gather": "diagnosis.gathering",
+    "Model": "diagnosis.model",
+    "Confronted": "diagnosis.session",
+    "Diagnosed": "diagnosis.session",
+    "confront": "diagnosis.session",
+    "diagnose": "diagnosis.session",
     "Run": "diagnosis.measurement",
     "read": "diagnosis.measurement",
     "Smoothed": "diagnosis.smoothing",

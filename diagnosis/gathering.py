@@ -1,0 +1,103 @@
+"""From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
+
+import signal
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from cosim import InputError
+
+from .cleaning import clean
+from .measurement import Run, read
+from .smoothing import Smoothed, smooth
+from .steps import Advance, silent
+from .weak import Integrals, integrals
+
+PROCESSES = 2
+# Rows in all; below, a second process takes longer to start than it saves.
+WORTH = 60_000
+
+
+def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integrals]:
+    """Read and smooth measured runs.
+
+    Args:
+        paths: files or folders of logs, see :func:`diagnosis.read`.
+        advance: told what is being done.
+
+    Returns:
+        For each run its windows of the weak form; names are unique.
+
+    Raises:
+        InputError: a run cannot be used, or is given twice, by whatever name.
+    """
+    advance("reading")
+    runs = [read(path) for path in paths]
+    _refuse_twice(runs, paths)
+    return [_windows(s) for s in _smooth_all(_distinct(runs, paths), advance)]
+
+
+def _refuse_twice(runs: Sequence[Run], paths: Sequence[str | Path]) -> None:
+    """The same measurement twice would count twice, and held out it would prove nothing."""
+    seen: dict[bytes, str | Path] = {}
+    for run, path in zip(runs, paths, strict=True):
+        content = np.column_stack([run.time, run.pose]).tobytes()
+        if content in seen:
+            again = f"'{path}' is given twice"
+            same = f"'{path}' holds the same measurement as '{seen[content]}'"
+            raise InputError(again if Path(path) == Path(seen[content]) else same)
+        seen[content] = path
+
+
+def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
+    """The runs, those of the same name with more of their path in it."""
+    times = Counter(run.name for run in runs)
+    return [
+        run if times[run.name] == 1 else replace(run, name=Path(path).absolute().as_posix())
+        for run, path in zip(runs, paths, strict=True)
+    ]
+
+
+def _smoothed(run: Run) -> Smoothed:
+    return smooth(clean(run))
+
+
+def _smooth_all(runs: Sequence[Run], advance: Advance) -> Iterable[Smoothed]:
+    if len(runs) < 2 or sum(run.time.size for run in runs) < WORTH:
+        for run in runs:
+            advance(f"smoothing {run.name}")
+            yield _smoothed(run)
+        return
+    # Ctrl-C is for this process alone, which then lets the others end.
+    pool = ProcessPoolExecutor(
+        PROCESSES, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
+    )
+    try:
+        futures = [pool.submit(_smoothed, run) for run in runs]
+        for run, future in zip(runs, futures, strict=True):
+            advance(f"smoothing {run.name}")
+            yield future.result()
+    finally:
+        with suppress(KeyboardInterrupt):
+            pool.shutdown(cancel_futures=True)
+
+
+def _windows(smoothed: Smoothed) -> Integrals:
+    """Windows of a run, at least one.
+
+    Raises:
+        InputError: the thrusters are never at work, or too much is missing.
+    """
+    run = smoothed.track.run
+    if not np.abs(run.tau_cmd).max() > 1e-6:
+        raise InputError(f"run '{run.name}': its commands are zero throughout, which tells nothing")
+    w = integrals(smoothed)
+    if not w.middle.size:
+        raise InputError(f"run '{run.name}': too much is missing while the thrusters are at work")
+    return w

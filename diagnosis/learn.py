@@ -1,0 +1,111 @@
+"""Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``."""
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from cosim import InputError
+from cosim.command import FAILED, run_command
+
+from .command import Done, folder, load_effects, parser, run
+from .folder import together
+from .steps import Advance
+
+DIAGNOSIS, MODEL, REPORT = FILES = ("diagnosis.json", "model.ssv", "report.html")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(partial(learn, _parser().parse_args(arguments)))
+
+
+def learn(options: argparse.Namespace, advance: Advance) -> Done:
+    """Do what the options say."""
+    load_effects(options.effects)
+    from . import outcome, session  # only now: they import the vessel, which has the effects
+    from .gathering import gather
+    from .terminal import show_diagnosis
+
+    with together(options.out, FILES) as new:
+        # merge: from .parameter_set import read_model, write_model; from .report import write_report
+        sets = import_module(".parameter_set", __package__)
+        write_report = import_module(".report", __package__).write_report
+        model = sets.read_model(options.model) if options.model else None
+        runs = gather([*options.train, *options.test], advance)
+        many = len(options.train)
+        found = session.diagnose(runs[:many], runs[many:], options.prior, model, advance)
+        refused = "" if found.sound or options.allow_unstable else UNSOUND
+        if not refused:
+            try:
+                sets.write_model(new / MODEL, found.learned.model)
+            except InputError as error:  # a parameter that no FMU would take
+                refused = str(error)
+        files = [name for name in FILES if not (refused and name == MODEL)]
+        result = outcome.diagnosis(found, options.model, files)
+        (new / DIAGNOSIS).write_text(result.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        content = result.model_dump(mode="json")
+        write_report(new / REPORT, content, found.runs.evidence, found.runs.std, advance=advance)
+    shown = [*show_diagnosis(result, str(options.out))]
+    if refused:
+        return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
+    return Done(0, shown)
+
+
+UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
+
+
+def _prior(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"needs a number of zero or more, not '{text}'")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = parser(
+        "learn",
+        "Learn from measured runs which physical effect a model lacks, and how sure that is.",
+        "examples:  python -m diagnosis.learn run1.csv run2.csv --test run3.csv\n"
+        "           python -m diagnosis.learn results/hidden_drag --prior 0 --out results/found\n"
+        "           python -m diagnosis.learn run1.csv --effects my_effects.py\n"
+        "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
+        "            130 interrupted (nothing is written)",
+    )
+    made.add_argument(
+        "train",
+        type=Path,
+        nargs="+",
+        metavar="TRAIN",
+        help="measured run to learn from, or folder of a log",
+    )
+    made.add_argument(
+        "--test",
+        type=Path,
+        nargs="+",
+        action="extend",
+        metavar="RUN",
+        default=[],
+        help="runs of which nothing is learned, to see the error fall",
+    )
+    made.add_argument(
+        "--prior",
+        type=_prior,
+        metavar="SHARE",
+        default=0.1,
+        help="relative standard deviation believed of every nominal coefficient; 0: exact (0.1)",
+    )
+    made.add_argument(
+        "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
+    )
+    out = Path("results", "diagnosis")
+    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

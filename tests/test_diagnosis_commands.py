@@ -1,0 +1,423 @@
+"""The commands of the diagnosis: files, terminal, exit codes; and bad input, one line each."""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import redirect_stdout
+from dataclasses import replace
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import standins
+from measured import sail
+
+import diagnosis
+from cosim import InputError
+from diagnosis import compare, learn, results, session
+from diagnosis.folder import together
+from fmus.effects import EFFECTS
+
+HERE = Path(__file__).parent
+COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+DRAG = {"ship": {"delta_X_u": -3.0}}
+SIGNALS = {"time": "time"} | {n: f"observer.{n}_m" for n in ("x", "y", "psi")}
+SIGNALS |= {f"tau_{a}": f"thrusters.tau_cmd_{a}" for a in "XYN"}
+
+
+def frame(seconds=96.0, **hidden):
+    run, _ = sail(seconds, h=0.05, **hidden)
+    return pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory):
+    """A folder with measured runs: a and b of a ship with more drag than the model's, c of the model's."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, seconds, hidden in (("a", 96.0, DRAG), ("b", 48.0, DRAG), ("c", 96.0, {})):
+        frame(seconds, seed=ord(name), **hidden).to_csv(folder / f"{name}.csv", index=False)
+    return folder
+
+
+def run(main, *arguments):
+    """Exit code and standard output of a command."""
+    shown = StringIO()
+    with redirect_stdout(shown):
+        try:
+            code = main([str(a) for a in arguments])
+        except SystemExit as end:
+            code = end.code
+    return code, shown.getvalue()
+
+
+def strict(path):
+    def refuse(constant):
+        raise AssertionError(f"{constant} in {path}")
+
+    return json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+
+
+def model(folder):
+    return import_module("diagnosis.parameter_set").read_model(folder / "model.ssv")
+
+
+@pytest.fixture(scope="session")
+def learned(runs, tmp_path_factory):
+    """Folder, exit code and terminal of one run of learn."""
+    out = tmp_path_factory.mktemp("out") / "deep" / "er"
+    return out, *run(learn.main, runs / "a.csv", "--test", runs / "b.csv", "--out", out)
+
+
+@pytest.fixture(scope="session")
+def found(runs):
+    """The same from Python."""
+    a, b = diagnosis.gather([runs / "a.csv", runs / "b.csv"])
+    return diagnosis.diagnose([a], [b])
+
+
+def test_the_files_are_there_and_nothing_else(learned):
+    out, code, _ = learned
+    assert code == 0
+    assert sorted(p.name for p in out.iterdir()) == ["diagnosis.json", "model.ssv", "report.html"]
+
+
+def test_the_hidden_drag_is_found_and_the_error_falls(learned):
+    out, _, _ = learned
+    told = strict(out / "diagnosis.json")
+    first = told["effects"][0]
+    assert first["id"] == "X_u"
+    assert told["verdict"] == ("ambiguous" if first["indistinguishable"] else "found")
+    low, high = first["coefficients"]["delta_X_u"]["ci95"]
+    assert low < -3.0 < high
+    assert first["share_of_error"] > 0.9
+    for errors, held_out in zip(told["errors"], (False, True), strict=True):
+        assert errors["held_out"] is held_out
+        for key in ("window_position_rmse", "window_heading_rmse"):
+            assert errors[key]["after"] < 0.3 * errors[key]["before"]
+        assert errors["omega_rms"]["after"][0] < 0.1 * errors["omega_rms"]["before"][0]
+    assert model(out).vessel["delta_X_u"] == first["coefficients"]["delta_X_u"]["value"]
+
+
+def test_json_has_every_key_of_the_format(learned):
+    told = strict(learned[0] / "diagnosis.json")
+    assert results.Diagnosis.model_validate(told).model_dump(mode="json") == told
+    assert {
+        "verdict",
+        "effects",
+        "suspect_coefficients",
+        "ranking",
+        "data",
+        "errors",
+        "stability",
+    } <= set(told)
+    effect = {
+        "id",
+        "axis",
+        "coefficients",
+        "confidence",
+        "share_of_error",
+        "indistinguishable",
+        "advice",
+    }
+    assert effect <= set(told["effects"][0])
+    assert {"value", "unit", "ci95"} == set(told["effects"][0]["coefficients"]["delta_X_u"])
+    assert {"id", "score", "q2"} == set(told["ranking"][0])
+    assert {r["id"] for r in told["ranking"]} <= set(EFFECTS)
+    counts = {"samples", "frozen", "dropped", "spikes", "used"}
+    assert counts <= set(told["data"])
+    for name in counts:
+        assert told["data"][name] == sum(r[name] for r in told["data"]["runs"])
+    stable = {"nominal_min_dissipation", "learned_min_dissipation", "bounded", "region"}
+    assert stable <= set(told["stability"])
+
+
+def test_terminal_tells_what_the_file_tells_within_80_columns(learned):
+    out, _, text = learned
+    told = strict(out / "diagnosis.json")
+    flat = " ".join(text.split())
+    assert max(map(len, text.splitlines()[:-1])) <= 80
+    for part in (
+        told["effects"][0]["sentence"],
+        told["effects"][0]["equation"],
+        *told["where"]["sentences"],
+    ):
+        assert " ".join(part.split()) in flat
+    assert "b (held out)" in flat
+    assert flat.endswith(f"diagnosis.json, model.ssv, report.html in {out}")
+
+
+def test_python_gives_the_numbers_of_the_command(learned, found):
+    told = strict(learned[0] / "diagnosis.json")
+    assert [f.id for f in found.learned.findings] == [e["id"] for e in told["effects"]]
+    assert list(found.shares) == [e["share_of_error"] for e in told["effects"]]
+    assert found.verdict == told["verdict"]
+    for e, errors in zip(found.runs.evidence, told["errors"], strict=True):
+        assert e.before.position == errors["window_position_rmse"]["before"]
+        assert e.after.omega_rms.tolist() == errors["omega_rms"]["after"]
+
+
+def test_of_a_log_only_the_measurement_is_read(learned, runs, tmp_path):
+    """Whatever the log says of the plant, the bytes are those of a CSV file with the measurement alone."""
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        table = pd.read_csv(runs / f"{name}.csv").rename(columns=SIGNALS)
+        table.assign(**{"vessel.x": 7.0}).to_csv(tmp_path / name / "log.csv", index=False)
+        plant = {"scenario": {"fmus": {"vessel": {"parameters": {"delta_X_u": 9.0, "m": 99.0}}}}}
+        (tmp_path / name / "log.json").write_text(json.dumps(plant))
+    code, _ = run(learn.main, tmp_path / "a", "--test", tmp_path / "b", "--out", tmp_path / "out")
+    assert code == 0
+    assert (tmp_path / "out" / "diagnosis.json").read_bytes() == (
+        learned[0] / "diagnosis.json"
+    ).read_bytes()
+
+
+def test_nothing_is_found_where_nothing_is_missing(runs, tmp_path):
+    code, text = run(learn.main, runs / "c.csv", "--prior", "0", "--out", tmp_path)
+    told = strict(tmp_path / "diagnosis.json")
+    assert code == 0
+    assert told["verdict"] == "none"
+    assert told["effects"] == []
+    assert told["sentence"] in text
+    for key in ("window_position_rmse", "window_heading_rmse", "omega_rms"):
+        assert told["errors"][0][key]["after"] == told["errors"][0][key]["before"]
+    assert all("no error seen" in s for s in told["where"]["sentences"])
+    empty = model(tmp_path)
+    assert (dict(empty.vessel), dict(empty.thrusters), empty.clock) == ({}, {}, 0.0)
+
+
+def test_compare_with_the_learned_model_gives_the_errors_after(learned, runs, tmp_path):
+    ssv = learned[0] / "model.ssv"
+    before, _ = run(compare.main, runs / "a.csv", runs / "b.csv", "--out", tmp_path / "1")
+    after, _ = run(compare.main, runs / "a.csv", runs / "b.csv", "--model", ssv, "--out", tmp_path / "2")
+    assert (before, after) == (0, 0)
+    assert sorted(p.name for p in (tmp_path / "1").iterdir()) == ["comparison.json", "report.html"]
+    told = strict(learned[0] / "diagnosis.json")["errors"]
+    first, last = (strict(tmp_path / k / "comparison.json") for k in "12")
+    assert results.Comparison.model_validate(first).model_dump(mode="json") == first
+    assert (first["model"], last["model"]) == (None, "model.ssv")
+    for e, b, a in zip(told, first["errors"], last["errors"], strict=True):
+        for key in ("window_position_rmse", "window_heading_rmse", "omega_rms"):
+            assert b[key]["before"] == e[key]["before"]
+            assert a[key]["before"] == pytest.approx(e[key]["after"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("options", "code"), [([], 3), (["--allow-unstable"], 0)])
+def test_a_model_that_is_not_sound_is_written_only_on_demand(
+    options, code, found, runs, tmp_path, monkeypatch
+):
+    stability = import_module("diagnosis.stability").check(found.learned.model, found.start, print)
+    values = {n: getattr(stability, n) for n in results.StabilityResult.model_fields}
+    loose = type("Stability", (), values | {"bounded": False, "safe": False})
+    monkeypatch.setattr(session, "diagnose", lambda *_: replace(found, stability=loose))
+    (tmp_path / "model.ssv").write_text("of yesterday")
+    files = [runs / "a.csv", "--test", runs / "b.csv"]
+    got, text = run(learn.main, *files, "--out", tmp_path, *options)
+    assert got == code
+    assert ("model.ssv is NOT written" in text) == bool(code)
+    assert (tmp_path / "model.ssv").exists() == (not code)
+    assert strict(tmp_path / "diagnosis.json")["stability"]["bounded"] is False
+    assert ("model.ssv" in strict(tmp_path / "diagnosis.json")["files"]) == (not code)
+
+
+UGLY = {
+    "a missing file": (["aa.csv"], "did you mean 'a.csv'?"),
+    "a folder without a log": (["."], "log.csv is missing"),
+    "a missing column": (["column.csv"], "no column 'psi'; did you mean 'psii'?"),
+    "another unit": (["unit.csv"], "is its position in mm?"),
+    "nothing but NaN": (["nan.csv"], "does not move"),
+    "an empty file": (["empty.csv"], "cannot be read"),
+    "only a header": (["header.csv"], "too short"),
+    "too short": (["short.csv"], "too short"),
+    "too short to learn": (["little.csv"], "too little to learn from"),
+    "no motion": (["still.csv"], "does not move"),
+    "no thrust": (["idle.csv"], "commands are zero throughout"),
+    "the same run twice": (["a.csv", "a.csv"], "is given twice"),
+    "held out what was learned": (["a.csv", "--test", "copy.csv"], "the same measurement as"),
+    "a model that is none": (["a.csv", "--model", "a.csv"], "cannot be read as a parameter set"),
+    "an unknown parameter": (["a.csv", "--model", "wrong.ssv"], "delta_X_v"),
+    "a folder that is a file": (["a.csv", "--out", "a.csv"], "cannot write to"),
+    "effects that are none": (["a.csv", "--effects", "none.py"], "effects"),
+}
+
+
+@pytest.fixture(scope="session")
+def ugly(runs):
+    """The folder of the runs with those that cannot be used."""
+    good = pd.read_csv(runs / "a.csv")
+    good.rename(columns={"psi": "psii"}).to_csv(runs / "column.csv", index=False)
+    good.assign(x=1e3 * good.x, y=1e3 * good.y).to_csv(runs / "unit.csv", index=False)
+    good.assign(x=np.nan, y=np.nan, psi=np.nan).to_csv(runs / "nan.csv", index=False)
+    (runs / "empty.csv").write_text("")
+    good[:0].to_csv(runs / "header.csv", index=False)
+    good[:100].to_csv(runs / "short.csv", index=False)
+    good[:600].to_csv(runs / "little.csv", index=False)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((len(good), 3))
+    good.assign(**dict(zip(("x", "y", "psi"), noise.T + 1.0, strict=True))).to_csv(
+        runs / "still.csv", index=False
+    )
+    good.assign(tau_X=0.0, tau_Y=0.0, tau_N=0.0).to_csv(runs / "idle.csv", index=False)
+    good.to_csv(runs / "copy.csv", index=False)
+    row = '<Parameter name="vessel.delta_X_v"><Real value="1"/></Parameter>'
+    (runs / "wrong.ssv").write_text(standins.EMPTY % row)
+    (runs / "none.py").write_text("x = 1\n")
+    return runs
+
+
+@pytest.mark.parametrize("case", UGLY)
+def test_bad_input_is_one_line_and_leaves_nothing(case, ugly, tmp_path, monkeypatch, capfd):
+    arguments, message = UGLY[case]
+    monkeypatch.chdir(ugly)
+    before = sorted(ugly.iterdir())
+    out = [] if "--out" in arguments else ["--out", tmp_path / "out" / "in"]
+    code, text = run(learn.main, *arguments, *out)
+    assert code == 2
+    assert text == ""
+    said = capfd.readouterr().err
+    assert message in said
+    assert len(said.splitlines()) == 1
+    assert sorted(ugly.iterdir()) == before
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("prior", ["-0.1", "nan", "much"])
+def test_a_prior_that_is_none_is_refused(prior, runs, capfd):
+    code, _ = run(learn.main, runs / "a.csv", f"--prior={prior}")
+    assert code == 2
+    assert "zero or more" in capfd.readouterr().err
+    with pytest.raises(InputError, match="zero or more"):
+        diagnosis.diagnose([], prior=-0.1)
+
+
+def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
+    (tmp_path / "a.csv").write_bytes((runs / "b.csv").read_bytes())
+    names = [w.run.name for w in diagnosis.gather([runs / "a.csv", tmp_path / "a.csv"])]
+    assert len(set(names)) == 2
+
+
+@pytest.mark.slow
+def test_two_processes_give_what_one_gives(runs, monkeypatch):
+    from diagnosis import gathering
+
+    files = [runs / "a.csv", runs / "b.csv"]
+    alone = diagnosis.gather(files)
+    monkeypatch.setattr(gathering, "WORTH", 0)
+    for one, two in zip(alone, diagnosis.gather(files), strict=True):
+        np.testing.assert_array_equal(one.smoothed.nu, two.smoothed.nu)
+        assert one.run.name == two.run.name
+
+
+def write(out, text, error=None, names=("a", "b")):
+    with together(out, ["a", "b"]) as new:
+        for name in names:
+            (new / name).write_text(text)
+        assert not error or new.parent == out
+        if error:
+            raise error
+
+
+def test_files_appear_together_or_not_at_all(tmp_path):
+    out = tmp_path / "new" / "folder"
+    with pytest.raises(KeyboardInterrupt):
+        write(out, "half", KeyboardInterrupt())
+    assert not list(tmp_path.iterdir())
+    write(out, "1")
+    with pytest.raises(InputError):
+        write(out, "2", InputError())
+    assert {p.name: p.read_text() for p in out.iterdir()} == {"a": "1", "b": "1"}
+    write(out, "3", names=["a"])
+    assert {p.name: p.read_text() for p in out.iterdir()} == {"a": "3"}
+
+
+def in_a_process(command, *arguments):
+    """A command in a process of its own, where no vessel was imported yet."""
+    text = (
+        "import standins, sys; from importlib import import_module; from cosim.command import run_command; "
+        f"m = import_module('diagnosis.{command}'); run_command(lambda: m.main(sys.argv[1:]))"
+    )
+    paths = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
+    return subprocess.Popen(
+        [sys.executable, "-c", text, *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+    )
+
+
+def test_commands_are_listed_and_explain_themselves():
+    listed = subprocess.run(
+        [sys.executable, "-m", "diagnosis"], capture_output=True, text=True, check=True
+    )
+    for command in ("compare", "learn"):
+        assert f"python -m diagnosis.{command}" in listed.stdout
+        told = subprocess.run(
+            [sys.executable, "-m", f"diagnosis.{command}", "--help"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert "examples:" in told.stdout
+        assert told.stderr == ""
+
+
+USERS = '''
+from typing import Annotated
+from fmus.effects import effect
+
+@effect("N_uuv", kind="force", axis="N", formula="N = k u u v", symbol="k")
+def N_uuv(ship, N_uuv: Annotated[float, "N.s3/m3", "moment by u u v"] = 0.0):
+    """A moment that I suspect."""
+    return 0.0, 0.0, N_uuv * ship.u * ship.u * ship.v
+'''
+
+
+@pytest.mark.slow
+def test_an_effect_of_the_user_is_found(tmp_path):
+    (tmp_path / "mine.py").write_text(USERS)
+    make = (
+        "import sys; from pathlib import Path; from fmus.effects import load; load(Path(sys.argv[1]));"
+        "import test_diagnosis_commands as t;"
+        "t.frame(96.0, ship={'N_uuv': 400.0}).to_csv(sys.argv[2], index=False)"
+    )
+    paths = os.pathsep.join([str(HERE), str(HERE.parent)])
+    subprocess.run(
+        [sys.executable, "-c", make, tmp_path / "mine.py", tmp_path / "run.csv"],
+        env=os.environ | {"PYTHONPATH": paths},
+        check=True,
+    )
+    arguments = [tmp_path / "run.csv", "--effects", tmp_path / "mine.py", "--out", tmp_path / "out"]
+    ended = in_a_process("learn", *arguments, "--prior", "0")
+    text, said = ended.communicate()
+    assert (ended.returncode, said) == (0, "")
+    first = strict(tmp_path / "out" / "diagnosis.json")["effects"][0]
+    assert first["id"] == "N_uuv"
+    assert first["coefficients"]["N_uuv"]["value"] == pytest.approx(400.0, rel=0.1)
+    assert first["sentence"] == "The ship has an effect that the model lacks: A moment that I suspect."
+    assert "N = k u u v; k = " in text
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
+def test_ctrl_c_leaves_nothing(runs, tmp_path):
+    out = tmp_path / "out"
+    ended = in_a_process("learn", runs / "a.csv", "--out", out)
+    while not out.exists():
+        time.sleep(0.02)
+        assert ended.poll() is None
+    ended.send_signal(signal.SIGINT)
+    assert "interrupted" in ended.communicate()[1]
+    assert ended.returncode == 130
+    assert not list(tmp_path.iterdir())
+
+
+def test_numbers_that_are_none_are_null():
+    change = results.Change(before=math.nan, after=math.inf)
+    assert change.model_dump_json() == '{"before":null,"after":null}'
