@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Sequence
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 from cosim.command import run_command
@@ -25,12 +24,11 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     load_effects(options.effects)
     from . import outcome, session  # only now: they import the vessel, which has the effects
     from .gathering import gather
+    from .parameter_set import read_model
+    from .report import write_report
     from .terminal import show_comparison
 
     with together(options.out, FILES) as new:
-        # merge: from .parameter_set import read_model; from .report import write_report
-        read_model = import_module(".parameter_set", __package__).read_model
-        write_report = import_module(".report", __package__).write_report
         model = read_model(options.model) if options.model else None
         found = session.confront(gather(options.runs, advance), model, advance=advance)
         advance("where it fails")

@@ -3,7 +3,6 @@
 import argparse
 from collections.abc import Sequence
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 from cosim import InputError
@@ -26,20 +25,19 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     load_effects(options.effects)
     from . import outcome, session  # only now: they import the vessel, which has the effects
     from .gathering import gather
+    from .parameter_set import read_model, write_model
+    from .report import write_report
     from .terminal import show_diagnosis
 
     with together(options.out, FILES) as new:
-        # merge: from .parameter_set import read_model, write_model; from .report import write_report
-        sets = import_module(".parameter_set", __package__)
-        write_report = import_module(".report", __package__).write_report
-        model = sets.read_model(options.model) if options.model else None
+        model = read_model(options.model) if options.model else None
         runs = gather([*options.train, *options.test], advance)
         many = len(options.train)
         found = session.diagnose(runs[:many], runs[many:], options.prior, model, advance)
         refused = "" if found.sound or options.allow_unstable else UNSOUND
         if not refused:
             try:
-                sets.write_model(new / MODEL, found.learned.model)
+                write_model(new / MODEL, found.learned.model)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         files = [name for name in FILES if not (refused and name == MODEL)]

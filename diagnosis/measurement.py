@@ -6,6 +6,7 @@ files that NTNU publishes of CyberShip Enterprise 1.
 """
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05
+# What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
+INTERRUPTED = "Calling read(nbytes) on source failed"
 MATLAB = "cse1_data"
 MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
 
@@ -168,8 +171,18 @@ def _names(path: Path, layout: Layout) -> list[str]:
 def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
     if path.suffix == ".parquet":
         return pd.read_parquet(path, columns=wanted)
+    content = BytesIO(path.read_bytes())
+    try:
+        return _read_csv(content, layout, wanted)
+    except pd.errors.ParserError as error:
+        if INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
+        raise
+
+
+def _read_csv(content: BytesIO, layout: Layout, wanted: list[str]) -> pd.DataFrame:
     return pd.read_csv(
-        path,
+        content,
         sep=layout.separator,
         decimal=layout.decimal,
         usecols=lambda name: str(name).strip() in wanted,

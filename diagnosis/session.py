@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from cosim import InputError
 from .evidence import Evidence, examine
 from .model import Model
 from .selection import Learned, learn
+from .stability import Region, Stability, check
 from .steps import Advance, silent
 from .uncertainty import omega_std
 from .weak import BLOCK, Integrals, omega
@@ -58,7 +58,7 @@ class Diagnosed:
         shares: for each finding the share of the error's sum of squares that it takes away.
         runs: those for training, then those held out, before and after.
         start: the model at first.
-        stability: of the learned model, see :mod:`diagnosis.stability`.
+        stability: of the learned model.
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
         prior, seed: that it was learned with.
     """
@@ -67,7 +67,7 @@ class Diagnosed:
     shares: Sequence[float]
     runs: Confronted
     start: Model
-    stability: Any
+    stability: Stability
     speeds: tuple[float, float, float]
     prior: float
     seed: int
@@ -141,8 +141,8 @@ def diagnose(
     learned = learn(train, prior, start, advance, seed)
     runs = confront(train, start, learned.model if learned.findings else None, held_out, advance)
     advance("stability")
-    # The check of the learned model, see docs/stability.md.
-    stability = import_module(".stability", __package__).check(learned.model, start, advance)
+    reached = Region.of(np.concatenate([w.smoothed.nu[w.known] for w in train]))
+    stability = check(learned.model, start, advance, reached)
     shares = _shares(learned, start, held_out)
     return Diagnosed(learned, shares, runs, start, stability, _reached(train), prior, seed)
 

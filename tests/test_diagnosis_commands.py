@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import standins
 from measured import sail
 
 import diagnosis
@@ -25,6 +24,10 @@ from diagnosis import compare, learn, results, session
 from diagnosis.folder import together
 from fmus.effects import EFFECTS
 
+EMPTY = (
+    '<ParameterSet xmlns="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0" '
+    'name="model"><Parameters>%s</Parameters></ParameterSet>'
+)
 HERE = Path(__file__).parent
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 DRAG = {"ship": {"delta_X_u": -3.0}}
@@ -265,7 +268,7 @@ def ugly(runs):
     good.assign(tau_X=0.0, tau_Y=0.0, tau_N=0.0).to_csv(runs / "idle.csv", index=False)
     good.to_csv(runs / "copy.csv", index=False)
     row = '<Parameter name="vessel.delta_X_v"><Real value="1"/></Parameter>'
-    (runs / "wrong.ssv").write_text(standins.EMPTY % row)
+    (runs / "wrong.ssv").write_text(EMPTY % row)
     (runs / "none.py").write_text("x = 1\n")
     return runs
 
@@ -338,7 +341,7 @@ def test_files_appear_together_or_not_at_all(tmp_path):
 def in_a_process(command, *arguments):
     """A command in a process of its own, where no vessel was imported yet."""
     text = (
-        "import standins, sys; from importlib import import_module; from cosim.command import run_command; "
+        "import sys; from importlib import import_module; from cosim.command import run_command; "
         f"m = import_module('diagnosis.{command}'); run_command(lambda: m.main(sys.argv[1:]))"
     )
     paths = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
