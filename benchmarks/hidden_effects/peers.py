@@ -1,9 +1,9 @@
 """What others make of the same runs: PySINDy's STLSQ and scikit-learn's PLS.
 
 Both get the model error in weak form and the very columns of the diagnosis' candidates, one for each
-coefficient; of an effect that is not straight, the shape that alone explains most. The effect whose column
-has the largest standardised coefficient counts as the first. Their settings are chosen by cross-validation
-over blocks of time, as it would be done by hand.
+coefficient; of an effect that is not straight, the shape that alone explains most. The effect whose
+column has the largest standardised coefficient counts as the first. Their settings are chosen by
+cross-validation over blocks of time, as it would be done by hand.
 """
 
 import warnings

@@ -16,10 +16,11 @@ Rows = Sequence[Row]
 HEAD = """# Does the diagnosis find what it was not told?
 
 Written by `python -m benchmarks.hidden_effects`; every cell is in [results.csv](results.csv). A cell is
-a ship with something hidden in it on three courses of 240 s at 50 Hz (ellipse, figure of eight, multisine)
-to learn from, and one held out. Noise n1 is 0.5 mm and 0.05 deg, n4 and n10 are 4 and 10 times that; there
-are freezes of up to 1 s and spikes. The diagnosis gets the columns of a measurement and nothing else. With
-coefficients "wrong", every nominal coefficient of the plant is up to 10 % off, and the prior is 0.1.
+a ship with something hidden in it on three courses of 240 s at 50 Hz (ellipse, figure of eight,
+multisine) to learn from, and one held out. Noise n1 is 0.5 mm and 0.05 deg, n4 and n10 are 4 and 10
+times that; there are freezes of up to 1 s and spikes. The diagnosis gets the columns of a measurement
+and nothing else. With coefficients "wrong", every nominal coefficient of the plant is up to 10 % off,
+and the prior is 0.1.
 
 Two effects are *separable* where the best fit of one leaves at least 5 % of the other's true force,
 computed from the true motion without noise, with coefficients free to change by 10 % where they are in
