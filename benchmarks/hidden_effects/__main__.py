@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import suppress
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,10 +26,7 @@ from .runs import NOISE, build
 from .trial import Cell, trial
 
 OUT = Path("docs") / "benchmarks" / "hidden_effects"
-NONES, PAIRS = (
-    5,
-    4,
-)  # cells without an effect and with two, for each noise, kind of coefficients and seed
+NONES, PAIRS = 5, 4  # cells without an effect and with two, for each of the others and a seed
 QUICK = ("X_u", "N_r", "loss_yaw", "bow_failure", "current", "delay")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -36,17 +34,17 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 def cells(
     effects: Sequence[str], noises: Sequence[str], wrong: Sequence[bool], seeds: Sequence[int]
 ) -> Iterator[Cell]:
-    """The cells of a benchmark; with all effects also those with none and with two."""
+    """The cells of a benchmark; with more effects than one also those with none and with two."""
     for seed in seeds:
         rng = np.random.default_rng([seed, 4])
-        pairs = [tuple(rng.choice(effects, 2, replace=False).tolist()) for _ in range(PAIRS)]
-        for noise in noises:
-            for off in wrong:
-                yield from (Cell((e,), noise, off, seed) for e in effects)
-                if len(effects) > 1:
-                    # The course is that of the seed; all else is drawn anew.
-                    yield from (Cell((), noise, off, seed + 100 * k) for k in range(NONES))
-                    yield from (Cell(pair, noise, off, seed) for pair in pairs)
+        hidden: list[tuple[str, ...]] = [(e,) for e in effects]
+        for _ in range(PAIRS if len(effects) > 1 else 0):
+            hidden.append(tuple(rng.choice(effects, 2, replace=False).tolist()))
+        # The courses are those of the seed; all else is drawn anew.
+        nones = [seed + 100 * k for k in range(NONES)] if len(effects) > 1 else []
+        for noise, off in product(noises, wrong):
+            yield from (Cell(h, noise, off, seed) for h in dict.fromkeys(hidden))
+            yield from (Cell((), noise, off, each) for each in nones)
 
 
 def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:

@@ -1,7 +1,7 @@
 """What the diagnosis costs: time for four runs, memory for an hour at 100 Hz.
 
-``python -m benchmarks.hidden_effects.cost FILE.csv...`` learns from measured runs in a process of its own
-and prints seconds and megabytes.
+``python -m benchmarks.hidden_effects.cost FILE.csv...`` learns from measured runs in a process of
+its own and prints seconds and megabytes.
 """
 
 import resource

@@ -1,8 +1,8 @@
 """What is hidden, and how much of it: sizes log-uniform, 5 to 40 % of the force on its axis.
 
 The size of an effect is the RMS of the force that it adds over the RMS of the force that the thrusters
-give, on the axis where that is most, over the courses to learn from. It is set by the motion of a ship that
-lacks nothing: the controller follows its course with the effect as well.
+give, on the axis where that is most, over the courses to learn from. It is set by the motion of a ship
+that lacks nothing: the controller follows its course with the effect as well.
 """
 
 from collections.abc import Callable, Mapping, Sequence

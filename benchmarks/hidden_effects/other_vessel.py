@@ -1,4 +1,4 @@
-"""A ship that the analysis does not share: drag by |u|^1.5, integrated by the semi-implicit Euler method.
+"""A ship that the analysis does not share: drag by |u|^1.5, integrated by semi-implicit Euler.
 
 A component file: ``python -m fmus.build benchmarks/hidden_effects/other_vessel.py --out fmu``.
 """

@@ -1,8 +1,8 @@
 """How much of a hidden force each other effect could not have given: from the truth alone.
 
 The separation of a hidden effect from another is the share of the hidden force, as a sum of squares with
-the axes weighted by noise, that the best fit of the other leaves over. Where the nominal coefficients are
-in doubt, they may change by up to 10 % each to help the other.
+the axes weighted by noise, that the best fit of the other leaves over. Where the nominal coefficients
+are in doubt, they may change by up to 10 % each to help the other.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""One cell of the benchmark: hide something, let the diagnosis look for it, hold its answer to the truth."""
+"""One cell of the benchmark: hide something, let the diagnosis look for it, score its answer."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,6 @@ from diagnosis.weak import Integrals, integrals
 
 from .courses import courses
 from .draw import FOREIGN, Draw, added_force, draw
-from .peers import features, first_by_pls, first_by_sindy
 from .results import Row
 from .runs import NOISE, Hidden, RunawayError, Voyage, sail
 from .separation import COEFFICIENTS, NOTHING, SEPARABLE, Rivals
@@ -145,8 +144,9 @@ def trial(cell: Cell, fmus: Path, peers: bool) -> Row:
         seconds=answer.seconds,
     )
     if peers and cell.effects:
-        columns = features(answer.data)
-        row.sindy, row.pls = first_by_sindy(columns), first_by_pls(columns)
+        from .peers import firsts  # without peers, their packages need not be there
+
+        row.sindy, row.pls = firsts(answer.data)
     if hidden:
         alike = [confusable(d, hidden, runs[:-1], cell.wrong) for d in hidden]
         row.alike = sorted(set.union(*alike))

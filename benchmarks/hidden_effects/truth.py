@@ -159,7 +159,7 @@ def force(m: Motion, values: Values) -> np.ndarray:
 
 
 def windows(x: np.ndarray, step: float = STEP) -> np.ndarray:
-    """Means (K, 3) of a signal (n, 3), one sample each ``step`` [s], over windows of 3 s, every 0.5 s."""
+    """Means (K, 3) of a signal (n, 3), a sample each ``step`` [s], over windows of 3 s, every 0.5 s."""
     width = round(WINDOW / step) + 1
     s = np.linspace(-1.0, 1.0, width)
     weights = (1.0 - s * s) ** 3
