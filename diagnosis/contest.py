@@ -113,9 +113,10 @@ def start(step: Step, best: Judged) -> Start:
     beta = dict(zip(mine.use.tolist(), mine.fitted(step.wide.total).beta, strict=False))
     columns = step.wide.place[best.candidate, best.shape][1]
     found = {n: float(beta[k]) for n, k in zip(shape.free, columns, strict=True) if k in beta}
-    live = [n for n in (*shape.given, *found) if n != MOMENT]
+    values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
+    live = [n for n in values if n != MOMENT]
     stiff = np.zeros((len(live), len(live))) if shape.stiff is None else shape.stiff
-    return Start(dict(shape.given) | found, live, stiff)
+    return Start(values, live, stiff)
 
 
 def same(t: Table, best: Judged, other: Judged) -> bool:

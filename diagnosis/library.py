@@ -65,6 +65,8 @@ GRIDS: dict[str, tuple[str, tuple[float, ...], tuple[str, ...]]] = {
     "delay": ("delay", (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5), ()),
     "clock_offset": ("clock_offset", (-0.5, -0.3, -0.2, -0.1, -0.05), ()),
 }
+# kg, kg, kg, kg m2: heavier by about half of what moves along each axis.
+HEAVY = {"mass": 7.0, "added_mass_X": 8.0, "added_mass_Y": 12.0, "added_mass_N": 1.4}
 SATURATIONS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 # An effect that is not straight, but nearly so where it is small.
 NEARLY = ("current",)
@@ -134,6 +136,9 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
         nearly = e.id in NEARLY or e.kind in NEARLY_KINDS
         plain = shape(data, model, base, {}, free, SMALL if nearly else 1.0)
         shapes = [replace(plain, stiff=stiffness(e, base, plain.columns))]
+        if e.kind == "inertia":  # a much heavier ship is not a little heavier one many times
+            far = {name: HEAVY[name] for name in free if name in HEAVY}
+            shapes += [shape(data, model, base, far, free, SMALL)] if far else []
     return Candidate(e, shapes)
 
 

@@ -18,8 +18,8 @@ from .waves import Waves, waves
 from .weak import Integrals
 
 WAVES = "waves"
-LEAST = 12.0  # twice a log likelihood ratio that chance does not give among so many candidates
-GAIN = 0.02
+LEAST = 10.0  # twice a log likelihood ratio that chance does not give among so many candidates
+GAIN = 0.003
 Q2 = 0.05
 MOST = 6
 REPLICATES = 200

@@ -19,7 +19,7 @@ from .model import Model, acceleration, by_mass, thrust
 from .smoothing import Smoothed
 
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for
-PEAK = 12.0  # times the spectrum around it
+PEAK = 5.0  # times the spectrum around it
 AROUND = 0.9  # Hz, of the spectrum around
 SEGMENT = 25.0  # s
 NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
