@@ -30,7 +30,8 @@ class Row:
         right: the right effect came first; of two, both within two steps.
         in_set: the right effect is in the reported set.
         before_mm, after_mm: window position error of the run held out.
-        seconds: from three measured runs to the answer.
+        truth_mm: that of the true model: no model can do better.
+        seconds: of processor time, from three measured runs to the answer.
         sindy, pls: the first effect of PySINDy and of PLS.
         note: why there is no result.
     """
@@ -52,6 +53,7 @@ class Row:
     in_set: bool = False
     before_mm: float = float("nan")
     after_mm: float = float("nan")
+    truth_mm: float = float("nan")
     seconds: float = float("nan")
     sindy: str = ""
     pls: str = ""
@@ -65,6 +67,11 @@ class Row:
     def fall(self) -> float:
         """How many times smaller the error became."""
         return self.before_mm / self.after_mm
+
+    @property
+    def possible(self) -> float:
+        """How many times smaller it is with the true model."""
+        return self.before_mm / self.truth_mm
 
 
 NAMES = [f.name for f in fields(Row)]
