@@ -85,7 +85,7 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
     found.append(("right effect first where separable: PySINDy", "", share(both, by("sindy"))))
     found.append(("the same cells: PLS", "", share(both, by("pls"))))
     found.append(("the same cells: the diagnosis", "", share(both, lambda r: r.right)))
-    found.append(("time of a cell to the answer (3 runs, one core), median", "", _seconds(rows)))
+    found.append(("processor time of a cell to the answer (3 runs), median", "", _seconds(rows)))
     if cost is not None:
         found.append(("time of 4 runs x 240 s x 50 Hz", "<= 20 s", f"{cost.seconds:.1f} s"))
         found.append(("memory, one hour at 100 Hz", "< 1 GB", f"{cost.megabytes:.0f} MB"))

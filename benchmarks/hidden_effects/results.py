@@ -30,7 +30,7 @@ class Row:
         right: the right effect came first; of two, both within two steps.
         in_set: the right effect is in the reported set.
         before_mm, after_mm: window position error of the run held out.
-        seconds: from three measured runs to the answer.
+        seconds: of processor time, from three measured runs to the answer.
         sindy, pls: the first effect of PySINDy and of PLS.
         note: why there is no result.
     """

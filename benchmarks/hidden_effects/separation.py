@@ -120,7 +120,7 @@ class Rivals:
             near = [sorted(part, key=lambda s: s[0])[:4] for part in (shares[:half], shares[half:])]
             both = [a + b for (_, a), (_, b) in product(*near)]
             shares += [(self._share(target, target - offset, []), offset) for offset in both]
-        return min(share for share, _ in shares)
+        return min(1.0, *(share for share, _ in shares))  # it may as well be absent
 
     def _bent(self, target: np.ndarray, effect: str) -> float:
         """Share left by an effect that is nearly straight, by Gauss-Newton steps."""
