@@ -31,6 +31,8 @@ TAU = ("tau_X", "tau_Y", "tau_N")
 THREE = ("u_vsp_x", "u_vsp_y", "u_bow")
 FIVE = ("u1", "u2", "u3", "u4", "u5")
 COMMANDS = (TAU, THREE, FIVE)
+POWER = ("power_vsp", "power_bow")  # may be beside the five
+ALL = (*TAU, *THREE, *FIVE, *POWER)
 
 # Factor to SI of every unit that a quantity may be in.
 UNITS: dict[str, dict[str, float]] = {
@@ -49,7 +51,7 @@ QUANTITY = {
     "tau_X": "force",
     "tau_Y": "force",
     "tau_N": "moment",
-} | dict.fromkeys((*THREE, *FIVE), "command")
+} | dict.fromkeys((*THREE, *FIVE, *POWER), "command")
 
 
 class Column(BaseModel):
@@ -145,10 +147,14 @@ def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
     Raises:
         InputError: a column is missing.
     """
-    groups = [g for g in COMMANDS if any(layout.column(s).name in names for s in g)]
+    groups: list[tuple[str, ...]] = [
+        g for g in COMMANDS if any(layout.column(s).name in names for s in g)
+    ]
     if not groups:
         forms = ", or ".join(", ".join(group) for group in COMMANDS)
         raise InputError(f"{where} has no commands: {forms}{nearest(TAU[0], names)}")
+    if FIVE in groups and any(layout.column(s).name in names for s in POWER):
+        groups.append(POWER)
     told = [signal for signal in layout.columns if layout is not LOG]
     wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *told])
     for signal in wanted:

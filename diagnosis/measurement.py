@@ -17,7 +17,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.thrusters.allocation import Allocation, thrust
 
-from .columns import FIVE, LOG, POSE, TAU, THREE, Layout, read_layout, signals, to_si
+from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
 
 ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from data)
 LOGS = ("log.csv", "log.parquet")
@@ -27,6 +27,11 @@ MOST_COMMAND = 1.05
 INTERRUPTED = "Calling read(nbytes) on source failed"
 MATLAB = "cse1_data"
 MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
+# Two power settings: by hand that of the bow first, in dynamic positioning that of the VSP first.
+MATLAB_POWER = slice(12, 14)
+# The settings in dynamic positioning, at which the thrusters give their nominal force.
+FULL_VSP, FULL_BOW = 0.4, 0.5
+SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,7 @@ class Run:
         tau_cmd: (n, 3), commanded force [N, N, N m] after clipping.
         u: (n, 3), commands of VSP in surge, VSP in sway, bow [1]; None if not known.
         five: (n, 5), commands of VSP 1 surge, sway, VSP 2 surge, sway, bow [1]; None if not known.
+        power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
         notes: what was found that is not as it should be, a line each.
     """
 
@@ -49,12 +55,15 @@ class Run:
     tau_cmd: np.ndarray
     u: np.ndarray | None = None
     five: np.ndarray | None = None
+    power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
-        u, five = (None if part is None else part[keep] for part in (self.u, self.five))
-        return Run(self.name, self.time[keep], self.pose[keep], self.tau_cmd[keep], u, five, self.notes)
+        parts = (self.u, self.five, self.power)
+        u, five, power = (None if part is None else part[keep] for part in parts)
+        always = self.time[keep], self.pose[keep], self.tau_cmd[keep]
+        return Run(self.name, *always, u, five, power, self.notes)
 
 
 def propellers(five: np.ndarray) -> np.ndarray:
@@ -63,9 +72,10 @@ def propellers(five: np.ndarray) -> np.ndarray:
     return np.stack([np.hstack([five[:, :2], bow]), np.hstack([five[:, 2:4], 0.0 * bow])], axis=1)
 
 
-def force(five: np.ndarray) -> np.ndarray:
+def force(five: np.ndarray, power: np.ndarray | None = None) -> np.ndarray:
     """Nominal tau [N, N, N m], shape (n, 3), of the five commands of the real ship, shape (n, 5)."""
-    x, y, bow = propellers(five).T
+    full = propellers(five)
+    x, y, bow = (full if power is None else full * power[:, None, [0, 0, 1]]).T
     both = [thrust(x[k], y[k], bow[k], Allocation(p_y=aside)) for k, aside in enumerate(ASIDE)]
     return np.sum(both, axis=0).T
 
@@ -99,22 +109,23 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
 
-    tau, u, five = (_held(stack(group)) for group in (TAU, THREE, FIVE))
+    tau, u, five, power = (_held(stack(group)) for group in (TAU, THREE, FIVE, POWER))
+    power = None if power is None else np.maximum(power, 0.0)
     for commands in (u, five):
         most = 0.0 if commands is None else float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
-    lost = sum(not np.isfinite(columns[s]).all() for s in (*TAU, *THREE, *FIVE) if s in columns)
+    lost = sum(not np.isfinite(columns[s]).all() for s in ALL if s in columns)
     if tau is None:
         if five is not None:
-            tau = force(five)
+            tau = force(five, power)
         else:
             assert u is not None
             x, y, bow = u.T
             tau = np.column_stack(thrust(x, y, bow, Allocation()))
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     pose = np.column_stack([columns[s] for s in POSE])
-    return Run(name, columns["time"], pose, tau, u, five, notes)
+    return Run(name, columns["time"], pose, tau, u, five, power, notes)
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:
@@ -129,14 +140,31 @@ def _matlab(path: Path) -> dict[str, np.ndarray]:
     """Signals of one of NTNU's files: one matrix, one column for each sample."""
     try:
         data = np.asarray(loadmat(path)[MATLAB], float)
-        if data.ndim != 2 or data.shape[0] < MATLAB_FIVE.stop:
+        if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop:
             raise ValueError(f"a matrix of shape {data.shape}")
     except KeyError:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE]]
-    return dict(zip(("time", *POSE, *FIVE), rows, strict=True))
+    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE], *_power(data)]
+    return dict(zip(("time", *POSE, *FIVE, *POWER), rows, strict=True))
+
+
+def _power(data: np.ndarray) -> np.ndarray:
+    """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
+
+    The settings hold for stretches. In those that a controller steers, both VSP have the same sway
+    command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
+    limit.
+    """
+    bow, vsp = data[MATLAB_POWER]
+    alike = np.abs(data[MATLAB_FIVE][1] - data[MATLAB_FIVE][3]) < SAME
+    stretch = np.cumsum(
+        np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
+    )
+    steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
+    vsp, bow = np.where(steered, (bow, vsp), (vsp, bow))
+    return np.array([(np.maximum(vsp, 0.0) / FULL_VSP) ** 2, np.maximum(bow, 0.0) / FULL_BOW])
 
 
 def _tabular(path: Path) -> dict[str, np.ndarray]:

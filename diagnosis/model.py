@@ -138,6 +138,7 @@ def thrust(run: Run, model: Model, nu: Series) -> Series:
     p = model.drive
     delay, lag = p.dynamics
     acting = [member.acting(p.wrong) for member in chain.IN_THRUSTERS.members]
+    power = chain.FULL_POWER if run.power is None else chain.Power(*run.power.T)
     total = np.zeros_like(run.tau_cmd)
     for commands, aside in shares(run, model):
         given = delayed(run.time, commands, delay + model.clock)
@@ -145,6 +146,6 @@ def thrust(run: Run, model: Model, nu: Series) -> Series:
         forces = lagged(run.time, given, lag)
         plant = p.plant._replace(plant_p_y=p.plant.plant_p_y + aside)
         total += np.column_stack(
-            np.broadcast_arrays(*chain.act(tuple(forces.T), now, plant, acting, p.wrong))
+            np.broadcast_arrays(*chain.act(tuple(forces.T), now, plant, acting, p.wrong, power))
         )
     return total

@@ -18,7 +18,7 @@ from fmus.frames import rotate_to_body
 from fmus.ops import when, wrap
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import thrust
-from fmus.thrusters.chain import Inputs
+from fmus.thrusters.chain import Inputs, Power
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 from fmus.vessel import vessel
 
@@ -72,6 +72,25 @@ class Starts:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
+    @property
+    def powered(self) -> bool:
+        """Whether any run tells the power of its thrusters."""
+        return any(smoothed.track.run.power is not None for smoothed, _ in self.runs)
+
+    def times(self, first: int, steps: int, clock: float) -> list[np.ndarray]:
+        """Middle of each step, (steps, w) for each run; arguments as of :meth:`commands`."""
+        middle = (np.arange(first, first + steps)[:, None] + 0.5) * self.h - clock
+        return [smoothed.time[rows] + middle for smoothed, rows in self.runs]
+
+    def power(self, first: int, steps: int, clock: float) -> np.ndarray:
+        """(steps, 2, w): power of VSP and bow thruster, arguments as of :meth:`commands`."""
+        found = []
+        for (smoothed, _), time in zip(self.runs, self.times(first, steps, clock), strict=True):
+            run = smoothed.track.run
+            row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+            found.append(np.ones((*row.shape, 2)) if run.power is None else run.power[row])
+        return np.concatenate(found, axis=1).transpose(0, 2, 1)
+
     def commands(self, first: int, steps: int, clock: float) -> np.ndarray:
         """What is asked of the thrusters, held from sample to sample.
 
@@ -84,8 +103,8 @@ class Starts:
             (steps, 3, sets, 1, w): shares of full force where there are five commands, else tau
             [N, N, N m].
         """
-        middle = (np.arange(first, first + steps)[:, None] + 0.5) * self.h - clock
-        found = [held(smoothed, smoothed.time[rows] + middle) for smoothed, rows in self.runs]
+        times = self.times(first, steps, clock)
+        found = [held(smoothed, time) for (smoothed, _), time in zip(self.runs, times, strict=True)]
         return np.concatenate(found, axis=1).transpose(0, 3, 2, 1)[:, :, :, None]
 
 
@@ -123,7 +142,11 @@ def predict(starts: Starts, ship: Values, thrusters: Values, clock: float = 0.0)
     found = np.empty((starts.steps + 1, 3, *np.broadcast_shapes(*sizes(p, plan), s.x.shape)))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
         found[0] = vessel.measured(s, body)
-        for k, asked in enumerate(starts.commands(-before, before + starts.steps, clock), -before):
+        span = -before, before + starts.steps, clock
+        power = starts.power(*span) if starts.powered else None
+        for k, asked in enumerate(starts.commands(*span), -before):
+            if power is not None:
+                machine = THRUSTERS.prepared(plan._replace(power=Power(*power[k + before])))
             a, b, c = asked
             request = Force(*(thrust(a, b, c, plan.allocation) if starts.five else (a, b, c)))
             speed = Velocity(s.u, s.v, s.r) if k >= 0 else Velocity()

@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 import cosim
 import diagnosis
-from diagnosis.columns import FIVE, TAU, THREE
+from diagnosis.columns import FIVE, POWER, TAU, THREE
 from diagnosis.measurement import force
 from fmus.thrusters.allocation import Allocation, thrust
 
@@ -217,6 +217,40 @@ def test_matlab_matrix_of_another_kind_is_refused(tmp_path):
     refused(tmp_path / "a.mat", "it has no 'cse1_data'")
 
 
+def matlab(path, by_hand, steered):
+    """A file of NTNU with two stretches, whose power settings are given."""
+    data = np.zeros((14, N))
+    data[0], data[[1, 2, 6]], data[7:12] = TIME, POSE.T, SHARES.T
+    half = N // 2
+    data[10, half:] = data[8, half:]  # a controller asks the same of both VSP in sway
+    data[12:, :half], data[12:, half:] = np.array([by_hand, steered])[:, :, None]
+    savemat(path, {"cse1_data": data})
+    return diagnosis.read(path)
+
+
+def test_power_settings_change_places_when_a_controller_steers(tmp_path):
+    run = matlab(tmp_path / "a.mat", by_hand=(1.0, 0.2), steered=(0.4, 0.5))
+    np.testing.assert_allclose(run.power[: N // 2], np.tile([0.25, 2.0], (N // 2, 1)), rtol=1e-12)
+    np.testing.assert_allclose(run.power[N // 2 :], np.ones((N // 2, 2)), rtol=1e-12)
+    vsp_only, bow_only = run.five * [1, 1, 1, 1, 0], run.five * [0, 0, 0, 0, 1]
+    expected = run.power[:, :1] * force(vsp_only) + run.power[:, 1:] * force(bow_only)
+    np.testing.assert_allclose(run.tau_cmd, expected, atol=1e-12)
+
+
+def test_without_power_there_is_no_force(tmp_path):
+    run = matlab(tmp_path / "a.mat", by_hand=(0.0, -0.1), steered=(0.0, 0.0))
+    assert (run.tau_cmd == 0.0).all()
+
+
+def test_power_may_be_told_beside_the_five_commands(tmp_path):
+    columns = dict(zip(FIVE, SHARES.T, strict=True)) | {"power_vsp": 50.0, "power_bow": 100.0}
+    table(**columns).to_csv(tmp_path / "a.csv", index=False)
+    told = {name: {"name": name, "unit": "%"} for name in POWER}
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told}))
+    run = diagnosis.read(tmp_path / "a.csv")
+    np.testing.assert_allclose(run.tau_cmd[:, 0], 0.5 * force(SHARES)[:, 0], atol=1e-12)
+
+
 def refused(path, message):
     with pytest.raises(diagnosis.InputError) as error:
         diagnosis.read(path)
@@ -231,4 +265,5 @@ def test_measured_runs_are_read():
         assert run.name == path.stem
         assert run.five.shape == (run.time.size, 5)
         assert np.median(np.diff(run.time)) == pytest.approx(0.05)
-        assert np.abs(run.tau_cmd[:, 0]).max() == pytest.approx(2.33, rel=0.01), "full ahead, once"
+        most = np.abs(run.tau_cmd[:, 0]).max()
+        assert most == pytest.approx(2.33 * run.power[:, 0].max(), rel=0.01), "full ahead, once"

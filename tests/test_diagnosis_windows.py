@@ -193,6 +193,16 @@ def test_model_that_runs_away_is_infinitely_wrong():
     assert np.isinf(errors.over_all(0)[1]) or errors.over_all(0)[1] >= 0.0
 
 
+def test_half_the_power_is_half_the_force():
+    """Five commands at a power that is told, and at full power of thrusters that are weaker."""
+    shares = np.column_stack(np.clip(allocate(*RUN.tau_cmd.T, Allocation()), -1.0, 1.0))
+    five = np.column_stack([shares[:, :2], shares])
+    full = replace(RUN, five=five)
+    weaker = replace(full, power=np.tile([0.5, 0.25], (RUN.time.size, 1)))
+    thrusters = {"plant_F_vsp": 0.5 * 1.165, "plant_F_bow": 0.25 * 2.629}
+    assert rms(windows_of(weaker)) == pytest.approx(rms(windows_of(full), thrusters=thrusters), rel=1e-9)
+
+
 def test_unknown_parameter_names_the_nearest():
     with pytest.raises(InputError, match="vessel has no parameter 'delta_X_v'; did you mean 'delta_X_"):
         WINDOWS.errors(vessel={"delta_X_v": 1.0})

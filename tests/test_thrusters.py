@@ -1,12 +1,13 @@
 """Thrust map and allocation."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import Allocation, allocate, thrust
-from fmus.thrusters.chain import Inputs, Past, Plant
+from fmus.thrusters.chain import Inputs, Past, Plant, Power
 from fmus.thrusters.thrusters import COMPONENT
 
 Params = COMPONENT.params
@@ -58,3 +59,17 @@ def test_surge_with_a_lateral_point_of_attack():
     assert run(0.5, 0.0, 0.0, Params(plant=Plant(plant_p_y=0.02))).tau_act_N == pytest.approx(
         -0.02 * 0.5
     )
+
+
+@given(command, command, command, st.floats(0.0, 2.0), st.floats(0.0, 2.0), st.booleans())
+def test_power_scales_what_a_thruster_and_its_effects_give(a, b, c, vsp, bow, bent):
+    tau = thrust(a, b, c, Allocation())
+    curve = COMPONENT.params().wrong._replace(curve_vsp_x_c_11=0.3 * bent, curve_vsp_y_c_9=0.1 * bent)
+    full = COMPONENT.params()._replace(wrong=curve)
+
+    def acting(p_vsp, p_bow):
+        out = run(*tau, full._replace(power=Power(p_vsp, p_bow)))
+        return np.array([out.tau_act_X, out.tau_act_Y, out.tau_act_N])
+
+    by_parts = vsp * acting(1.0, 0.0) + bow * acting(0.0, 1.0)
+    assert acting(vsp, bow) == pytest.approx(by_parts, abs=1e-12)

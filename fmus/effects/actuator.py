@@ -1,5 +1,6 @@
 """What the thrusters really do, as against what they are asked for."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from ..declare import POSITIVE, Range, Variable
@@ -37,30 +38,41 @@ def thrust_curve(
     return f._replace(vsp_x=f.vsp_x * left * gain)
 
 
-def vsp_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
+def vsp_surge_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
     """A free addition to the VSP surge force over its command."""
     *nodes, reach = values
     return f._replace(vsp_x=f.vsp_x + interpolate(now.u_vsp_x, -reach, reach, nodes))
 
 
-add(
-    Effect(
-        id="curve_vsp_x(c)",
-        kind="actuator",
-        axis="X",
-        description="free addition to the VSP surge force over its command",
-        formula="f_x + Σ c_k · hat_k(u_vsp_x), 21 nodes over [-range, range]",
-        symbol="c_1 … c_21",
-        sign="positive pushes ahead",
-        source="(2.12); 3.2.3, on a triangle basis",
-        linear=True,
-        parameters=node_parameters(
-            "curve_vsp_x_c", "N", "VSP surge force", "command, both ways", "1", 1.0
-        ),
-        function=vsp_curve,
-        settings=frozenset({"curve_vsp_x_c_range"}),
+def vsp_sway_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
+    """A free addition to the VSP sway force over its command."""
+    *nodes, reach = values
+    return f._replace(vsp_y=f.vsp_y + interpolate(now.u_vsp_y, -reach, reach, nodes))
+
+
+def _add_vsp_curve(axis: str, acts_on: str, way: str, function: Callable[..., Thrust]) -> None:
+    """Register a free curve of the VSP's force over the command in the same direction."""
+    prefix = f"curve_vsp_{axis}_c"
+    add(
+        Effect(
+            id=f"curve_vsp_{axis}(c)",
+            kind="actuator",
+            axis=acts_on,
+            description=f"free addition to the VSP {way} force over its command",
+            formula=f"f_{axis} + Σ c_k · hat_k(u_vsp_{axis}), 21 nodes over [-range, range]",
+            symbol="c_1 … c_21",
+            sign=f"positive pushes {'ahead' if axis == 'x' else 'to starboard'}",
+            source="(2.12); 3.2.3, on a triangle basis",
+            linear=True,
+            parameters=node_parameters(prefix, "N", f"VSP {way} force", "command, both ways", "1", 1.0),
+            function=function,
+            settings=frozenset({f"{prefix}_range"}),
+        )
     )
-)
+
+
+_add_vsp_curve("x", "X", "surge", vsp_surge_curve)
+_add_vsp_curve("y", "YN", "sway", vsp_sway_curve)
 
 
 @effect(

@@ -34,6 +34,13 @@ class Plant(NamedTuple):
     plant_p_y: Annotated[float, "m", "real point of attack, to starboard"] = 0.0
 
 
+class Power(NamedTuple):
+    """How hard the thrusters run: what a characteristic and its effects give is scaled by these."""
+
+    power_vsp: Annotated[float, "1", "thrust of the VSP, of that at their full speed", POSITIVE] = 1.0
+    power_bow: Annotated[float, "1", "thrust of the bow, of that at its full power", POSITIVE] = 1.0
+
+
 class Rate(NamedTuple):
     plant_rate: Annotated[float, "1/s", "limit of a command's rate; 0: none", POSITIVE] = 0.0
 
@@ -98,7 +105,12 @@ def lagged(before: Triple, wanted: Triple, T: Number, h: Number) -> Triple:
     return a, b, c
 
 
-def act(shares: Triple, now: Running, plant: Plant, acting: Any, wrong: Any) -> Triple:
+FULL_POWER = Power()
+
+
+def act(
+    shares: Triple, now: Running, plant: Plant, acting: Any, wrong: Any, power: Any = FULL_POWER
+) -> Triple:
     """tau [N, N, N m] of thrusters that give these shares of their full force, effects included.
 
     Args:
@@ -107,12 +119,14 @@ def act(shares: Triple, now: Running, plant: Plant, acting: Any, wrong: Any) -> 
         plant: the real thrusters.
         acting: for each effect, whether it acts.
         wrong: parameters of the effects.
+        power: of the VSP and of the bow thruster.
     """
     F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = plant
     f = Thrust(F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2])
     for member, acts in zip(IN_THRUSTERS.members, acting, strict=True):
         f = member.apply(acts, wrong, f, f, now)
-    X, Y, N = moments(f.vsp_x, f.vsp_y, f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
+    vsp, bow = power
+    X, Y, N = moments(vsp * f.vsp_x, vsp * f.vsp_y, bow * f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
 
 
@@ -140,6 +154,7 @@ def thrusters(
         allocation=Allocation(),
         plant=Plant(),
         model=model(),
+        power=Power(),
         rate=Rate(),
         dynamics=Dynamics(),
         wrong=IN_THRUSTERS.params(),
@@ -167,10 +182,11 @@ def thrusters(
         now = Running._make((s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), *given))
         wanted = characteristic(now, p.model)
         shares = when(lag > 0.0, lambda: lagged(s.lagged, wanted, lag, h), lambda: wanted)
+        vsp, bow = p.power
         tau = when(
             any_acts,
-            lambda: act(shares, now, p.plant, acting, p.wrong),
-            lambda: thrust(shares[0], shares[1], shares[2], p.plant),
+            lambda: act(shares, now, p.plant, acting, p.wrong, p.power),
+            lambda: thrust(vsp * shares[0], vsp * shares[1], bow * shares[2], p.plant),
         )
         possible = thrust(s_x, s_y, s_bow, p.allocation)
         # At h = 0 nothing has had time to change.
