@@ -17,6 +17,8 @@ from .table import Doubt, Table, noise, table
 
 CONTENDERS = 8
 SEPARATION = 0.05
+WEIGHINGS = 4
+CHANGED = 1.5
 # A free shape that can do what a plain effect does is not listed as another explanation of it.
 FREE_SHAPE = 5
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
@@ -54,10 +56,17 @@ def candidates(p: Problem, at: Point, known: Set[str]) -> Step:
     base = evaluate(p.data, model)
     found = [c for c in library(p.data, model, base) if c.effect.id not in known]
     doubt = doubts(p, at, base)
-    straight = [s.columns for c in found for s in c.shapes[:1]]
     sigma = p.sigma
     if sigma is None:
+        straight = [s.columns for c in found for s in c.shapes[:1]]
         sigma = noise(base, np.concatenate([*straight, doubt.columns], axis=2), FLOOR)
+    return weighed(p, sigma, base, doubt, found)
+
+
+def weighed(
+    p: Problem, sigma: np.ndarray, base: np.ndarray, doubt: Doubt, found: Sequence[Candidate]
+) -> Step:
+    """Judge candidates with an error counted in units of sigma (3,) [N, N, N m]."""
     wide = table(base, p.blocks, found, doubt, sigma)
     order = in_order([judge(wide, k, len(c.shapes)) for k, c in enumerate(found)])
     return Step(base, doubt, wide, found, order, judge(wide, -1, 1))
@@ -104,6 +113,30 @@ def contend(p: Problem, at: Point, step: Step) -> Contest:
     t = table(step.base, p.blocks, moved, step.doubt, step.wide.sigma)
     judged = in_order([judge(t, k, 1) for k in range(len(best))])
     return Contest([e.id for e in effects], starts, refined, t, judged)
+
+
+def settle(p: Problem, at: Point, step: Step, least: np.ndarray) -> tuple[Problem, Step, Contest]:
+    """A contest in which an error counts by what even the best of all leaves over.
+
+    Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
+    such would move the nominal coefficients to wherever it becomes a little less.
+
+    Args:
+        p, at, step: all candidates beside a model.
+        least: (3,), noise that is there in any case [N, N, N m].
+    """
+    p = replace(p, sigma=step.wide.sigma)
+    contest = contend(p, at, step)
+    for _ in range(WEIGHINGS):
+        left = contest.refined[contest.judged[0].candidate].left
+        sigma = np.maximum(least, np.sqrt(np.mean(left**2, axis=0)))
+        change = sigma / step.wide.sigma
+        if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
+            break
+        p = replace(p, sigma=sigma)
+        step = weighed(p, sigma, step.base, step.doubt, step.candidates)
+        contest = contend(p, at, step)
+    return p, step, contest
 
 
 def start(step: Step, best: Judged) -> Start:

@@ -152,3 +152,18 @@ def library(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[C
 NOMINAL = {
     v.name: v.start for group in (Inertia, Damping, Plant) for v in variables(group) if v.start != 0.0
 }
+# Damping is taken over from other ships; what is weighed and measured is never further off than this.
+MEASURED = 0.1
+_DAMPING = {v.name for v in variables(Damping)}
+
+
+def beliefs(prior: float) -> dict[str, float]:
+    """Standard deviation believed of each nominal coefficient, in SI.
+
+    Args:
+        prior: relative; of masses and of the thrusters' forces and places at most a tenth.
+    """
+    return {
+        name: abs(start) * (prior if name in _DAMPING else min(prior, MEASURED))
+        for name, start in NOMINAL.items()
+    }

@@ -107,12 +107,14 @@ class Judged:
     Attributes:
         candidate, shape: which, and the shape that fits all data best.
         blocks: (blocks,), loss of each block by a fit that has not seen it.
+        runs: loss of all runs, each by a fit to the others; that of the blocks where there is one run.
         charge: what its parameters cost, and the changes of nominal coefficients that it needs.
     """
 
     candidate: int
     shape: int
     blocks: np.ndarray
+    runs: float
     charge: float
 
     @property
@@ -123,18 +125,24 @@ class Judged:
 
 def judge(t: Table, candidate: int, shapes: int) -> Judged:
     """Cross-validated loss of a candidate, its shape chosen by the training part of each fold."""
-    fold = np.arange(len(t.grams)) % FOLDS
     options = [pieces(t, candidate, k) for k in range(shapes)]
+    found = unseen(t, options, np.arange(len(t.grams)) % FOLDS)
+    by_run = unseen(t, options, t.runs) if len(np.unique(t.runs)) > 1 else found
+    whole = [o.fitted(t.total) for o in options]
+    shape = int(np.argmin([float(w.loss(t.total)) + w.unlikely for w in whole]))
+    charge = options[shape].size(t.total) * t.price + whole[shape].unlikely
+    return Judged(candidate, shape, found, float(by_run.sum()), charge)
+
+
+def unseen(t: Table, options: Sequence[Pieces], fold: np.ndarray) -> np.ndarray:
+    """Loss of each block by the fit, of the shape that does best, to all other folds (blocks,)."""
     found = np.empty(len(t.grams))
-    for f in range(FOLDS):
+    for f in np.unique(fold):
         train = t.total - t.grams[fold == f].sum(axis=0)
         fits = [o.fitted(train) for o in options]
         best = min(fits, key=lambda one, train=train: float(one.loss(train)) + one.unlikely)
         found[fold == f] = best.loss(t.grams[fold == f])
-    whole = [o.fitted(t.total) for o in options]
-    shape = int(np.argmin([float(w.loss(t.total)) + w.unlikely for w in whole]))
-    charge = options[shape].size(t.total) * t.price + whole[shape].unlikely
-    return Judged(candidate, shape, found, charge)
+    return found
 
 
 def first_share(

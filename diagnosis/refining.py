@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from fmus.declare import Variable
 from fmus.effects import EFFECTS
 
-from .library import NOMINAL, Shape, evaluate
+from .library import NOMINAL, Shape, beliefs, evaluate
 from .model import Model
 from .ranking import RIDGE
 from .table import OVERLAP, Doubt
@@ -86,8 +86,8 @@ class Point:
 def shifts(moved: np.ndarray, prior: float) -> dict[str, float]:
     """Nominal coefficients' additions, in SI."""
     return {
-        name: prior * start * float(k)
-        for (name, start), k in zip(NOMINAL.items(), moved, strict=True)
+        name: std * float(k)
+        for (name, std), k in zip(beliefs(prior).items(), moved, strict=True)
         if k != 0.0
     }
 
@@ -117,11 +117,8 @@ def doubts(p: Problem, at: Point, base: np.ndarray) -> Doubt:
     model = at.model(p.prior)
     own = at.fitted
     columns = [slope(p, model, base, n, at.values[n]) for n in own]
-    for n, start in NOMINAL.items():
-        known = p.prior == 0.0
-        columns.append(
-            np.zeros_like(base) if known else p.prior * start * slope(p, model, base, n, start)
-        )
+    for n, std in beliefs(p.prior).items():
+        columns.append(std * slope(p, model, base, n, NOMINAL[n]) if std else np.zeros_like(base))
     stiff = np.asarray(block_diag(at.stiff, np.eye(len(NOMINAL))))
     moved = np.array([*[at.values[n] for n in own], *at.moved])
     return Doubt(np.stack(columns, axis=2), stiff, moved)

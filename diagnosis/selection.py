@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .contest import Contest, Step, candidates, contend, same
-from .library import NOMINAL
+from .contest import Contest, Step, candidates, same, settle
+from .library import NOMINAL, beliefs
 from .model import Model
 from .ranking import RIDGE, Judged, first_share
 from .refining import MOMENT, Point, Problem
+from .table import RUN
 from .waves import Waves, waves
 from .weak import Integrals
 
@@ -106,24 +107,22 @@ def learn(
     """
     rng = np.random.default_rng(seed)
     start = model or Model()
-    advance("waves")
-    swell = waves([w.smoothed for w in data], start, rng)
-    blocks = np.concatenate([10_000 * k + w.block for k, w in enumerate(data)])
+    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(data)])
     p, at = Problem(data, blocks, None, prior), Point(start)
     advance("every effect as a candidate")
     step = first = candidates(p, at, set())
-    p = replace(p, sigma=first.wide.sigma)
     contest: Contest | None = None
     ranking: list[Ranked] = []
     findings: list[Finding] = []
     while len(findings) < MOST:
         advance(f"effect {len(findings) + 1}: the best candidates where they fit best")
-        contest = contend(p, at, step)
+        p, step, contest = settle(p, at, step, first.wide.sigma)
+        total = float(np.sum((first.base * p.weight) ** 2))
         ranking = ranking or ranked(step, contest)
-        if not accepted(step.nothing, contest.judged[0], first.size):
+        if not accepted(step.nothing, contest.judged[0], total):
             break
         advance(f"effect {len(findings) + 1}: how sure is it")
-        findings.append(finding(step, contest, first.size, rng))
+        findings.append(finding(step, contest, total, rng))
         at = contest.winner
         findings[-1] = replace(findings[-1], model=at.model(prior))
         advance(f"effect {len(findings) + 1}: every effect as a candidate")
@@ -136,12 +135,13 @@ def learn(
         mine = {n: c for n, c in ci95.items() if n in values}
         findings[k] = replace(f, values=values, ci95=dict(f.ci95) | mine)
     suspects = suspected(prior, shift[len(names) :], std[len(names) :]) if prior > 0.0 else []
+    last = at.model(prior) if at.values else start
+    advance("waves")
+    swell = waves([w.smoothed for w in data], last, rng)
     if swell is not None:
         findings.insert(0, of_waves(swell, start))
         ranking = [Ranked(WAVES, 0.0, swell.share), *ranking]
-    return Learned(
-        findings, ranking, at.model(prior) if at.values else start, suspects, first.wide.sigma
-    )
+    return Learned(findings, ranking, last, suspects, np.asarray(p.sigma))
 
 
 def ranked(step: Step, contest: Contest) -> list[Ranked]:
@@ -157,7 +157,7 @@ def finding(step: Step, contest: Contest, size: float, rng: np.random.Generator)
 
     Args:
         step, contest: the step that found it.
-        size: sum of squares of the model error at first.
+        size: sum of squares of the model error at first, in units of the noise.
         rng: for the bootstrap.
     """
     first, *others = contest.judged
@@ -198,13 +198,18 @@ def posterior(p: Problem, at: Point, step: Step) -> tuple[np.ndarray, np.ndarray
 def suspected(prior: float, shift: np.ndarray, std: np.ndarray) -> list[Suspect]:
     """Nominal coefficients that lie far from what is believed of them, the surest first."""
     found = [
-        Suspect(name, float(k / s), start * (1.0 + prior * float(k)))
-        for (name, start), k, s in zip(NOMINAL.items(), shift, std, strict=True)
+        Suspect(name, float(k / s), NOMINAL[name] + believed * float(k))
+        for (name, believed), k, s in zip(beliefs(prior).items(), shift, std, strict=True)
     ]
     return sorted((s for s in found if abs(s.z) > SUSPECT), key=lambda s: -abs(s.z))
 
 
 def accepted(nothing: Judged, best: Judged, total: float) -> bool:
-    """Whether a candidate is more than chance and more than the nominal coefficients' doubt."""
+    """Whether a candidate is more than chance, and helps in runs that it was not fitted to."""
     gain = nothing.score - best.score
-    return gain > max(GAIN * nothing.score, LEAST) and float(best.blocks.sum()) < (1.0 - Q2) * total
+    elsewhere = best.runs < nothing.runs
+    return (
+        elsewhere
+        and gain > max(GAIN * nothing.score, LEAST)
+        and float(best.blocks.sum()) < (1.0 - Q2) * total
+    )

@@ -13,6 +13,8 @@ from .library import Candidate
 
 # Windows overlap: this many count as one.
 OVERLAP = 4.0
+# Blocks are numbered from here on in each run.
+RUN = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,7 @@ class Table:
     Attributes:
         grams: (blocks, p, p), in units of the noise; column 0 is the model error.
         rows: windows in each block.
+        runs: number of each block's run.
         place: (candidate, shape) -> (index of its offset or -1, indices of its columns).
         moved: (candidate, shape) -> how far its offset moves the nominal coefficients (q,).
         bent: (candidate, shape) -> number of its parameters that are given.
@@ -50,6 +53,7 @@ class Table:
 
     grams: np.ndarray
     rows: np.ndarray
+    runs: np.ndarray
     place: dict[tuple[int, int], tuple[int, list[int]]]
     moved: dict[tuple[int, int], np.ndarray]
     bent: dict[tuple[int, int], int]
@@ -127,4 +131,6 @@ def table(
         part = A[blocks == name].reshape(-1, A.shape[2])
         grams[k] = part.T @ part
     rows = np.array([(blocks == name).sum() for name in names])
-    return Table(grams, rows, place, moved, bent, given, stiff, indices, doubt.stiff, sigma)
+    return Table(
+        grams, rows, names // RUN, place, moved, bent, given, stiff, indices, doubt.stiff, sigma
+    )

@@ -1,7 +1,8 @@
 """Waves, told by a peak in the spectrum of the model error.
 
-They come and go with no parameter of the ship, so they are looked for before anything is fitted, and no
-constant is fitted to them.
+They come and go with no parameter of the ship, so nothing is fitted to them. They are looked for in what
+the best model leaves over, as a ship that is held by a controller swings, too; the windows of the weak
+form let hardly any of them through.
 """
 
 from collections.abc import Sequence

@@ -22,7 +22,7 @@ FINE = 0.005  # s, step of ships that are integrated otherwise
 NOISE = {"n1": 1.0, "n4": 4.0, "n10": 10.0}
 POSITION, HEADING = 5e-4, np.radians(0.05)  # m, rad; standard deviation at n1
 SETTLED = 20.0  # s until the ship is on its course
-FAR = 1.0  # m; a ship that is further from its target then has run away
+FAR = 5.0  # m; a ship that is further from its target then has run away
 
 MEASURED = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 COMMANDS = ["thrusters.tau_cmd_X", "thrusters.tau_cmd_Y", "thrusters.tau_cmd_N"]

@@ -9,6 +9,7 @@ from .curve import interpolate, node_parameters
 from .registry import Effect, Running, Thrust, add, effect
 
 SHARE = Range(-1.0, 1.0)
+ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
 
 
 @effect(
@@ -287,8 +288,10 @@ def loss_yaw(
 def attack_point(
     f: Thrust,
     now: Running,
-    attack_point_dx: Annotated[float, "m", "point of attack forward of the assumed one"] = 0.0,
-    attack_point_dy: Annotated[float, "m", "point of attack to starboard of the assumed one"] = 0.0,
+    attack_point_dx: Annotated[float, "m", "point of attack forward of the assumed one", ABOARD] = 0.0,
+    attack_point_dy: Annotated[
+        float, "m", "point of attack to starboard of the assumed one", ABOARD
+    ] = 0.0,
 ) -> Thrust:
     """The force acts elsewhere than assumed."""
     return f._replace(dx=f.dx + attack_point_dx, dy=f.dy + attack_point_dy)

@@ -2,10 +2,12 @@
 
 from typing import Annotated, Any
 
+from ..declare import Range
 from ..frames import rotate_to_earth
 from .registry import Effect, add, effect
 
 Pose = tuple[Any, Any, Any]
+ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
 
 
 @effect(
@@ -19,8 +21,8 @@ Pose = tuple[Any, Any, Any]
 )
 def marker_offset(
     pose: Pose,
-    marker_offset_dx: Annotated[float, "m", "markers forward of the body origin"] = 0.0,
-    marker_offset_dy: Annotated[float, "m", "markers to starboard of the body origin"] = 0.0,
+    marker_offset_dx: Annotated[float, "m", "markers forward of the body origin", ABOARD] = 0.0,
+    marker_offset_dy: Annotated[float, "m", "markers to starboard of the body origin", ABOARD] = 0.0,
 ) -> Pose:
     """The position is measured at another point of the ship."""
     x, y, psi = pose
