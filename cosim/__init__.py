@@ -17,15 +17,20 @@ if TYPE_CHECKING:
     from .log import read_log
     from .scenario import Scenario, load_scenario
     from .simulation import Result, simulate
+    from .ssv import Parameter, ParameterSet, read_parameters, write_parameters
 
 __all__ = [
     "InputError",
+    "Parameter",
+    "ParameterSet",
     "Result",
     "Scenario",
     "SimulationError",
     "load_scenario",
     "read_log",
+    "read_parameters",
     "simulate",
+    "write_parameters",
 ]
 
 _HOME = {
@@ -36,6 +41,10 @@ _HOME = {
     "load_scenario": "scenario",
     "Result": "simulation",
     "simulate": "simulation",
+    "Parameter": "ssv",
+    "ParameterSet": "ssv",
+    "read_parameters": "ssv",
+    "write_parameters": "ssv",
 }
 
 

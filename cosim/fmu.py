@@ -27,6 +27,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .errors import InputError, SimulationError
+from .units import BASE, Unit
 
 WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -55,16 +56,6 @@ def _callbacks(environment: int) -> fmi2.fmi2CallbackFunctions:
     callbacks.componentEnvironment = environment
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit by name, and where the FMU defines it its SI exponents, factor and offset."""
-
-    name: str
-    exponents: tuple[int, ...] | None
-    factor: float
-    offset: float
 
 
 @dataclass(frozen=True)
@@ -126,15 +117,9 @@ class Model:
     def _read_variables(self) -> dict[str, Variable]:
         """All variables by name, in the order of the description."""
         units = {
-            u.name: Unit(
-                str(u.name),
-                None
-                if (b := u.baseUnit) is None
-                # rad is no dimension of its own in SI: 1/s and rad/s go together.
-                else (b.kg, b.m, b.s, b.A, b.K, b.mol, b.cd),
-                1.0 if b is None else b.factor or math.nan,
-                0.0 if b is None else b.offset,
-            )
+            u.name: Unit(str(u.name))
+            if (b := u.baseUnit) is None
+            else Unit(str(u.name), tuple(getattr(b, n) for n in BASE), b.factor or math.nan, b.offset)
             for u in self.description.unitDefinitions
         }
         found: dict[str, Variable] = {}
@@ -153,7 +138,7 @@ class Model:
                 int(v.valueReference),
                 v.causality or "local",
                 v.variability or "continuous",
-                None if not unit else units.get(unit, Unit(unit, None, 1.0, 0.0)),
+                None if not unit else units.get(unit, Unit(unit)),
                 v.description or "",
                 None if low is None else float(low),
                 None if high is None else float(high),

@@ -65,7 +65,11 @@ def _header(line: str) -> list[str]:
 
 def write_json(path: Path, content: Any) -> None:
     """Write a JSON file so that it is never half there."""
-    text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+    write_whole(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file so that it is never half there."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         part.write_text(text, encoding="utf-8")

@@ -13,9 +13,9 @@ from .errors import InputError, nearest
 from .fmu import NUMERIC, Model, Variable
 from .order import Link, execution_order
 from .scenario import Event, Scenario, Value
-from .ssv import Parameter
+from .ssv import ParameterSet
 from .table import read_table, table_parameters
-from .units import Conversion, conversion
+from .units import SAME, Conversion, conversion
 
 INT_LIMIT = 2**31
 # What an input of one type accepts from an output of another.
@@ -26,8 +26,8 @@ ACCEPTS = {
     "Boolean": ("Boolean",),
 }
 
-# Parameter sets: file, and model name -> parameter -> value.
-Overrides = Sequence[tuple[Path, dict[str, dict[str, Parameter]]]]
+# Parameter sets, each with its file.
+Overrides = Sequence[tuple[Path, ParameterSet]]
 
 
 @dataclass(frozen=True)
@@ -221,20 +221,21 @@ def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[st
     for name, entry in system.scenario.fmus.items():
         chosen[name] = {k: (v, f"fmus.{name}.parameters") for k, v in entry.parameters.items()}
         chosen[name] |= _from_table(system, name)
-    for path, by_model in overrides:
-        for model_name, values in by_model.items():
+    for path, given in overrides:
+        for name, beside in given.beside.items():
+            system.warnings.append(
+                f"'{path}': {name} = {beside.value} {beside.unit or ''} is no parameter of an FMU "
+                f"and has no effect here: {beside.description}"
+            )
+        for model_name in given.values:
             targets = [n for n, model in system.models.items() if model.name == model_name]
             if not targets:
-                hint = ""
-                if model_name in system.models:
-                    hint = f"; the model of that instance is called '{system.models[model_name].name}'"
                 system.warnings.append(
-                    f"'{path}' has values for a model '{model_name}', which does not run here{hint}"
+                    f"'{path}' has values for a model '{model_name}', which does not run here"
+                    f"{_models_hint(system, model_name)}"
                 )
             for name in targets:
-                for parameter, given in values.items():
-                    _check_unit(system.models[name], parameter, given, f"'{path}'")
-                    value: Value = given.value
+                for parameter, value in _in_units_of(system.models[name], path, given).items():
                     old = chosen[name].get(parameter)
                     if old is not None and old[0] != value:
                         system.warnings.append(
@@ -258,14 +259,38 @@ def _from_table(system: System, name: str) -> dict[str, tuple[Value, str]]:
     return {parameter: (value, f"'{path}'") for parameter, value in found.items()}
 
 
-def _check_unit(model: Model, parameter: str, given: Parameter, where: str) -> None:
-    """A parameter set may leave the unit out, but not claim another one than the FMU's."""
-    variable = model.variables.get(parameter)
-    unit = variable.unit.name if variable is not None and variable.unit is not None else given.unit
-    if given.unit not in (None, unit):
-        raise InputError(
-            f"{where}: {model.name}.{parameter} is in '{given.unit}', but the FMU's unit is '{unit}'"
-        )
+def _models_hint(system: System, wrong: str) -> str:
+    if wrong in system.models:
+        return f"; the model of that instance is called '{system.models[wrong].name}'"
+    return nearest(wrong, {model.name for model in system.models.values()})
+
+
+def _in_units_of(model: Model, path: Path, given: ParameterSet) -> dict[str, Value]:
+    """The values of a parameter set for one model, in the units of the FMU.
+
+    Raises:
+        InputError: no such variable, or a unit that does not fit.
+    """
+    found: dict[str, Value] = {}
+    for name, parameter in given.values[model.name].items():
+        where = f"'{path}': {model.name}.{name}"
+        variable = model.variables.get(name)
+        if variable is None:
+            raise InputError(f"{where} does not exist{_effects_hint(model, name)}")
+        value = given.number(parameter, variable.unit, where)
+        found[name] = int(value) if variable.type != "Real" and value.is_integer() else value
+    return found
+
+
+def _effects_hint(model: Model, wrong: str) -> str:
+    """What may be meant by a parameter that an FMU lacks, and how one of ours would get it."""
+    hint = nearest(wrong, [v.name for v in model.variables.values() if v.causality == "parameter"])
+    if model.path.name != f"{model.name}.fmu":
+        return hint
+    return (
+        f"{hint}; if it is of an effect of your own, build the FMU that has it, with "
+        f"'python -m fmus.build {model.name} --effects FILE.py --out fmu', and name it by its path"
+    )
 
 
 def _check_value(variable: Variable, value: Value | None, where: str) -> None:
@@ -303,13 +328,7 @@ def _connect(system: System) -> None:
             if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
                 raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
             taken[target.name] = source
-            system.connections.append(
-                Connection(
-                    source,
-                    target,
-                    conversion(source.variable, target.variable, ends, system.warnings),
-                )
-            )
+            system.connections.append(Connection(source, target, _link(source, target, ends, system)))
     for name, model in system.models.items():
         free = [
             v.name
@@ -322,6 +341,18 @@ def _connect(system: System) -> None:
             system.warnings.append(
                 f"{name}: input {', '.join(free)} not connected; keeps its start value"
             )
+
+
+def _link(source: Signal, target: Signal, ends: str, system: System) -> Conversion:
+    """The conversion of units between two ends; a warning where they cannot be compared."""
+    a, b = source.variable.unit, target.variable.unit
+    how = conversion(a, b, ends)
+    if how is None and a is not None and b is not None:
+        system.warnings.append(
+            f"{ends}: units '{a.name}' and '{b.name}' cannot be compared, "
+            "because an FMU does not define them; the value passes unchanged"
+        )
+    return how or SAME
 
 
 def _kind(signal: Signal) -> str:

@@ -1,10 +1,22 @@
-"""Whether two connected variables speak of the same quantity, and how to convert."""
+"""Whether two units measure the same quantity, and how to convert."""
 
 import math
 from dataclasses import dataclass
 
 from .errors import InputError
-from .fmu import Variable
+
+# rad is no dimension of its own in SI: 1/s and rad/s go together.
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by name, and where a file defines it its SI exponents (see BASE), factor and offset."""
+
+    name: str
+    exponents: tuple[int, ...] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -18,30 +30,24 @@ class Conversion:
 SAME = Conversion()
 
 
-def conversion(source: Variable, target: Variable, ends: str, warnings: list[str]) -> Conversion:
-    """How to turn a source's value into the target's unit.
+def conversion(a: Unit | None, b: Unit | None, where: str) -> Conversion | None:
+    """How to turn a value in one unit into another.
 
     Args:
-        source, target: the connected variables.
-        ends: names of both ends, for messages.
-        warnings: receives a line where the units cannot be compared.
+        a, b: the unit that a value has, and the one that it is to have; None where nobody says.
+        where: what is converted, for messages.
 
     Returns:
-        The conversion; none where one side has no unit.
+        The conversion; none where one side has no unit. None: the units differ by name, and a file
+        does not define them, so that they cannot be compared.
 
     Raises:
         InputError: different dimensions.
     """
-    a, b = source.unit, target.unit
-    if a is None or b is None:
+    if a is None or b is None or a == b:
         return SAME
     if a.exponents is None or b.exponents is None or math.isnan(a.factor * b.factor):
-        if a.name != b.name:
-            warnings.append(
-                f"{ends}: units '{a.name}' and '{b.name}' cannot be compared, "
-                "because an FMU does not define them; the value passes unchanged"
-            )
-        return SAME
+        return SAME if a.name == b.name else None
     if a.exponents != b.exponents:
-        raise InputError(f"{ends}: unit '{a.name}' cannot be converted to '{b.name}'")
+        raise InputError(f"{where}: unit '{a.name}' cannot be converted to '{b.name}'")
     return Conversion(a.factor / b.factor, (a.offset - b.offset) / b.factor)

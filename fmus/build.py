@@ -1,4 +1,4 @@
-"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR] [--effects FILE.py]``.
+"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR]``, see ``--help``.
 
 An FMU carries the source of its component and of every module of ours that this imports, in a package
 whose name holds a hash of that source. So two FMUs in one process never run each other's code, nor that
@@ -7,7 +7,6 @@ of an older build, and the same source gives the same bytes.
 
 import argparse
 import ast
-import difflib
 import hashlib
 import importlib
 import importlib.metadata
@@ -21,14 +20,15 @@ import sys
 import tempfile
 import traceback
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock
 from platformdirs import user_cache_path
 
-from .declare import Component, DeclarationError, Range, discover, variables, width
+from .baking import Starts, read_starts
+from .declare import Component, DeclarationError, Range, discover, nearest, variables, width
 from .effects import registry
 from .trace import trace_init, trace_step
 from .units import base_exponents
@@ -47,7 +47,7 @@ from {package}.slave import Slave
 
 
 class {class_name}(Slave):
-    component = COMPONENT
+    component = COMPONENT{starting}
     code_hash = "{code_hash}"
     code_version = "{version}"
 
@@ -69,7 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           python -m fmus.build vessel controller_abs --out fmu\n"
         "           python -m fmus.build my_controller.py --out fmu\n"
         "           python -m fmus.build --list vessel\n"
-        "           python -m fmus.build vessel --effects my_effects.py --out fmu",
+        "           python -m fmus.build vessel --effects my_effects.py --out fmu\n"
+        "           python -m fmus.build --parameters model.ssv --out fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
@@ -85,6 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=[],
         help="a file of model effects of your own, for vessel and thrusters; may be repeated",
     )
+    parser.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE.ssv",
+        help="SSP parameter set whose values become start values (without NAME: of the FMUs it names)",
+    )
     options = parser.parse_args(arguments)
     try:
         for file in options.effects:
@@ -92,7 +99,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.list:
             _print_list(options.names)
             return 0
-        for path in build(options.names, options.out):
+        if options.parameters is None:
+            built = build(options.names, options.out)
+        else:
+            built = build(options.names, options.out, read_starts(options.parameters), _note)
+        for path in built:
             print(path)
     except (BuildError, DeclarationError, OSError) as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
@@ -127,27 +138,59 @@ def _limits(allowed: Range) -> str:
     )
 
 
-def build(names: Sequence[str], out: Path | None = None) -> list[Path]:
+def build(
+    names: Sequence[str],
+    out: Path | None = None,
+    starts: Starts | None = None,
+    note: Callable[[str], None] = lambda _: None,
+) -> list[Path]:
     """FMUs that are up to date with the source.
 
     Args:
         names: FMU names, with or without ``.fmu``, or paths of component files; none means all.
         out: folder that receives copies; None leaves them in the user's cache.
+        starts: a parameter set. The FMUs that it names start with its values; without names, they are
+            the ones that are built.
+        note: receives a line where a part of the parameter set is not used.
 
     Returns:
         Path of each FMU, in the order of the names.
 
     Raises:
         BuildError: unknown name, or a file that declares no component.
+        DeclarationError: a parameter set that does not fit.
     """
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
             raise BuildError(f"'{out}' is a file, not a folder") from None
-    names = list(names) or [component.name for _, component in discover()]
-    built = [_cached(name) for name in names]
+    if starts is None:
+        built = [_cached(name) for name in names or [component.name for _, component in discover()]]
+    else:
+        built = [_cached(name, starts) for name in names or starts.values]
+        _tell_unused(starts, [fmu.stem for fmu in built], note)
     return built if out is None else [_place(fmu, out / fmu.name) for fmu in built]
+
+
+def _note(text: str) -> None:
+    print("note:", text, file=sys.stderr)
+
+
+def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], None]) -> None:
+    """Say what of a parameter set went into no FMU.
+
+    Raises:
+        BuildError: it names an FMU that does not exist.
+    """
+    for name in starts.values:
+        if name not in built:
+            _load(name, None)
+            note(f"'{starts.path}' has values for {name}, which is not built")
+    for text in starts.beside:
+        note(f"'{starts.path}' has what no FMU can hold, {text}")
+    if not starts.values:
+        note(f"'{starts.path}' holds no values: no FMU is changed by it")
 
 
 def _place(source: Path, target: Path) -> Path:
@@ -167,14 +210,17 @@ def cache_folder() -> Path:
     return Path(chosen) if chosen else user_cache_path("cybership")
 
 
-def _cached(name: str) -> Path:
+def _cached(name: str, starts: Starts | None = None) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = _which(name)
-    folder = cache_folder() / _source_hash(own_file)
+    folder = cache_folder() / _source_hash(own_file, {})
     fmu = folder / f"{stem}.fmu"
-    if fmu.is_file():
+    if starts is None and fmu.is_file():
         return fmu
     module, component = _load(stem, own_file)
+    if starts is not None:
+        component = starts.baked(component)
+        folder = cache_folder() / _source_hash(own_file, component.starts)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -203,13 +249,19 @@ def _which(name: str) -> tuple[str, Path | None]:
     return stem, own_file
 
 
-def _source_hash(own_file: Path | None) -> str:
-    """Hash of everything that a build reads."""
+def _source_hash(own_file: Path | None, starts: Mapping[str, float]) -> str:
+    """Hash of everything that a build reads, and of the start values that it changes."""
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     own = [*registry.LOADED.values(), *([own_file] if own_file else [])]
     for path in [*sorted(p for p in ROOT.rglob("*.py") if CHECKER not in p.parents), *own]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    digest.update(_changes(starts).encode())
     return digest.hexdigest()[:16]
+
+
+def _changes(starts: Mapping[str, float]) -> str:
+    """Changed start values as Python writes them, in the order of names; empty if there are none."""
+    return repr(dict(sorted(starts.items()))) if starts else ""
 
 
 def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
@@ -220,8 +272,7 @@ def _load(name: str, own_file: Path | None) -> tuple[str, Component]:
             if registry.LOADED:
                 _check_effects(known[name][1])
             return known[name]
-        near = difflib.get_close_matches(name, known, 1, 0.5)
-        hint = f"; did you mean '{near[0]}'?" if near else f"; there are {', '.join(known)}"
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
         raise BuildError(f"no FMU '{name}'{hint}")
     spec = importlib.util.spec_from_file_location(own_file.stem, own_file)
     if spec is None or spec.loader is None:
@@ -330,6 +381,8 @@ def _pack(component: Component, module: str, own_file: Path | None, work: Path) 
     digest = hashlib.sha256()
     for inside in sorted(sources):
         digest.update(f"{inside}\0{sources[inside]}\0".encode())
+    changes = _changes(component.starts)
+    digest.update(changes.encode())
     code_hash = digest.hexdigest()
     package = f"{component.name}_{code_hash[:16]}"
     for inside, text in sources.items():
@@ -343,6 +396,7 @@ def _pack(component: Component, module: str, own_file: Path | None, work: Path) 
             name=component.name,
             package=package,
             module=module.partition(".")[2],
+            starting=f".starting({changes})" if changes else "",
             class_name=component.name.title().replace("_", ""),
             effects="".join(
                 f"import {package}.effects.{stem}\n"

@@ -6,17 +6,24 @@ at initialisation, :data:`FIXED`. A field may itself be such a NamedTuple, whose
 the flat list under their own names.
 """
 
+import difflib
 import importlib
 import pkgutil
 from collections import namedtuple
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 
 class DeclarationError(Exception):
     """A component's declaration is incomplete or contradicts itself."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint at the known name most like a wrong one; empty if none is like it."""
+    found = difflib.get_close_matches(name, known, 1, 0.5)
+    return f"; did you mean '{found[0]}'?" if found else ""
 
 
 @dataclass(frozen=True)
@@ -197,6 +204,7 @@ class Component:
         prepare: ``prepare(params)`` gives what follows from the parameters alone, where computing it
             anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
+        starts: start values of parameters and inputs that are not those of the declaration.
     """
 
     name: str
@@ -213,6 +221,11 @@ class Component:
     held: tuple[str, ...] = ()
     prepare: Callable[[Any], Any] | None = None
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
+    starts: Mapping[str, float] = field(default_factory=dict)
+
+    def starting(self, starts: Mapping[str, float]) -> "Component":
+        """The same component with other start values of some parameters or inputs."""
+        return replace(self, starts={**self.starts, **starts})
 
     def prepared(self, params: Any) -> Any:
         """What :meth:`advance` wants of the parameters: to be kept while they stay the same."""
@@ -243,7 +256,7 @@ class Component:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise DeclarationError(f"{self.name} declares {', '.join(twice)} more than once")
-        return found
+        return [replace(v, start=self.starts.get(v.name, v.start)) for v in found]
 
 
 def discover() -> Iterator[tuple[str, Component]]:

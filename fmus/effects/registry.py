@@ -18,7 +18,6 @@ Every further argument is a parameter, ``name: Annotated[float, unit, descriptio
 parameters that start at zero are the effect's coefficients: with all of them zero there is no effect.
 """
 
-import difflib
 import importlib.util
 import re
 import sys
@@ -28,7 +27,7 @@ from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_type_hints
 
-from ..declare import DeclarationError, Variable, variables, vector
+from ..declare import DeclarationError, Variable, nearest, variables, vector
 from ..ops import Number, when
 
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
@@ -224,8 +223,7 @@ def find(name: str) -> Effect:
         KeyError: there is none; the message names the nearest.
     """
     if name not in EFFECTS:
-        near = difflib.get_close_matches(name, EFFECTS, 1, 0.5)
-        raise KeyError(f"no effect '{name}'" + (f"; did you mean '{near[0]}'?" if near else ""))
+        raise KeyError(f"no effect '{name}'{nearest(name, EFFECTS)}")
     return EFFECTS[name]
 
 
