@@ -6,6 +6,7 @@ the library directly, with buffers that are laid out once.
 
 import ctypes
 import hashlib
+import io
 import itertools
 import math
 import os
@@ -13,7 +14,7 @@ import shutil
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,11 +27,14 @@ from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, read_model_description
 
+from . import access, archive, stepping
+from .access import DISCARD, ERROR, FATAL, Access, Memory, Port
 from .errors import InputError, SimulationError
 from .units import BASE, Unit
 
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+DESCRIPTION = "modelDescription.xml"
+SLAVE_MODULE = "resources/slavemodule.txt"  # of a Python FMU: which module it is
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
 
 # FMPy's logger proxy knows one logger for the whole process: ours finds the instance by its number.
@@ -79,40 +83,45 @@ class Model:
 
     Args:
         path: the ``.fmu`` file.
+        folder: where it is unpacked already, by somebody who will remove it.
 
     Raises:
         InputError: not there, not an FMU, or not one for FMI 2.0 co-simulation.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, folder: Path | None = None) -> None:
         self.path = path
         if not path.is_file():
             raise InputError(f"no such FMU: '{path}'")
+        entries = {entry.filename for entry in archive.check_archive(path)}
+        if DESCRIPTION not in entries:
+            raise InputError(f"'{path}' is not an FMU: it has no {DESCRIPTION}")
         try:
-            with zipfile.ZipFile(path) as archive:
-                if "modelDescription.xml" not in archive.namelist():
-                    raise InputError(f"'{path}' is not an FMU: it has no modelDescription.xml")
-                with archive.open("modelDescription.xml") as xml:
-                    _, root = next(ElementTree.iterparse(xml, ["start"]))
+            with zipfile.ZipFile(path) as opened:
+                xml = opened.read(DESCRIPTION)
+            archive.check_xml(xml, path, "an FMU")
+            _, root = next(ElementTree.iterparse(io.BytesIO(xml), ["start"]))
             version = root.get("fmiVersion")
             if version != "2.0":
                 raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
             self.description: ModelDescription = read_model_description(str(path), validate=False)
         except InputError:
             raise
-        except zipfile.BadZipFile:
-            raise InputError(f"'{path}' is not an FMU: it is not a zip archive") from None
         except Exception as error:
             raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
         if self.description.coSimulation is None:
             raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
+        library = self.description.coSimulation.modelIdentifier
+        if not library or any(c in "/\\:" or not c.isprintable() for c in library):
+            raise InputError(f"'{path}' is refused: its modelIdentifier {library!r} is no identifier")
         self.name: str = self.description.modelName or path.stem
         try:
             self.variables = self._read_variables()
         except Exception as error:
             raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
         self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-        self._folder: Path | None = None
+        self._folder = folder
+        self._is_ours = folder is None
 
     def _read_variables(self) -> dict[str, Variable]:
         """All variables by name, in the order of the description."""
@@ -169,10 +178,10 @@ class Model:
         if self._folder is None:
             folder = Path(tempfile.mkdtemp(prefix="cosim_"))
             try:
-                fmpy.extract(str(self.path), str(folder))
-            except Exception as error:
+                archive.unpack(self.path, folder)
+            except BaseException:
                 shutil.rmtree(folder, ignore_errors=True)
-                raise InputError(f"'{self.path}' cannot be unpacked: {error}") from error
+                raise
             self._folder = folder
         return self._folder
 
@@ -188,7 +197,8 @@ class Model:
         """Remove what was unpacked."""
         if self._folder is not None:
             self.forget_modules()
-            shutil.rmtree(self._folder, ignore_errors=True)
+            if self._is_ours:
+                shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = None
 
 
@@ -220,13 +230,21 @@ class Instance:
             )
         except Exception as error:
             os.chdir(here)
-            raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {error}") from error
+            there = sorted(path.name for path in (folder / "binaries").glob("*"))
+            why = f"{error}" if fmpy.platform in there else f"it has {', '.join(there) or 'no binaries'}"
+            why += _tool_hint(model, folder)
+            raise InputError(f"'{model.path}' cannot be loaded on {fmpy.platform}: {why}") from error
 
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others
         # may work in threads of their own and must not find it held.
-        self._keep_lock = hasattr(self._fmu.dll, "finalizePythonInterpreter")
-        if self._keep_lock and not (folder / "resources" / "slavemodule.txt").is_file():
-            raise InputError(f"'{model.path}' is a Python FMU without its resources/slavemodule.txt")
+        self.is_python = hasattr(self._fmu.dll, "finalizePythonInterpreter")
+        if self.is_python and not (folder / SLAVE_MODULE).is_file():
+            raise InputError(f"'{model.path}' is a Python FMU without its {SLAVE_MODULE}")
+        # A Python FMU saves its state in many small pieces, and does not tell how far it got.
+        self.can_redo = bool(
+            not self.is_python and cs.canGetAndSetFMUstate and cs.canHandleVariableCommunicationStepSize
+        )
+        self.saved_state = ctypes.c_void_p()
         self.complaint = ""
         self.worst_status = 0
 
@@ -244,10 +262,10 @@ class Instance:
     def _instantiate(self, folder: Path) -> int:
         resources = folder / "resources"
         # pythonfmu undoes no escapes but that of the space.
-        uri = f"file://{str(resources).replace(' ', '%20')}" if self._keep_lock else resources.as_uri()
+        uri = f"file://{str(resources).replace(' ', '%20')}" if self.is_python else resources.as_uri()
         # A module of the same name that is there already would be taken for the FMU's own.
-        script = resources / "slavemodule.txt"
-        module = script.read_text().strip() if self._keep_lock else ""
+        script = folder / SLAVE_MODULE
+        module = script.read_text().strip() if self.is_python else ""
         other = sys.modules.pop(module, None)
         component = self._fmu.fmi2Instantiate(
             self.name.encode(),
@@ -259,17 +277,23 @@ class Instance:
             fmi2.fmi2True,
         )
         self._fmu.component = component
-        if self._keep_lock:
+        if self.is_python:
             self.model.forget_modules()
         if other is not None:
             sys.modules[module] = other
         if not component:
             why = f": {self.complaint}" if self.complaint else ""
+            why += _tool_hint(self.model, folder)
             raise InputError(f"'{self.model.path}' cannot be instantiated as '{self.name}'{why}")
         return int(component)
 
-    def check(self, what: str, status: int) -> None:
+    def check(self, what: str, status: int, note: str = "") -> None:
         """End the run if a call returned more than a warning.
+
+        Args:
+            what: the call.
+            status: what it returned.
+            note: text to add to the message.
 
         Raises:
             SimulationError: names the instance, the call and the status, and what the FMU said of it.
@@ -277,17 +301,25 @@ class Instance:
         if status >= DISCARD:
             self.worst_status = max(self.worst_status, status)
             why = f": {self.complaint}" if self.complaint else ""
-            raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{why}")
+            raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{note}{why}")
 
     def function(self, name: str) -> Callable[..., int]:
         """An FMI function of the library; its arguments must be ctypes values."""
-        kind = ctypes.PYFUNCTYPE if self._keep_lock else ctypes.CFUNCTYPE
+        kind = ctypes.PYFUNCTYPE if self.is_python else ctypes.CFUNCTYPE
         try:
             address = ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value
         except AttributeError:
             raise InputError(f"'{self.model.path}' does not export {name}") from None
         assert address is not None
         return kind(ctypes.c_int)(address)
+
+    def stepping(self, h: float) -> Callable[[float], None]:
+        """A function of t [s] that steps from t to t + h."""
+        return (stepping.redoing if self.can_redo else stepping.plain)(self, h)
+
+    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+        """What the loop calls, see :func:`cosim.access.bind`."""
+        return access.bind(self, inputs, outputs, memory, h)
 
     def call(self, what: str, action: Callable[[], Any]) -> None:
         """Run a step of the life cycle; an FMU that refuses it ends the run."""
@@ -333,8 +365,15 @@ class Instance:
         return float(values[0])
 
     def set_up(self, stop: float) -> None:
-        """Announce the experiment."""
-        self.call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=0.0, stopTime=stop))
+        """Announce the experiment, from 0 to stop [s], with the tolerance that the FMU suggests."""
+        suggested = self.model.description.defaultExperiment
+        tolerance = None if suggested is None else suggested.tolerance
+        self.call(
+            "fmi2SetupExperiment",
+            lambda: self._fmu.setupExperiment(
+                tolerance=None if tolerance is None else float(tolerance), startTime=0.0, stopTime=stop
+            ),
+        )
 
     def enter_initialization(self) -> None:
         self.call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
@@ -350,11 +389,23 @@ class Instance:
     def free(self) -> None:
         """Free the instance and its library; after a fatal error nothing of it may be called."""
         if self.worst_status < FATAL:
+            if self.saved_state:
+                self.function("fmi2FreeFMUstate")(
+                    ctypes.c_void_p(self.component), ctypes.byref(self.saved_state)
+                )
             self._fmu.fmi2FreeInstance(self._fmu.component)
         _listeners.pop(self._environment, None)
         # The first pythonfmu library in a process cannot be unloaded. Left alone it would do this when
         # the process ends, after its own memory is gone, and now and then abort the process.
         finalize = getattr(self._fmu.dll, "finalizePythonInterpreter", None)
-        if self._keep_lock and finalize is not None:
+        if self.is_python and finalize is not None:
             finalize()
         self._fmu.freeLibrary()
+
+
+def _tool_hint(model: Model, folder: Path) -> str:
+    """What may be the reason why an FMU does not start; a Python FMU's tool is there, it is Python."""
+    cs = model.description.coSimulation
+    if cs is None or not cs.needsExecutionTool or (folder / SLAVE_MODULE).is_file():
+        return ""
+    return "; it needs the tool that it was made with to be installed"

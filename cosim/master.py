@@ -7,27 +7,21 @@ the log is the table.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
+from .access import Memory, Port
 from .errors import SimulationError
 from .faults import EARLY, Effect, Values
-from .fmu import DISCARD, Instance, Variable
+from .fmu import Instance, Variable
+from .isolation import TIMEOUT, IsolatedInstance
 from .scenario import Event
-from .system import INT_LIMIT, Connection, Signal, System
-
-_SETTERS = {
-    "Integer": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
-    "Enumeration": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
-    "Boolean": ("fmi2SetBoolean", "fmi2GetBoolean", ctypes.c_int),
-}
+from .system import Connection, Signal, System
 
 
 @dataclass
@@ -60,7 +54,11 @@ class Messages:
             self._show(f"FMUs logged more than {self.KEEP} messages; the rest is not shown")
 
 
-class Table:
+# What the master drives; where an instance runs makes no difference to it.
+AnyInstance = Instance | IsolatedInstance
+
+
+class Table(Memory):
     """One double for each signal, in a memory that FMUs read and write.
 
     Args:
@@ -78,77 +76,8 @@ class Table:
         # sorted() is stable: within a stretch the order is that of the model description.
         self.signals = sorted(signals.values(), key=rank)
         self.slots = {signal.name: k for k, signal in enumerate(self.signals)}
-        self._memory = (ctypes.c_double * max(1, len(self.signals)))()
-        self.address = ctypes.addressof(self._memory)
-        self.values = memoryview(self._memory).cast("B").cast("d")
+        super().__init__(len(self.signals))
         self.row = np.asarray(self.values)
-
-
-# A function and its arguments, converted for C once and for all; returns an FMI status.
-Call = tuple[Callable[..., int], tuple[Any, ...]]
-
-
-def make_access(
-    instance: Instance, signals: Sequence[Signal], table: Table, setting: bool
-) -> list[Call]:
-    """Calls that set or get some variables of one FMU.
-
-    Reals pass directly between the FMU and the table, in one call; other types through buffers.
-
-    Args:
-        instance: whose variables.
-        signals: which; the Reals among them stand side by side in the table.
-        table: where the values are.
-        setting: whether to set, not get.
-    """
-    calls: list[Call] = []
-    reals = [s for s in signals if s.variable.type == "Real"]
-    if reals:
-        address = table.address + 8 * table.slots[reals[0].name]
-        calls.append(_vector_call(instance, "fmi2SetReal" if setting else "fmi2GetReal", reals, address))
-    for kind in _SETTERS:
-        others = [s for s in signals if s.variable.type == kind]
-        if others:
-            calls.append((_buffered_call(instance, kind, others, table, setting), ()))
-    return calls
-
-
-def _vector_call(instance: Instance, what: str, signals: Sequence[Signal], address: int) -> Call:
-    """One vector get or set between an FMU and a memory."""
-    references = (ctypes.c_uint * len(signals))(*[s.variable.reference for s in signals])
-    return instance.function(what), (
-        ctypes.c_void_p.from_param(instance.component),
-        ctypes.byref(references),
-        ctypes.c_size_t.from_param(len(signals)),
-        ctypes.c_void_p.from_param(address),
-    )
-
-
-def _buffered_call(
-    instance: Instance, kind: str, signals: Sequence[Signal], table: Table, setting: bool
-) -> Callable[[], int]:
-    """The same for variables that are not Real: whole numbers, converted on the way."""
-    setter, getter, c_type = _SETTERS[kind]
-    buffer = (c_type * len(signals))()
-    slots = [table.slots[s.name] for s in signals]
-    values = table.values
-    what = setter if setting else getter
-    function, arguments = _vector_call(instance, what, signals, ctypes.addressof(buffer))
-
-    def set_() -> int:
-        for k, slot in enumerate(slots):
-            if not abs(values[slot]) < INT_LIMIT:
-                raise SimulationError(f"{signals[k].name} = {values[slot]} is not a 32-bit number")
-            buffer[k] = round(values[slot])
-        return function(*arguments)
-
-    def get() -> int:
-        status = function(*arguments)
-        for k, slot in enumerate(slots):
-            values[slot] = float(buffer[k])
-        return status
-
-    return set_ if setting else get
 
 
 class Changes:
@@ -190,11 +119,12 @@ class Stepper:
     Attributes:
         exchange: ``exchange(t)`` brings the newest values, which belong to time t, to the FMU's inputs.
         read: ``read(t)`` brings its outputs to the table.
+        begin: ``begin(t)`` lets the step from t begin beside those of others, None if it cannot.
         advance: ``advance(t)`` steps from t, and reads.
         input_effects, output_effects: act on the values on their way, in this order.
     """
 
-    def __init__(self, system: System, instance: Instance, table: Table, settable: set[str]) -> None:
+    def __init__(self, system: System, instance: AnyInstance, table: Table, settable: set[str]) -> None:
         self.instance = instance
         self.every = system.every[instance.name]
         self.step_size = self.every * system.scenario.step
@@ -210,7 +140,14 @@ class Stepper:
         self._inputs = [s for s in own if s.variable.causality == "input"]
         # Inputs without a source that events may change.
         self._free = [s for s in own if s.name in settable and s.name not in sourced]
-        self.exchange = self._make_exchange(incoming, [s for s in own if s.name in settable])
+        self._access = instance.bind(
+            [Port(s.variable, table.slots[s.name]) for s in own if s.name in settable],
+            [Port(s.variable, table.slots[s.name]) for s in self.got],
+            table,
+            self.step_size,
+        )
+        self.begin = self._access.begin
+        self.exchange = self._make_exchange(incoming)
         self.read = self._make_read()
         self.advance = self._make_advance()
 
@@ -226,12 +163,9 @@ class Stepper:
     # The three functions that run every step keep what they need in their own scope, where Python finds
     # it fastest.
 
-    def _make_exchange(
-        self, incoming: Sequence[Connection], settable: Sequence[Signal]
-    ) -> Callable[[float], None]:
-        instance, values, effects = self.instance, self._table.values, self.input_effects
+    def _make_exchange(self, incoming: Sequence[Connection]) -> Callable[[float], None]:
+        values, effects, put = self._table.values, self.input_effects, self._access.put
         copies, runs, conversions = _transfers(incoming, self._table)
-        sets = make_access(instance, settable, self._table, setting=True)
         if conversions:
             effects.append(partial(_convert, conversions))
 
@@ -242,40 +176,32 @@ class Stepper:
                 values[target:target_end] = values[source:source_end]
             for effect in effects:
                 effect(values, t)
-            for function, arguments in sets:
-                if (status := function(*arguments)) >= DISCARD:
-                    instance.check("setting its inputs", status)
+            put()
 
         return exchange
 
     def _make_read(self) -> Callable[[float], None]:
-        instance, values, effects = self.instance, self._table.values, self.output_effects
-        gets = make_access(instance, self.got, self._table, setting=False)
+        values, effects, get = self._table.values, self.output_effects, self._access.get
 
         def read(t: float) -> None:
-            for function, arguments in gets:
-                if (status := function(*arguments)) >= DISCARD:
-                    instance.check("getting its outputs", status)
+            get()
             for effect in effects:
                 effect(values, t)
 
         return read
 
     def _make_advance(self) -> Callable[[float], None]:
-        instance, h, read = self.instance, self.step_size, self.read
-        do_step, now = instance.function("fmi2DoStep"), ctypes.c_double()
-        arguments = (
-            ctypes.c_void_p.from_param(instance.component),
-            now,
-            ctypes.c_double.from_param(h),
-            ctypes.c_int.from_param(1),
+        values, effects, step, h = (
+            self._table.values,
+            self.output_effects,
+            self._access.step,
+            self.step_size,
         )
 
         def advance(t: float) -> None:
-            now.value = t
-            if (status := do_step(*arguments)) >= DISCARD:
-                instance.check(f"the step from t = {t} s", status)
-            read(t + h)
+            step(t)
+            for effect in effects:
+                effect(values, t + h)
 
         return advance
 
@@ -335,7 +261,7 @@ class Master:
     def __init__(self, system: System, show: Callable[[str], None]) -> None:
         self.system = system
         self.messages = Messages(show)
-        self._instances: dict[str, Instance] = {}
+        self._instances: dict[str, AnyInstance] = {}
         self._initialised = False
         changeable = {f"{e.model}.{e.variable}" for e in system.scenario.events}
         settable = {c.target.name for c in system.connections}
@@ -345,7 +271,7 @@ class Master:
         self.table = Table(system.signals, system.order, settable)
         try:
             for name in system.order:
-                self._instances[name] = Instance(name, system.models[name], self.messages.add)
+                self._instances[name] = self._instantiate(name)
             self._steppers = [
                 Stepper(system, self._instances[name], self.table, settable) for name in system.order
             ]
@@ -355,6 +281,12 @@ class Master:
         except BaseException:
             self.close()
             raise
+
+    def _instantiate(self, name: str) -> AnyInstance:
+        model, entry = self.system.models[name], self.system.scenario.fmus[name]
+        if entry.isolate:
+            return IsolatedInstance(name, model, self.messages.add, entry.timeout or TIMEOUT)
+        return Instance(name, model, self.messages.add)
 
     def _stepper(self, name: str) -> Stepper:
         return self._steppers[self.system.order.index(name)]
@@ -411,7 +343,7 @@ class Master:
             else:
                 self._change_parameter(stepper.instance, signal.variable, event)
 
-    def _change_parameter(self, instance: Instance, variable: Variable, event: Event) -> None:
+    def _change_parameter(self, instance: AnyInstance, variable: Variable, event: Event) -> None:
         name = f"{instance.name}.{variable.name}"
         original = self._originals.setdefault(name, instance.get_value(variable))
         if event.action == "reset":
@@ -433,30 +365,39 @@ class Master:
         Raises:
             SimulationError: an FMU returned an error, or an output is not finite.
         """
-        one_by_one = self.system.scenario.algorithm == "gauss_seidel"
-        everyone = due = [(s.exchange, s.advance, s.every) for s in self._steppers]
-        multirate = any(every > 1 for _, _, every in everyone)
-        time = self.time
+        steppers, advance_all = self._steppers, self._one_after_the_other
+        if self.system.scenario.algorithm == "jacobi":
+            # Those that step beside the others are begun first and awaited last.
+            steppers = sorted(steppers, key=lambda s: s.begin is not None)
+            advance_all = self._all_at_once
+        due = steppers
+        multirate = any(s.every > 1 for s in steppers)
         events = self._events
         t = 0.0
         for k in range(1, self.system.steps + 1):
             if events and events[0].time <= t + EARLY:
                 self._begin_events(t)
-            t_next = time(k)
+            t_next = self.time(k)
             if multirate:
                 # An FMU steps when its own time is full, with inputs of the end of its step.
-                due = [one for one in everyone if k % one[2] == 0]
-            if one_by_one:
-                for exchange, advance, every in due:
-                    exchange(t_next)
-                    advance(t if every == 1 else time(k - every))
-            else:
-                for exchange, _, _ in due:
-                    exchange(t)
-                for _, advance, every in due:
-                    advance(t if every == 1 else time(k - every))
+                due = [s for s in steppers if k % s.every == 0]
+            advance_all(due, k, t, t_next)
             t = t_next
             yield t
+
+    def _one_after_the_other(self, due: Sequence[Stepper], k: int, t: float, t_next: float) -> None:
+        for stepper in due:
+            stepper.exchange(t_next)
+            stepper.advance(t if stepper.every == 1 else self.time(k - stepper.every))
+
+    def _all_at_once(self, due: Sequence[Stepper], k: int, t: float, t_next: float) -> None:
+        for stepper in due:
+            stepper.exchange(t)
+        for stepper in due:
+            if stepper.begin is not None:
+                stepper.begin(t if stepper.every == 1 else self.time(k - stepper.every))
+        for stepper in due:
+            stepper.advance(t if stepper.every == 1 else self.time(k - stepper.every))
 
     @property
     def outputs(self) -> list[str]:

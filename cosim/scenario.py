@@ -14,6 +14,7 @@ from pydantic import (
     PrivateAttr,
     TypeAdapter,
     ValidationError,
+    model_validator,
 )
 
 from . import faults
@@ -75,6 +76,16 @@ class FmuEntry(Strict):
         None,
         description="CSV file, relative to the scenario; column c holds the parameters c_1, c_2, ...",
     )
+    isolate: bool = Field(False, description="run it in a process of its own")
+    timeout: PositiveFloat | None = Field(
+        None, description="with isolate: longest time [s] that one call may take (60)"
+    )
+
+    @model_validator(mode="after")
+    def _timeout_needs_a_process(self) -> "FmuEntry":
+        if self.timeout is not None and not self.isolate:
+            raise ValueError('timeout needs "isolate": true')
+        return self
 
 
 class Event(Strict):

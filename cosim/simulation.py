@@ -187,6 +187,7 @@ def simulate(
     parameters: Sequence[str | Path] = (),
     realtime: float | None = None,
     pictures: bool = False,
+    native: bool = True,
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Result:
@@ -198,6 +199,7 @@ def simulate(
         parameters: SSP parameter sets that beat the scenario's values.
         realtime: simulated seconds per second of wall time; None runs as fast as it can.
         pictures: whether to draw.
+        native: whether FMUs may hold programs that were not built on this computer.
         show: receives warnings and messages, a line each.
         progress: receives the simulated time [s] now and then.
 
@@ -210,7 +212,7 @@ def simulate(
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
-    system = prepare(scenario, overrides)
+    system = prepare(scenario, overrides, native)
     try:
         for warning in system.warnings:
             show(f"warning: {warning}")

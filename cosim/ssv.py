@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from .archive import check_xml
 from .errors import InputError
 from .log import write_whole
 from .units import BASE, Unit, conversion
@@ -89,7 +90,9 @@ def read_parameters(path: Path) -> ParameterSet:
         InputError: missing, no parameter set, a name twice, or a value that is no number.
     """
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        content = path.read_bytes()
+        check_xml(content, path, "a parameter set")
+        root = ElementTree.fromstring(content)
     except FileNotFoundError:
         raise InputError(f"no such parameter set: '{path}'") from None
     except (OSError, ElementTree.ParseError, LookupError, ValueError) as error:

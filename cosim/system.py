@@ -9,6 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
 
 from . import metrics
+from .access import INT_LIMIT
 from .errors import InputError, nearest
 from .fmu import NUMERIC, Model, Variable
 from .order import Link, execution_order
@@ -17,7 +18,6 @@ from .ssv import ParameterSet
 from .table import read_table, table_parameters
 from .units import SAME, Conversion, conversion
 
-INT_LIMIT = 2**31
 # What an input of one type accepts from an output of another.
 ACCEPTS = {
     "Real": ("Real", "Integer", "Enumeration"),
@@ -100,18 +100,22 @@ class System:
         return Signal(instance, known[variable])
 
 
-def prepare(scenario: Scenario, overrides: Overrides = ()) -> System:
+def prepare(scenario: Scenario, overrides: Overrides = (), native: bool = True) -> System:
     """Read the FMUs of a scenario and check everything that can be checked without running.
 
     Args:
         scenario: what to run.
         overrides: parameter sets that beat the scenario's own.
+        native: whether FMUs may run programs that were not built on this computer.
 
     Raises:
         InputError: the first thing that is wrong.
     """
     warnings: list[str] = []
     system = System(scenario, _read_models(scenario, warnings), warnings=warnings)
+    if not native:
+        _fmu_builder("--verify", "--", *{str(model.path) for model in system.models.values()})
+    _check_processes(system)
     _check_window(scenario)
     _count_steps(system)
     _check_parameters(system, overrides)
@@ -149,23 +153,45 @@ def _read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
         path = paths.get(entry.path) or scenario.folder / entry.path
         if path not in models:
             models[path] = Model(path)
-        elif (cs := models[path].description.coSimulation) and cs.canBeInstantiatedOnlyOncePerProcess:
-            raise InputError(f"fmus.{instance}: '{path}' can be instantiated only once per process")
         found[instance] = models[path]
     return found
 
 
 def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
-    """Paths of the project's own FMUs, built if need be by a process of their own."""
+    """Paths of the project's own FMUs, built if need be."""
     if not names:
         return {}
+    return dict(zip(names, map(Path, _fmu_builder("--", *names)), strict=True))
+
+
+def _fmu_builder(*arguments: str) -> list[str]:
+    """Lines that the project's FMU builder prints, in a process of its own.
+
+    Raises:
+        InputError: what it complains of.
+    """
     done = subprocess.run(
-        [sys.executable, "-m", "fmus.build", "--", *names], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "fmus.build", *arguments], capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
         raise InputError(reason[0].removeprefix("error: "))
-    return dict(zip(names, map(Path, done.stdout.splitlines()), strict=True))
+    return done.stdout.splitlines()
+
+
+def _check_processes(system: System) -> None:
+    """Some FMUs want a process for each instance."""
+    together: dict[str, str] = {}
+    for name, model in system.models.items():
+        capabilities = model.description.coSimulation
+        if system.scenario.fmus[name].isolate or capabilities is None:
+            continue
+        other = together.setdefault(model.sha256, name)
+        if other != name and capabilities.canBeInstantiatedOnlyOncePerProcess:
+            raise InputError(
+                f"fmus.{name}: '{model.path}' can be instantiated only once per process, and "
+                f'{other} does; give one of them "isolate": true'
+            )
 
 
 def whole(ratio: float) -> int | None:

@@ -27,6 +27,7 @@ from pathlib import Path
 from filelock import FileLock
 from platformdirs import user_cache_path
 
+from . import ledger
 from .baking import Starts, read_starts
 from .declare import Component, DeclarationError, Range, discover, nearest, variables, width
 from .effects import registry
@@ -70,13 +71,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           python -m fmus.build my_controller.py --out fmu\n"
         "           python -m fmus.build --list vessel\n"
         "           python -m fmus.build vessel --effects my_effects.py --out fmu\n"
-        "           python -m fmus.build --parameters model.ssv --out fmu",
+        "           python -m fmus.build --parameters model.ssv --out fmu\n"
+        "           python -m fmus.build --verify fmu/vessel.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
     parser.add_argument(
         "--list", action="store_true", help="list the FMUs, or the variables of those named"
+    )
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="build nothing; tell whether all programs in these .fmu files were built on this computer",
     )
     parser.add_argument(
         "--effects",
@@ -96,6 +103,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for file in options.effects:
             registry.load(file)
+        if options.verify:
+            _verify(options.names)
+            return 0
         if options.list:
             _print_list(options.names)
             return 0
@@ -109,6 +119,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
+
+
+def _verify(names: Sequence[str]) -> None:
+    """Refuse FMUs with a program file that no build on this computer has made.
+
+    Raises:
+        BuildError: names the first such file; or a file cannot be read.
+    """
+    for name in names:
+        try:
+            wrong = ledger.stranger(Path(name), cache_folder())
+        except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
+            raise BuildError(f"'{name}' cannot be read: {error}") from error
+        if wrong:
+            raise BuildError(f"'{name}' was not built here: it holds '{wrong}'")
 
 
 def _print_list(names: Sequence[str]) -> None:
@@ -231,7 +256,10 @@ def _cached(name: str, starts: Starts | None = None) -> Path:
     with FileLock(folder / "lock"):
         if not fmu.is_file():
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-                _place(_pack(component, module, own_file, Path(work)), fmu)
+                built = _pack(component, module, own_file, Path(work))
+                with FileLock(cache_folder() / "ledger.lock"):
+                    ledger.record(built, cache_folder())
+                _place(built, fmu)
     return fmu
 
 

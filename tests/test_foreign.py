@@ -1,111 +1,21 @@
 """An FMU that is no Python: a first-order lag in C, compiled here, run beside ours."""
 
-import subprocess
 import zipfile
 
-import ccode
 import fmpy
 import numpy as np
 import pytest
+from foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
 
-pytestmark = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
-
-SOURCE = r"""
-#include <stdlib.h>
-#include <string.h>
-typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
-typedef struct { Logger logger; void *(*allocate)(size_t, size_t); void (*release)(void *);
-                 void *step_finished; void *environment; } Callbacks;
-typedef struct { double u, y, T; int steps; int on; const Callbacks *callbacks; char name[64]; } Lag;
-
-const char *fmi2GetTypesPlatform(void) { return "default"; }
-const char *fmi2GetVersion(void) { return "2.0"; }
-int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const k[]) { return 0; }
-void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
-                      const Callbacks *callbacks, int visible, int logging) {
-    if (strcmp(guid, "{lag}")) return NULL;
-    Lag *m = callbacks->allocate(1, sizeof(Lag));
-    m->T = 1.0; m->on = 1; m->callbacks = callbacks; strncpy(m->name, name, 63);
-    return m;
-}
-void fmi2FreeInstance(void *c) { Lag *m = c; m->callbacks->release(m); }
-int fmi2SetupExperiment(void *c, int t, double tol, double start, int s, double stop) { return 0; }
-int fmi2EnterInitializationMode(void *c) { return 0; }
-int fmi2ExitInitializationMode(void *c) { return 0; }
-int fmi2Terminate(void *c) { return 0; }
-int fmi2Reset(void *c) { Lag *m = c; m->u = m->y = 0.0; m->steps = 0; return 0; }
-int fmi2GetReal(void *c, const unsigned vr[], size_t n, double v[]) {
-    Lag *m = c; double all[] = {m->u, m->y, m->T};
-    for (size_t k = 0; k < n; k++) { if (vr[k] > 2) return 3; v[k] = all[vr[k]]; } return 0;
-}
-int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double v[]) {
-    Lag *m = c;
-    for (size_t k = 0; k < n; k++) { if (vr[k] == 0) m->u = v[k]; else if (vr[k] == 2) m->T = v[k]; else return 3; }
-    return 0;
-}
-int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int v[]) { v[0] = ((Lag *)c)->steps; return 0; }
-int fmi2SetInteger(void *c, const unsigned vr[], size_t n, const int v[]) { return 3; }
-int fmi2GetBoolean(void *c, const unsigned vr[], size_t n, int v[]) { v[0] = ((Lag *)c)->on; return 0; }
-int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int v[]) { ((Lag *)c)->on = v[0]; return 0; }
-int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *v[]) { return 3; }
-int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *const v[]) { return 3; }
-int fmi2DoStep(void *c, double t, double h, int no_set) {
-    Lag *m = c;
-    if (m->u > 1e6) {
-        m->callbacks->logger(m->callbacks->environment, m->name, 3, "error", "input %g is too large", m->u);
-        return 3;
-    }
-    if (m->on) m->y += h / m->T * (m->u - m->y);
-    m->steps++;
-    return 0;
-}
-int fmi2CancelStep(void *c) { return 3; }
-int fmi2GetStatus(void *c, int k, int *v) { return 2; }
-int fmi2GetRealStatus(void *c, int k, double *v) { return 2; }
-int fmi2GetIntegerStatus(void *c, int k, int *v) { return 2; }
-int fmi2GetBooleanStatus(void *c, int k, int *v) { return 2; }
-int fmi2GetStringStatus(void *c, int k, const char **v) { return 2; }
-int fmi2SetRealInputDerivatives(void *c, const unsigned v[], size_t n, const int o[], const double x[]) { return 3; }
-int fmi2GetRealOutputDerivatives(void *c, const unsigned v[], size_t n, const int o[], double x[]) { return 3; }
-int fmi2GetFMUstate(void *c, void **s) { return 3; }
-int fmi2SetFMUstate(void *c, void *s) { return 3; }
-int fmi2FreeFMUstate(void *c, void **s) { return 3; }
-int fmi2SerializedFMUstateSize(void *c, void *s, size_t *n) { return 3; }
-int fmi2SerializeFMUstate(void *c, void *s, char b[], size_t n) { return 3; }
-int fmi2DeSerializeFMUstate(void *c, const char b[], size_t n, void **s) { return 3; }
-int fmi2GetDirectionalDerivative(void *c, const unsigned u[], size_t nu, const unsigned k[], size_t nk,
-                                 const double dk[], double du[]) { return 3; }
-"""
-
-DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="lag" guid="{lag}">
-  <CoSimulation modelIdentifier="lag" canHandleVariableCommunicationStepSize="true"/>
-  <ModelVariables>
-    <ScalarVariable name="in[1]" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="out, filtered" valueReference="1" causality="output" initial="exact"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="T" valueReference="2" causality="parameter" variability="tunable"><Real start="1" min="0.01"/></ScalarVariable>
-    <ScalarVariable name="steps" valueReference="0" causality="output" variability="discrete" initial="exact"><Integer start="0"/></ScalarVariable>
-    <ScalarVariable name="on" valueReference="0" causality="input" variability="discrete"><Boolean start="true"/></ScalarVariable>
-  </ModelVariables>
-  <ModelStructure><Outputs><Unknown index="2" dependencies=""/><Unknown index="4" dependencies=""/></Outputs></ModelStructure>
-</fmiModelDescription>
-"""
+pytestmark = needs_compiler
 
 
 @pytest.fixture
 def lag(tmp_path):
     """Path of the compiled FMU."""
-    (tmp_path / "lag.c").write_text(SOURCE)
-    library = tmp_path / f"lag{fmpy.sharedLibraryExtension}"
-    subprocess.run(
-        [ccode.COMPILER, "-O1", "-shared", "-fPIC", "-o", library, tmp_path / "lag.c"], check=True
-    )
-    with zipfile.ZipFile(tmp_path / "lag.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
-        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
-    return tmp_path / "lag.fmu"
+    return build_lag(tmp_path)
 
 
 def scenario(lag, **changes):
@@ -170,12 +80,160 @@ def test_alone_it_does_what_fmpy_makes_it_do(lag, tmp_path):
 
 
 def test_refused_instantiation_is_one_message(lag, tmp_path):
-    with zipfile.ZipFile(lag) as archive:
-        content = {n: archive.read(n) for n in archive.namelist()}
-    wrong = content["modelDescription.xml"].replace(b"{lag}", b"{other}")
-    with zipfile.ZipFile(lag, "w") as archive:
-        for name, data in (content | {"modelDescription.xml": wrong}).items():
-            archive.writestr(name, data)
+    edit(lag, lambda name, data: data.replace(b'guid="{lag}"', b'guid="{other}"'))
     with pytest.raises(cosim.InputError, match="cannot be instantiated as 'lag'"):
         cosim.simulate(cosim.load_scenario(scenario(lag)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def alone(lag, **changes):
+    return {
+        "name": "alone", "step": 0.1, "stop": 1.0,
+        "fmus": {"lag": {"path": str(lag), "parameters": {"in[1]": 1.0}}},
+    } | changes  # fmt: skip
+
+
+# Cannot step across t = 0.437 s at once; tells that it gets there.
+CORNER = "if (t < 0.437 && t + h > 0.437 + 1e-12) { m->last = 0.437; return 2; }"
+
+
+def test_discarded_step_is_done_again_in_shorter_ones(tmp_path):
+    """Forward Euler in three pieces shows in the numbers: up to the corner, and from there on."""
+    fmu = build_lag(tmp_path, "lag", CORNER, f"{ANY_STEP} {STATE}")
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "done"
+    log, y = cosim.read_log(tmp_path / "out"), 0.0
+    expected = [0.0]
+    for h in (0.1, 0.1, 0.1, 0.1, (0.437 - 0.4, 0.5 - 0.437), 0.1, 0.1, 0.1, 0.1, 0.1):
+        for part in np.atleast_1d(h):
+            y += part * (1.0 - y)
+        expected.append(y)
+    assert log["lag.out, filtered"] == pytest.approx(expected, abs=1e-15)
+    assert list(log["lag.steps"]) == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+
+
+def test_step_is_halved_where_the_fmu_does_not_tell_how_far_it_got(tmp_path):
+    fmu = build_lag(
+        tmp_path, "lag", "m->last = t; if (t > 0.35 && h > 0.03) return 2;", f"{ANY_STEP} {STATE}"
+    )
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "done"
+    assert cosim.read_log(tmp_path / "out")["lag.steps"][-1] > 4 + 6 * 3
+
+
+@pytest.mark.parametrize("capabilities", [ANY_STEP, STATE])
+def test_discarded_step_that_cannot_be_done_again_tells_how_far_it_got(tmp_path, capabilities):
+    fmu = build_lag(tmp_path, "lag", CORNER, capabilities)
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "failed"
+    assert result.message == "lag: the step from t = 0.4 s returned discard; it got to t = 0.437 s"
+    assert len(cosim.read_log(tmp_path / "out")["time"]) == 5
+
+
+@pytest.mark.parametrize("capabilities", [ANY_STEP, f"{ANY_STEP} {STATE}"])
+def test_fmu_that_asks_for_the_end_is_told(tmp_path, capabilities):
+    habit = "if (t > 0.45) { m->last = t + 0.01; m->done = 1; return 2; }"
+    fmu = build_lag(tmp_path, "lag", habit, capabilities)
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "failed"
+    assert "asks to end the simulation at t = 0.51 s" in result.message
+
+
+def test_fmu_that_always_discards_is_given_up(tmp_path):
+    fmu = build_lag(tmp_path, "lag", "m->last = t; return 2;", f"{ANY_STEP} {STATE}")
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "failed"
+    assert "returned discard" in result.message
+
+
+def test_steps_never_vary_for_an_fmu_that_wants_them_constant(tmp_path):
+    """Not even in the last digits, and with an event in between."""
+    habit = "if (m->last != 0.0 && h != m->last) return 3; m->last = h;"
+    fmu = build_lag(tmp_path, "lag", habit, 'canHandleVariableCommunicationStepSize="false"')
+    events = [{"time": 0.123, "model": "lag", "variable": "T", "action": "override", "value": 0.1}]
+    content = alone(fmu, step=0.01, events=events)
+    content["fmus"]["lag"]["step"] = 0.05
+    assert cosim.simulate(cosim.load_scenario(content), tmp_path / "out").status == "done"
+
+
+def test_last_words_of_a_crashing_fmu_are_heard(tmp_path, capfd):
+    fmu = build_lag(tmp_path, "lag", 'if (t > 0.45) { printf("so it ends\\n"); abort(); }')
+    content = alone(fmu)
+    content["fmus"]["lag"]["isolate"] = True
+    cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+    assert capfd.readouterr().err.count("so it ends") == 1
+
+
+@pytest.mark.parametrize("habit", ["abort();", "raise(11);", "_exit(0);", "for (;;) sleep(1);"])
+def test_compiled_fmu_that_crashes_or_hangs_is_one_message(tmp_path, habit):
+    fmu = build_lag(tmp_path, "lag", f"if (t > 0.45) {{ {habit} }}")
+    content = alone(fmu)
+    content["fmus"]["lag"] |= {"isolate": True, "timeout": 1.0}
+    result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+    assert result.status == "failed"
+    assert "the step from t = 0.5 s" in result.message
+    assert len(cosim.read_log(tmp_path / "out")["time"]) == 6
+
+
+ONCE = f'{ANY_STEP} canBeInstantiatedOnlyOncePerProcess="true"'
+
+
+def test_two_instances_of_an_fmu_for_one_per_process_need_isolation(tmp_path):
+    fmu = build_lag(tmp_path, "lag", "", ONCE)
+    copy = tmp_path / "copy.fmu"
+    copy.write_bytes(fmu.read_bytes())
+    for other in (fmu, copy):
+        content = alone(fmu)
+        content["fmus"]["second"] = {"path": str(other)}
+        with pytest.raises(
+            cosim.InputError, match='once per process, and lag does; give one of them "isolate"'
+        ):
+            cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+        content["fmus"]["second"]["isolate"] = True
+        assert cosim.simulate(cosim.load_scenario(content), tmp_path / "out").status == "done"
+
+
+def test_fmu_that_lacks_its_tool_says_so(tmp_path):
+    fmu = build_lag(tmp_path, "lag", "", f'{ANY_STEP} needsExecutionTool="true"')
+    assert cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out").status == "done"
+    edit(fmu, lambda name, data: data.replace(b'guid="{lag}"', b'guid="{licence}"'))
+    with pytest.raises(cosim.InputError, match="needs the tool that it was made with"):
+        cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+
+
+def test_binary_for_another_platform_is_one_message(tmp_path):
+    fmu = build_lag(tmp_path)
+    edit(fmu, lambda name, data: data, lambda name: name.replace(fmpy.platform, "amiga32"))
+    with pytest.raises(cosim.InputError, match=f"cannot be loaded on {fmpy.platform}: it has amiga32"):
+        cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+def test_flood_of_messages_from_c_is_cut(tmp_path, isolate):
+    """Formats, percent signs and lines of any length; more than a pipe holds."""
+    habit = """for (int k = 0; k < 500; k++)
+        m->callbacks->logger(m->callbacks->environment, m->name, 1, "w", "%d of %s: 100%% %0400d", k, "many", k);"""
+    fmu = build_lag(tmp_path, "lag", habit)
+    content = alone(fmu)
+    content["fmus"]["lag"]["isolate"] = isolate
+    shown = []
+    result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out", show=shown.append)
+    assert result.status == "done"
+    assert any(line.startswith("warning: lag: 3 of many: 100% 0000") for line in shown)
+    assert len(shown) < 210
+
+
+def test_nan_from_c_ends_the_run(tmp_path):
+    fmu = build_lag(tmp_path, "lag", "if (t > 0.45) { m->y = NAN; return 0; }")
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)), tmp_path / "out")
+    assert result.status == "failed"
+    assert result.message == "lag.out, filtered is not finite at t = 0.6 s"
+
+
+def edit(fmu, change, rename=lambda name: name):
+    """Rewrite the files inside an FMU, and their names."""
+    with zipfile.ZipFile(fmu) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for name, data in content.items():
+            archive.writestr(rename(name), change(name, data))

@@ -1,0 +1,168 @@
+"""Archives and XML from strangers: looked through before anything of them is used.
+
+An FMU is a program, and whoever runs it trusts it. But reading one must not write outside of its own
+folder, fill the disk or the memory, or mean another file on the next computer.
+"""
+
+import re
+import shutil
+import stat
+import unicodedata
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+from .errors import InputError
+
+# What Windows takes for a device, with any extension.
+DEVICE = re.compile(
+    r"(con|prn|aux|nul|conin\$|conout\$|com[0-9¹²³]|lpt[0-9¹²³])\s*(\.|$)", re.IGNORECASE
+)
+ENCRYPTED = 0x1
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How large an archive may become.
+
+    Attributes:
+        files: entries.
+        size: of all entries together, unpacked [bytes].
+        ratio: of that size to the size of the archive; does not count below ``always`` [bytes].
+    """
+
+    files: int = 50_000
+    size: int = 4 * 2**30
+    ratio: float = 200.0
+    always: int = 64 * 2**20
+
+
+LIMITS = Limits()
+
+
+def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
+    """Entries of an archive that can be unpacked anywhere without harm.
+
+    Args:
+        path: a zip archive.
+        limits: how large it may become.
+
+    Raises:
+        InputError: not a zip archive; an entry leaves the folder, is a link, is encrypted, has a name
+            that not every computer can write or that means another entry too; or it is a bomb.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+        packed = path.stat().st_size
+    except FileNotFoundError:
+        raise InputError(f"no such file: '{path}'") from None
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+        raise InputError(f"'{path}' is not a zip archive: {error}") from None
+    if len(entries) > limits.files:
+        raise InputError(f"'{path}' is refused: {len(entries)} entries are more than {limits.files}")
+    size = sum(entry.file_size for entry in entries)
+    # Entries may share their bytes: only the size of the whole file is certain.
+    if size > limits.size or (size > limits.always and size > limits.ratio * packed):
+        raise InputError(
+            f"'{path}' is refused: {packed} bytes would become {size} (at most {limits.size}, "
+            f"and {limits.ratio:g} times the size of the archive)"
+        )
+    for entry in entries:
+        if reason := _fault(entry):
+            raise InputError(f"'{path}' is refused: its entry {entry.orig_filename[:100]!r} {reason}")
+    if clash := _clash([entry.filename for entry in entries]):
+        raise InputError(f"'{path}' is refused: {clash}")
+    return entries
+
+
+def _fault(entry: zipfile.ZipInfo) -> str:
+    """What is wrong with one entry; empty if nothing is."""
+    name = entry.orig_filename
+    parts = name.removesuffix("/").split("/")
+    kind = stat.S_IFMT(entry.external_attr >> 16)
+    if name.startswith("/") or ":" in name:
+        return "is no path inside the archive"
+    if "\\" in name:
+        return "has a backslash in its name"
+    if ".." in parts:
+        return "leaves the folder"
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is a link or a device, not a file"
+    if entry.flag_bits & ENCRYPTED:
+        return "is encrypted"
+    if any(ord(c) < 32 for c in name) or any(p in ("", ".") or p[-1] in ". " for p in parts):
+        return "has a name that not every computer can write"
+    if any(DEVICE.match(part) for part in parts):
+        return "has the name of a device of Windows"
+    return ""
+
+
+def _clash(names: list[str]) -> str:
+    """Two entries that mean one file on some computer; empty if there are none."""
+    files: dict[str, str] = {}
+    for name in names:
+        if not name.endswith("/"):
+            key = _key(name)
+            if key in files:
+                return f"its entries {files[key]!r} and {name!r} are one file on some computers"
+            files[key] = name
+    for name in names:
+        parents = _key(name.removesuffix("/")).split("/")[: None if name.endswith("/") else -1]
+        for k in range(len(parents)):
+            key = "/".join(parents[: k + 1])
+            if key in files:
+                return f"its entry {files[key]!r} is a file, and the folder of {name!r}"
+    return ""
+
+
+def _key(name: str) -> str:
+    """Equal for names that some file system cannot tell apart: by case, or by accents."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def unpack(path: Path, folder: Path, limits: Limits = LIMITS) -> None:
+    """Unpack an archive into an empty folder, after :func:`check_archive`.
+
+    Raises:
+        InputError: refused, damaged, or the disk is full.
+    """
+    entries = check_archive(path, limits)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for entry in entries:
+                target = folder / entry.filename
+                if entry.is_dir():
+                    target.mkdir(parents=True, exist_ok=True)
+                    continue
+                target.parent.mkdir(parents=True, exist_ok=True)
+                # zipfile reads no more than the announced size; "x" never follows what is there.
+                with archive.open(entry) as reader, target.open("xb") as writer:
+                    shutil.copyfileobj(reader, writer)
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be unpacked: {error}") from error
+
+
+def check_xml(data: bytes, path: Path, what: str) -> None:
+    """Refuse XML that declares a document type: bombs and theft by entities are its only users left.
+
+    Args:
+        data: the document.
+        path: where it comes from.
+        what: what it should be, for the message.
+
+    Raises:
+        InputError: it has a DOCTYPE, or is not XML.
+    """
+
+    def refuse(*_: object) -> None:
+        raise InputError(f"'{path}' is refused: its XML declares a document type (DOCTYPE)")
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as {what}: {error}") from None

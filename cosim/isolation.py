@@ -1,0 +1,241 @@
+"""An FMU in a process of its own: the master's end.
+
+Whatever the FMU does to its process, the master gets an answer or a SimulationError. In a step, one
+request carries the inputs and one answer the outputs.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
+
+from .access import WARNING, Access, Memory, Port
+from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
+from .errors import InputError, SimulationError
+from .fmu import Model, Variable
+
+# Longest wall time of one call [s], where the scenario does not tell.
+TIMEOUT = 60.0
+# For a process that has nothing more to do to end [s].
+PATIENCE = 5.0
+START = "its instantiation"
+
+
+class IsolatedInstance:
+    """A running FMU in a process of its own; to the master like :class:`cosim.fmu.Instance`.
+
+    Args:
+        name: instance name.
+        model: what to run.
+        on_message: receives (instance, status, text) of each message that the FMU logs.
+        timeout: longest wall time that one call may take [s].
+
+    Raises:
+        InputError: the archive cannot be unpacked. Whether the FMU can be instantiated shows in the
+            first call: processes start side by side.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        model: Model,
+        on_message: Callable[[str, int, str], None],
+        timeout: float = TIMEOUT,
+    ) -> None:
+        self.name = name
+        self.model = model
+        self._on_message = on_message
+        self._timeout = timeout
+        folder = model.unpack()
+        try:
+            # A session of its own: Ctrl-C reaches the master only, and children end with their parent.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "cosim.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise SimulationError(f"{name}: its process cannot be started: {error}") from None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._channel = Channel(self._process.stdout, self._process.stdin)
+        self._lost = ""  # why there is no process any more
+        self._asked = ""  # the call whose answer has not come
+        self._talking = False  # inside a frame: where an exception leaves this, nothing more can be said
+        self._waiting_since: float | None = None
+        self._is_late = False
+        self._closed = threading.Event()
+        threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
+        path = str(model.path.resolve())
+        self._send(START, CALL, json.dumps(["start", name, path, str(folder)]).encode())
+
+    def _watch(self) -> None:
+        """End the process when it takes too long to answer; the one who waits for it notices."""
+        while not self._closed.wait(min(0.5, self._timeout / 4)):
+            since = self._waiting_since
+            if since is not None and time.monotonic() - since > self._timeout:
+                self._is_late = True
+                self._kill()
+
+    def _kill(self) -> None:
+        with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(self._process.pid, signal.SIGKILL)  # with whatever the FMU started
+            else:
+                self._process.kill()
+
+    def _send(self, what: str, kind: int, body: bytes) -> None:
+        """Ask; an answer that is still due is awaited first."""
+        if self._asked:
+            self._answer()
+        if self._lost:
+            raise SimulationError(self._lost)
+        self._asked, self._talking = what, True
+        try:
+            self._channel.send(kind, body)
+        except OSError:
+            self._give_up()
+        self._talking = False
+
+    def _answer(self) -> bytes:
+        """Await the answer to what was asked, and pass on what the FMU logs meanwhile."""
+        if self._lost:
+            raise SimulationError(self._lost)
+        self._talking = True
+        self._waiting_since = time.monotonic()
+        try:
+            kind, body = self._channel.receive()
+            while kind == LOG:
+                self._on_message(self.name, *json.loads(body))
+                kind, body = self._channel.receive()
+        except EOFError:
+            self._give_up()
+        self._waiting_since = None
+        what, self._talking, self._asked = self._asked, False, ""
+        if kind == DONE:
+            return body
+        if what == START:
+            self._lost = body.decode()  # nothing there to be terminated or freed
+        raise (InputError if kind == REFUSED else SimulationError)(body.decode())
+
+    def _give_up(self) -> NoReturn:
+        """The process is gone: tell why.
+
+        Raises:
+            SimulationError: always.
+        """
+        self._waiting_since = None
+        self._closed.set()
+        try:
+            code = self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:  # closed its pipes and lives on
+            self._kill()
+            code = self._process.wait()
+        if self._is_late:
+            how = f"{self._asked} took longer than {self._timeout:g} s; its process was ended"
+        else:
+            how = f"its process died in {self._asked} ({_reason(code)})"
+        self._lost = f"{self.name}: {how}"
+        raise SimulationError(self._lost)
+
+    def _call(self, what: str, name: str, *arguments: Any) -> Any:
+        self._send(what, CALL, json.dumps([name, *arguments]).encode())
+        return json.loads(self._answer())
+
+    def set_value(self, variable: Variable, value: float | int | bool | str) -> None:
+        """Set one variable, outside the step loop."""
+        self._call(f"setting {variable.name} = {value}", "set_value", variable.name, value)
+
+    def get_value(self, variable: Variable) -> float:
+        """One numeric variable, outside the step loop."""
+        return float(self._call(f"getting {variable.name}", "get_value", variable.name))
+
+    def set_up(self, stop: float) -> None:
+        """Announce the experiment."""
+        self._call("fmi2SetupExperiment", "set_up", stop)
+
+    def enter_initialization(self) -> None:
+        self._call("fmi2EnterInitializationMode", "enter_initialization")
+
+    def exit_initialization(self) -> None:
+        self._call("fmi2ExitInitializationMode", "exit_initialization")
+
+    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+        """What the loop calls, see :func:`cosim.access.bind`; the ports of a kind stand side by side."""
+        names = [[port.variable.name for port in ports] for ports in (inputs, outputs)]
+        self._call("the choice of its variables", "bind", *names, h)
+        own_inputs, own_outputs = _stretch(inputs, memory), _stretch(outputs, memory)
+        pending = 0
+
+        def move(what: str, actions: int, t: float) -> None:
+            nonlocal pending
+            actions |= pending
+            pending = 0
+            body = MOVE_HEAD.pack(actions, t)
+            self._send(what, MOVE, body + own_inputs if actions & PUT else body)
+
+        def put() -> None:
+            # They travel with the request that follows.
+            nonlocal pending
+            pending = PUT
+
+        def get() -> None:
+            move("getting its outputs", GET, 0.0)
+            own_outputs[:] = self._answer()
+
+        def begin(t: float) -> None:
+            move(f"the step from t = {t} s", STEP, t)
+
+        def step(t: float) -> None:
+            if not self._asked:
+                begin(t)
+            own_outputs[:] = self._answer()
+
+        return Access(put, get, step, begin)
+
+    def terminate(self) -> None:
+        """End the simulation, if it still can."""
+        if not self._lost and not self._talking:
+            self._call("fmi2Terminate", "terminate")
+
+    def free(self) -> None:
+        """Free the instance and end its process."""
+        if self._talking:  # interrupted while it worked
+            self._kill()
+        elif not self._lost:
+            try:
+                self._call("fmi2FreeInstance", "free")
+            except (SimulationError, InputError) as error:
+                self._on_message(self.name, WARNING, str(error))
+        self._closed.set()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            self._process.wait()
+
+
+def _stretch(ports: Sequence[Port], memory: Memory) -> memoryview:
+    """The part of a memory that holds some variables."""
+    first = ports[0].slot if ports else 0
+    return memory.octets[8 * first : 8 * (first + len(ports))]
+
+
+def _reason(code: int) -> str:
+    """How a process ended, in words."""
+    if code < 0:
+        with suppress(ValueError):
+            return f"signal {-code}, {signal.Signals(-code).name}"
+        return f"signal {-code}"
+    return f"exit code {code}"
