@@ -119,17 +119,22 @@ def prepare(scenario: Scenario, overrides: Overrides = ()) -> System:
     _check_faults(system)
     _check_events(system)
     _choose_signals(system)
-    links = [
-        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
-        for c in system.connections
-    ]
     if scenario.algorithm == "gauss_seidel":
-        feedthrough = {name: model.feedthrough for name, model in system.models.items()}
-        system.order, late = execution_order(list(system.models), links, feedthrough)
+        system.order, late = newest_first(system)
         system.warnings += late
     else:
         system.order = list(system.models)
     return system
+
+
+def newest_first(system: System) -> tuple[list[str], list[str]]:
+    """The order of instances in which values travel farthest at one instant, and where that ends."""
+    links = [
+        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
+        for c in system.connections
+    ]
+    feedthrough = {name: model.feedthrough for name, model in system.models.items()}
+    return execution_order(list(system.models), links, feedthrough)
 
 
 def _read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
