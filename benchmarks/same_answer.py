@@ -1,7 +1,7 @@
 """Run one system in several tools and compare: ``python -m benchmarks.same_answer``.
 
-The system is exported once (SSP archive, OSP directory, container FMU), each tool runs that in a process of
-its own, and every output of every FMU is compared with this master's at each step, at full precision.
+The system is exported once (SSP archive, OSP directory, container FMU), each tool runs that in a process
+of its own, and every output of every FMU is compared with this master's at each step, at full precision.
 """
 
 import argparse
