@@ -78,9 +78,9 @@ def export_fmu(system: System, fmu: Path, drop: bool = False) -> list[str]:
 def export_osp(system: System, folder: Path, drop: bool = False) -> list[str]:
     """Write a system as an OSP directory, in place of an earlier one; as :func:`export_ssp`."""
     notes = portable.check(system, portable.OSP, drop)
-    if folder.exists() and not (folder / STRUCTURE).is_file():
-        if not folder.is_dir() or any(folder.iterdir()):
-            raise InputError(f"'{folder}' is there already, and is no OSP directory to replace")
+    free = not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))
+    if not free and not (folder / STRUCTURE).is_file():
+        raise InputError(f"'{folder}' is there already, and is no OSP directory to replace")
     with _beside(folder) as work:
         new = work / "new"
         new.mkdir()

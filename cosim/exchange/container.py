@@ -4,6 +4,7 @@ FMUs."""
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..system import System, newest_first
@@ -40,7 +41,7 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
     files = {part.name: f"link_{part.file}" for part in parts}
     try:
         container = FMUContainer(fmu.stem, folder)
-        container.start_time, container.stop_time = 0.0, system.scenario.stop
+        vars(container).update(start_time=0.0, stop_time=system.scenario.stop)
         # The order of stepping is that of initialisation as well, which simultaneous steps need too.
         order, _ = newest_first(system)
         for name in order:
@@ -61,7 +62,7 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(f"the container cannot be made: {error.reason}") from None
 
 
-def _add_face(container: "FMUContainer", system: System, part: Part, file: str) -> None:  # noqa: F821
+def _add_face(container: Any, system: System, part: Part, file: str) -> None:
     """Ports of the container, and start values."""
     fed = {c.target.name for c in system.connections}
     given = {v.name for v, _ in system.parameters[part.name]}

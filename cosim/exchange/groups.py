@@ -1,7 +1,7 @@
 """OSP-IS model descriptions: which variables of an FMU belong together, and as what.
 
-A variable's unit tells its quantity, the first or last part of its name the axis: ``x_hat``, ``y_hat`` in
-m become the group ``linear_displacement_hat``. Variables whose names say no axis stay alone.
+A variable's unit tells its quantity, the first or last part of its name the axis: ``x_hat``, ``y_hat``
+in m become the group ``linear_displacement_hat``. Variables whose names say no axis stay alone.
 """
 
 from dataclasses import dataclass

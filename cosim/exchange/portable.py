@@ -7,13 +7,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from xml.etree import ElementTree
 
 from ..errors import InputError
 from ..fmu import Model, Variable
 from ..scenario import Value
 from ..system import Connection, System
-from .xml import parameter_set
+from . import xml
 
 
 @dataclass(frozen=True)
@@ -84,9 +83,7 @@ def check(system: System, target: Format, drop: bool) -> list[str]:
             "their values arrive a step later"
         )
     if any(every > 1 for every in system.every.values()):
-        notes.append(
-            "an instance with a step of its own gets its inputs at the start of that step there"
-        )
+        notes.append("an instance with a longer step gets its inputs at the start of that step there")
     return notes
 
 
@@ -114,8 +111,8 @@ def _check_shape(system: System, target: Format) -> None:
     for name, every in system.every.items():
         if every > 1 and not target.own_steps:
             raise InputError(
-                f"fmus.{name}: {target.name} cannot hold its step of {every * system.scenario.step:g} s, "
-                f"only one step of {system.scenario.step:g} s for all"
+                f"fmus.{name}: {target.name} cannot hold a step of {every * system.scenario.step:g} s "
+                f"beside that of {system.scenario.step:g} s"
             )
     for c in system.connections:
         ends = f"{c.source.name} -> {c.target.name}"
@@ -187,16 +184,10 @@ def _bake(part: Part, folder: Path) -> None:
     names = {f"{part.model.name}.{v.name}": (v, value) for v, value in part.values}
     work = folder / f".{part.file}"
     work.mkdir()
-    ElementTree.ElementTree(parameter_set(part.name, names, root=True)).write(
-        work / "start.ssv", "utf-8"
-    )
-    done = subprocess.run(
-        [sys.executable, "-m", "fmus.build", "--parameters", str(work / "start.ssv"), "--out", str(work)]
-        + ["--", part.model.name],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    start = work / "start.ssv"
+    xml.write(xml.parameter_set(part.name, names, root=True), start)
+    command = [sys.executable, "-m", "fmus.build", "--parameters", start, "--out", work]
+    done = subprocess.run([*command, "--", part.model.name], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
         raise InputError(reason[0].removeprefix("error: "))

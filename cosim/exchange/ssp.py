@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -115,11 +115,11 @@ def _component(system: System, part: Part, units: dict[str, dict[str, str]]) -> 
     return component
 
 
-def _common_units(models: object) -> dict[str, dict[str, str]]:
+def _common_units(models: Iterable[Model]) -> dict[str, dict[str, str]]:
     """Definition of each unit that all FMUs define alike."""
     found: dict[str, dict[str, str]] = {}
     unlike: set[str] = set()
-    for model in set(models):  # type: ignore[call-overload]
+    for model in models:
         for name, attributes in _units(model).items():
             if found.setdefault(name, attributes) != attributes:
                 unlike.add(name)
