@@ -3,7 +3,7 @@
 import math
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
@@ -308,13 +308,15 @@ def _connect(system: System) -> None:
             if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
                 raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
             taken[target.name] = source
-            system.connections.append(
-                Connection(
-                    source,
-                    target,
-                    conversion(source.variable, target.variable, ends, system.warnings),
-                )
-            )
+            system.connections.append(Connection(source, target, _way(system, source, target, ends)))
+    for name in system.scenario.transformations:
+        if name not in taken:
+            raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
+    _find_free_inputs(system, taken)
+
+
+def _find_free_inputs(system: System, taken: Collection[str]) -> None:
+    """Warn of inputs that nothing feeds and the scenario does not mention."""
     for name, model in system.models.items():
         free = [
             v.name
@@ -327,6 +329,16 @@ def _connect(system: System) -> None:
             system.warnings.append(
                 f"{name}: input {', '.join(free)} not connected; keeps its start value"
             )
+
+
+def _way(system: System, source: Signal, target: Signal, ends: str) -> Conversion:
+    """What becomes of a value between two ends."""
+    given = system.scenario.transformations.get(target.name)
+    if given is None:
+        return conversion(source.variable, target.variable, ends, system.warnings)
+    if target.variable.type != "Real":
+        raise InputError(f"{ends}: a transformation needs a Real, not {target.variable.type}")
+    return Conversion(given.factor, given.offset)
 
 
 def _kind(signal: Signal) -> str:
