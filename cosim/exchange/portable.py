@@ -151,8 +151,8 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
         model = system.models[name]
         values = tuple(pair for pair in system.parameters[name] if not _is_start(*pair))
         entry, beside = system.scenario.fmus[name], system.scenario.folder
-        own = PurePath(entry.path).name == entry.path and model.path != beside / entry.path
-        baked = own and all(v.causality == "parameter" for v, _ in values)
+        # The project's own are named, and lie where they were built.
+        baked = PurePath(entry.path).name == entry.path and model.path != beside / entry.path
         part = Part(name, model, f"{stem}.fmu", values, baked)
         if values and baked:
             _bake(part, folder)

@@ -18,7 +18,7 @@ RESOURCES = "resources"
 SPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "ssv": xml.SSV,
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
 }
 OSP_ANNOTATION = "com.opensimulationplatform"

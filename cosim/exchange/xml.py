@@ -7,7 +7,8 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 from ..fmu import Variable
 from ..scenario import Value
-from ..ssv import NAMESPACE
+
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 
 
 def parameter_set(
@@ -22,7 +23,7 @@ def parameter_set(
     """
     outer = Element("ssv:ParameterSet", version="1.0", name=name)
     if root:
-        outer.set("xmlns:ssv", NAMESPACE)
+        outer.set("xmlns:ssv", SSV)
     inner = SubElement(outer, "ssv:Parameters")
     for parameter, (variable, value) in values.items():
         entry = SubElement(inner, "ssv:Parameter", name=parameter)
