@@ -308,7 +308,7 @@ def _connect(system: System) -> None:
             if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
                 raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
             taken[target.name] = source
-            system.connections.append(Connection(source, target, _way(system, source, target, ends)))
+            system.connections.append(Connection(source, target, _link(source, target, ends, system)))
     for name in system.scenario.transformations:
         if name not in taken:
             raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
@@ -331,14 +331,14 @@ def _find_free_inputs(system: System, taken: Collection[str]) -> None:
             )
 
 
-def _way(system: System, source: Signal, target: Signal, ends: str) -> Conversion:
+def _link(source: Signal, target: Signal, ends: str, system: System) -> Conversion:
     """What becomes of a value between two ends."""
     given = system.scenario.transformations.get(target.name)
-    if given is None:
-        return conversion(source.variable, target.variable, ends, system.warnings)
-    if target.variable.type != "Real":
-        raise InputError(f"{ends}: a transformation needs a Real, not {target.variable.type}")
-    return Conversion(given.factor, given.offset)
+    if given is not None:
+        if target.variable.type != "Real":
+            raise InputError(f"{ends}: a transformation needs a Real, not {target.variable.type}")
+        return Conversion(given.factor, given.offset)
+    return conversion(source.variable, target.variable, ends, system.warnings)
 
 
 def _kind(signal: Signal) -> str:
