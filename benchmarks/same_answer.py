@@ -94,13 +94,13 @@ def run_libcosim(plan: Plan, path: str) -> np.ndarray:
 
 
 def run_ecos(plan: Plan) -> np.ndarray:
-    """Ecos."""
+    """Ecos, which applies a set of parameters if it is called by its name."""
     from ecospy.EcosSimulation import EcosSimulation
 
     names = [name.replace(".", "::") for name in plan["outputs"]]
     rows = []
     with EcosSimulation(ssp_path=plan["ssp"], step_size=plan["step"]) as simulation:
-        simulation.init()
+        simulation.init(parameter_set=plan.get("set"))
         for _ in range(plan["steps"]):
             simulation.step()
             rows.append([simulation.get_real(name) for name in names])
