@@ -2,9 +2,11 @@
 FMUs."""
 
 import logging
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from ..errors import InputError
 from ..system import System, newest_first
@@ -40,7 +42,7 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
     # Every link becomes a local variable that is called after the FMU; the plain names are for outputs.
     files = {part.name: f"link_{part.file}" for part in parts}
     try:
-        container = FMUContainer(fmu.stem, folder)
+        container = _quiet(FMUContainer)(re.sub(r"^(?=\d)|\W", "_", fmu.stem), folder)
         vars(container).update(start_time=0.0, stop_time=system.scenario.stop)
         # The order of stepping is that of initialisation as well, which simultaneous steps need too.
         order, _ = newest_first(system)
@@ -60,6 +62,20 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         )
     except FMUContainerError as error:
         raise InputError(f"the container cannot be made: {error.reason}") from None
+
+
+def _quiet(toolbox_container: Any) -> Any:
+    """The toolbox's class without what it claims of author and licence."""
+
+    class Container(toolbox_container):
+        def make_fmu_xml(self, xml_filename: Path, *arguments: Any, **options: Any) -> None:
+            super().make_fmu_xml(xml_filename, *arguments, **options)
+            tree = ElementTree.parse(xml_filename)
+            for claim in ("author", "license"):
+                tree.getroot().attrib.pop(claim, None)
+            tree.write(xml_filename, encoding="UTF-8", xml_declaration=True)
+
+    return Container
 
 
 def _add_face(container: Any, system: System, part: Part, file: str) -> None:
