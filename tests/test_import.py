@@ -86,6 +86,8 @@ def test_what_ssp_archives_may_hold(chain, tmp_path, edits, factor):
         ([('endConnector="u" />', 'endConnector="u"><ssc:BooleanMappingTransformation/></ssd:Connection>')],
          "BooleanMappingTransformation is not supported"),
         ([("</ssd:Elements>", "")], "cannot be read"),
+        ([("<ssd:SystemStructureDescription", '<!DOCTYPE x [<!ENTITY a "aaaa">]>\n<ssd:SystemStructureDescription')],
+         "document type, which is refused"),
     ],
 )  # fmt: skip
 def test_what_ssp_archives_may_not_hold(chain, tmp_path, edits, message):

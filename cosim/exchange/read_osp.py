@@ -178,7 +178,7 @@ class _Reader:
         described = f"{model.name}_OspModelDescription.xml"
         for file in (model.path.parent / described, self.folder / described):
             if file.is_file():
-                root = parse_any(file)
+                root = parse(file.read_bytes(), f"'{file}'", "OspModelDescription")
                 break
         else:
             raise InputError(f"'{self.file}': {simulator}.{name} needs '{described}'")
@@ -205,16 +205,6 @@ class _Reader:
             self.notes.append(f"with the events of '{files[0].name}'")
         found = {"events": events, "description": content.get("description", "")}
         return found | ({"stop": content["end"]} if "end" in content else {})
-
-
-def parse_any(file: Path) -> Element:
-    """A model description, of any version of OSP-IS."""
-    from xml.etree import ElementTree
-
-    try:
-        return ElementTree.fromstring(file.read_bytes())
-    except (OSError, ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"'{file}' cannot be read: {error}") from None
 
 
 def _inside(element: Element) -> Iterator[Element]:

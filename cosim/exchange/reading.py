@@ -59,13 +59,27 @@ def read_system(path: Path) -> Imported:
     return read_ssp(path) if path.suffix == ".ssp" else read_osp(path)
 
 
-def parse(text: bytes, where: str, tag: str, namespace: str) -> Element:
-    """The root of a document, which must be of this kind."""
+class _Builder(ElementTree.TreeBuilder):
+    """Refuses document types, with which a short file can become a long one."""
+
+    def doctype(self, *_: Any) -> None:
+        raise ValueError("it has a document type, which is refused")
+
+
+def parse(text: bytes, where: str, tag: str, namespace: str = "") -> Element:
+    """The root of a document, which must be of this kind.
+
+    Args:
+        text: the document.
+        where: what messages call it.
+        tag: of the root.
+        namespace: of the root; any if empty.
+    """
     try:
-        root = ElementTree.fromstring(text)
+        root = ElementTree.fromstring(text, ElementTree.XMLParser(target=_Builder()))
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise InputError(f"{where} cannot be read: {error}") from None
-    if root.tag != f"{{{namespace}}}{tag}":
+    if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
         raise InputError(f"{where} is no {tag} that this reader knows, but '{root.tag}'")
     return root
 
