@@ -127,6 +127,13 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["osp", "s.json"]
 
 
+def test_isolation_stays_behind(chain, tmp_path):
+    chain["fmus"]["gain"] = {"path": chain["fmus"]["gain"]["path"], "isolate": True}
+    with pytest.raises(InputError, match="the isolation of gain"):
+        write(chain, tmp_path / "s.ssp", export_ssp)
+    assert "left out: the isolation of gain" in write(chain, tmp_path / "s.ssp", export_ssp, drop=True)
+
+
 def test_nothing_is_left_after_a_failure(portable, tmp_path, monkeypatch):
     def fail(*arguments):
         raise OSError("disk full")

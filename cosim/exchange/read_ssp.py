@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from xml.etree.ElementTree import Element
 
+from ..archive import check_archive
 from ..errors import InputError, nearest
 from ..fmu import Model
 from .portable import file_stems
@@ -28,6 +29,7 @@ def read_ssp(path: Path) -> Imported:
     Raises:
         InputError: no SSP 1.0 archive, or it has something that this master cannot do.
     """
+    check_archive(path)
     try:
         with zipfile.ZipFile(path) as archive:
             return _Reader(path, archive).read()
