@@ -32,12 +32,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         overrides = [(path, read_parameters(path)) for path in options.parameters]
         system = prepare(load_scenario(options.scenario), overrides)
         try:
-            notes = _export(system, options)
+            with console.status("exporting"):
+                notes = _export(system, options)
         finally:
             system.close()
     except InputError as error:
         console.print(f"error: {error}", markup=False)
         return BAD_INPUT
+    for warning in system.warnings:
+        console.print(f"warning: {warning}", markup=False)
     for note in notes:
         console.print(f"note: {note}", markup=False)
     print(options.ssp or options.osp or options.fmu)
