@@ -146,7 +146,8 @@ def test_wrong_fault_is_refused_by_name(ellipse, fault, message):
 
 
 def test_example_of_the_contributing_guide_registers_itself():
-    text = (ROOT / "CONTRIBUTING.md").read_text().split("```python\n")[2].split("```")[0]
+    section = (ROOT / "CONTRIBUTING.md").read_text().split("## A new measurement fault")[1]
+    text = section.split("```python\n")[1].split("```")[0]
     exec(text, vars(faults) | {"__name__": "mine"})
     assert play(make("scale", factor=3.0), [(2.0,)]) == [(6.0,)]
     del faults.KINDS["scale"]
