@@ -27,12 +27,14 @@ class Fall(NamedTuple):
         out: fall of the model error when the run is left out.
         seen: when it is among those learned from; NaN if that was not tried.
         most: at which only the measurement's noise is left.
-        single: share of what is left that the commands of the single VSP would explain.
+        both, single: shares of what is left that the commands of the VSP would explain, by the sum of
+            the two and by each.
     """
 
     out: float
     seen: float
     most: float
+    both: float
     single: float
 
 
@@ -56,13 +58,19 @@ def reason(fall: Fall, target: float) -> str:
     if not isfinite(fall.seen):
         return "not known"
     if fall.seen >= target:
-        return f"what the others teach does not hold here: with this run among them {fall.seen:.2g}×"
+        text = f"what the others teach does not hold here: with this run among them {fall.seen:.2g}×"
+        return text + commanded(fall)
     text = f"not reached with this run among those learned from either ({fall.seen:.2g}×)"
-    if fall.single > CLEARLY:
-        text += (
-            f"; the commands of the single VSP would explain {100.0 * fall.single:.0f} % of the squares "
-            "that are left, and the model gives both VSP one law for each axis"
-        )
+    return text + commanded(fall)
+
+
+def commanded(fall: Fall) -> str:
+    """What the commands of the VSP say of what is left; empty: nothing."""
+    if fall.single < CLEARLY:
+        return ""
+    text = f"; {100.0 * fall.single:.0f} % of the squares that are left go with the commands of each VSP"
+    if fall.both < 0.5 * fall.single:
+        text += ", for which the model has one law together"
     return text
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Diagnosed, Model, outcome
 from diagnosis.evidence import Evidence
+from diagnosis.measurement import propellers
 from diagnosis.model import delayed
 from diagnosis.results import Diagnosis
 from diagnosis.steps import Advance
@@ -104,34 +106,46 @@ def at_full_power(w: Integrals) -> np.ndarray:
     return np.sqrt(np.mean(omega(blind, Model()) ** 2, axis=0))
 
 
-def single_commands(e: Evidence, model: Model) -> np.ndarray:
-    """How much of what is left the commands of the single VSP would explain (3,), 0 to 1.
+class Commanded(NamedTuple):
+    """Shares (3,) of what is left, 0 to 1, that the commands of the VSP would explain on each axis.
 
-    The thrusters' model gives both VSP the same force law on the axis of the command. Here each axis is
-    fitted with the four commands, straight and by their size, and judged on blocks that were not
-    fitted; where even that is no better than nothing, the share is 0.
+    Attributes:
+        both: the sums of the two VSP's commands, as in a model with one law for both.
+        single: the commands of each.
+    """
+
+    both: np.ndarray
+    single: np.ndarray
+
+
+def commanded(e: Evidence, model: Model) -> Commanded:
+    """How much of what is left goes with the commands of the VSP, in any direction of the force.
+
+    Fitted are commands and their sizes, delayed as in the model, and judged on blocks that were not
+    fitted; where that is no better than nothing, the share is 0.
 
     Args:
         e: the run.
-        model: the learned one, for its delay.
+        model: the learned one.
     """
     w = e.integrals
     if w.run.five is None:
-        return np.zeros(3)
+        return Commanded(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
     late, _ = model.drive.dynamics
-    pairs = w.run.five[:, :2], w.run.five[:, 2:4]
-    four = np.hstack([_late(w, pair, late) for pair in pairs])
-    columns = w.held @ (power * np.hstack([four, np.abs(four)]))
+    one, other = np.moveaxis(propellers(w.run.five), 1, 0)
+    first, second = (delayed(w.run.time, part, late)[:, :2] for part in (one, other))
+    two, four = first + second, np.hstack([first, second])
+    return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
+
+
+def _explained(w: Integrals, left: np.ndarray, commands: np.ndarray) -> np.ndarray:
+    """Cross-validated share (3,) of the squares of ``left`` (K, 3)."""
+    columns = w.held @ np.hstack([commands, np.abs(commands)])
     fold = np.unique(w.block // TOGETHER, return_inverse=True)[1]
-    left, missed = e.after.omega, np.zeros(3)
+    missed = np.zeros(3)
     for k in range(fold.max() + 1):
         out = fold == k
         fitted = np.linalg.lstsq(columns[~out], left[~out], rcond=None)[0]
         missed += np.sum((left[out] - columns[out] @ fitted) ** 2, axis=0)
     return np.clip(1.0 - missed / np.sum(left**2, axis=0), 0.0, 1.0)
-
-
-def _late(w: Integrals, pair: np.ndarray, delay: float) -> np.ndarray:
-    """Two commands (n, 2) of ``delay`` [s] ago."""
-    return delayed(w.run.time, np.hstack([pair, np.zeros((len(pair), 1))]), delay)[:, :2]

@@ -56,13 +56,13 @@ def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
         report = Report(out, "The real ship")
     except OSError as error:
         raise cosim.InputError(f"cannot write to '{out}': {error.strerror}") from None
-    thrusters = min(prior, MEASURED)
+    damping, thrusters = 100.0 * prior, 100.0 * min(prior, MEASURED)
     names = ", ".join(w.run.name for w in runs)
     report.text(
         f"NTNU's measured runs of CyberShip Enterprise 1: {names}. Each is left out in turn; what the "
         "model lacks is learned from the others, as by "
         f"`python -m diagnosis.learn --prior {prior:g}`: coefficients of the damping, borrowed from "
-        f"another ship, are believed to {100.0 * prior:.0f} %, masses and thrusters to {100.0 * thrusters:.0f} %."
+        f"another ship, are believed to {damping:.0f} %, masses and thrusters to {thrusters:.0f} %."
     )
     ship_tables.write_falls(report, folds)
     ship_tables.write_windows(report, folds)

@@ -12,7 +12,7 @@ from diagnosis.results import Diagnosis, EffectResult
 
 from . import bollard
 from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, reason, wanted
-from .leave_one_out import Fold, at_full_power, single_commands, steered
+from .leave_one_out import Fold, at_full_power, commanded, steered
 from .report import Report
 
 UNITS = ("N", "N", "N m")
@@ -26,8 +26,7 @@ def kind(fold: Fold) -> str:
 def falls(fold: Fold) -> list[Fall]:
     """The fall of each axis, and what bounds it."""
     seen = np.full(3, np.nan) if fold.seen is None else fold.seen
-    single = single_commands(fold.evidence, fold.model)
-    columns = zip(fold.fall, seen, fold.ceiling, single, strict=True)
+    columns = zip(fold.fall, seen, fold.ceiling, *commanded(fold.evidence, fold.model), strict=True)
     return [Fall(*map(float, row)) for row in columns]
 
 
@@ -37,8 +36,8 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
     report.text(
         "RMS of the force that the model lacks, in windows of 3 s with the thrusters at work. Before: "
         "the nominal model with the power settings that the run logged; in brackets as if they were not "
-        "known. After: with what was learned from the other runs. The last columns: the fall if this "
-        "run is among those learned from, and the fall at which only the measurement's noise is left."
+        "known. After: with what was learned from the other runs. The last column: the fall if this run "
+        "is among those learned from."
     )
     rows, results = [], {}
     for f in folds:
@@ -49,8 +48,8 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
             target = wanted(axis, kind(f))
             said = "–" if target is None else f"{target:g}×: {'' if x.out >= target else 'not '}reached"
             changes = f"{before:.3g} ({blind[k]:.3g})", f"{after:.3g}", f"{x.out:.2f}×"
-            ends = _times(x.seen), _times(x.most)
-            rows.append([f"{f.name}, {kind(f)}", f"{axis} [{UNITS[k]}]", *changes, said, *ends])
+            name = f"{f.name}, {kind(f)}"
+            rows.append([name, f"{axis} [{UNITS[k]}]", *changes, said, _times(x.seen)])
             results[f.name]["axes"][axis] = {
                 "before": before,
                 "before_without_power": float(blind[k]),
@@ -58,8 +57,10 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
                 "target": target,
                 **x._asdict(),
             }
-    header = ["run left out", "axis", "before", "after", "fall", "target", "learned from it", "noise"]
+    header = ["run left out", "axis", "before", "after", "fall", "target", "learned from it"]
     report.table(header, rows)
+    least = min(x.most for f in folds for x in falls(f))
+    report.text(f"Noise of the measurement is not what is left: it would allow {least:.0f}× or more.")
     missed = [
         f"{f.name}, {axis} ({x.out:.2f}× of {target:g}×): {reason(x, target)}."
         for f in folds
