@@ -61,6 +61,14 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
     report.table(header, rows)
     least = min(x.most for f in folds for x in falls(f))
     report.text(f"Noise of the measurement is not what is left: it would allow {least:.0f}× or more.")
+    worse = [
+        f"{axis} of {f.name}"
+        for f in folds
+        for axis, x in zip(AXES, falls(f), strict=True)
+        if x.out < 1.0
+    ]
+    if worse:
+        report.text(f"The learned model is worse than the nominal one in {', '.join(worse)}.")
     missed = [
         f"{f.name}, {axis} ({x.out:.2f}× of {target:g}×): {reason(x, target)}."
         for f in folds
@@ -93,6 +101,14 @@ def write_windows(report: Report, folds: Sequence[Fold]) -> None:
 
     header = ["run left out", "position [mm]: before", "after", "heading [°]: before", "after"]
     report.table(header, [row(f.evidence) for f in folds])
+    seen = [(f.name, f.evidence.before, f.evidence.after) for f in folds]
+    farther = [name for name, before, after in seen if after.position > before.position]
+    askew = [name for name, before, after in seen if after.heading > before.heading]
+    for what, names in (("position", farther), ("heading", askew)):
+        if names:
+            report.text(
+                f"The {what} is predicted worse than by the nominal model in {', '.join(names)}."
+            )
     away = [f.name for f in folds if np.isinf(f.evidence.after.position)]
     if away:
         report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
