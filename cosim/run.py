@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print(text, markup=False)
 
     try:
-        scenario = load_scenario(options.scenario)
+        scenario = load_scenario(options.scenario, {"step": options.step, "stop": options.stop})
         bar = (
             nullcontext()
             if options.quiet or not console.is_terminal
@@ -125,10 +125,17 @@ def _parser() -> argparse.ArgumentParser:
         "           python -m cosim.run scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters model.ssv\n"
         "           python -m cosim.run theirs.json --no-native\n"
+        "           python -m cosim.run system.ssp --stop 100\n"
         "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        help="JSON file; or an SSP archive, an OSP directory or its OspSystemStructure.xml",
+    )
+    parser.add_argument("--stop", type=_positive, metavar="SECONDS", help="another end")
+    parser.add_argument("--step", type=_positive, metavar="SECONDS", help="another base step")
     parser.add_argument("--out", type=_folder, metavar="DIR", help="result folder (results/<name>)")
     parser.add_argument(
         "--parameters",

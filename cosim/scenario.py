@@ -1,6 +1,7 @@
 """The scenario file: what it may hold, and messages for what it may not."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
@@ -19,6 +20,7 @@ from pydantic import (
 
 from . import faults
 from .errors import InputError, nearest
+from .exchange.reading import is_system, read_system
 
 if TYPE_CHECKING:
     AnyFault = faults.Fault
@@ -110,6 +112,13 @@ class LogOptions(Strict):
     format: Literal["csv", "parquet"] = "csv"
 
 
+class Transformation(Strict):
+    """What becomes of a value on its way: factor * value + offset."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+
 class MetricsOptions(Strict):
     """The part of the run that the metrics cover."""
 
@@ -143,31 +152,56 @@ class Scenario(Strict):
         description="[output, input] as instance.variable; a * on both sides connects all variables "
         "whose names agree there",
     )
+    transformations: dict[str, Transformation] = Field(
+        default_factory=dict,
+        description="connected input -> what becomes of values on their way there, in place of a "
+        "conversion of units",
+    )
     faults: list[AnyFault] = Field(default_factory=list)
     events: list[Event] = Field(default_factory=list)
     log: LogOptions = Field(default_factory=lambda: LogOptions.model_validate({}))
     metrics: MetricsOptions = Field(default_factory=lambda: MetricsOptions.model_validate({}))
 
     _folder: Path = PrivateAttr(default_factory=Path.cwd)
+    _notes: list[str] = PrivateAttr(default_factory=list)
+    _unpacked: Any = PrivateAttr(None)
 
     @property
     def folder(self) -> Path:
         """What paths in the scenario are relative to."""
         return self._folder
 
+    @property
+    def notes(self) -> list[str]:
+        """What was assumed or left out when it was read from the format of another tool."""
+        return self._notes
 
-def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
-    """A scenario from a JSON file or from the same content as a dict.
+
+def load_scenario(
+    source: str | Path | dict[str, Any], changes: Mapping[str, Any] | None = None
+) -> Scenario:
+    """A scenario from a JSON file or from the same content as a dict, or a system of other tools.
 
     Args:
-        source: path of the file; a dict is read as if it lay in the working directory.
+        source: path of the file; a dict is read as if it lay in the working directory. An SSP archive,
+            an OSP directory or its OspSystemStructure.xml is a scenario as well.
+        changes: keys that beat those of the file; None does not count.
 
     Raises:
         InputError: missing file, no JSON, unknown key, wrong type or value; names the place.
     """
+    chosen = {key: value for key, value in (changes or {}).items() if value is not None}
     if isinstance(source, dict):
-        return _validate(source, "scenario", Path.cwd())
+        return _validate(source | chosen, "scenario", Path.cwd())
     path = Path(source)
+    if is_system(path):
+        system = read_system(path)
+        for key in ("step", "stop"):
+            if key not in system.content | chosen:
+                raise InputError(f"'{path}' does not say its {key}; give it by --{key} SECONDS")
+        scenario = _validate(system.content | chosen, f"'{path}'", system.folder)
+        scenario._notes, scenario._unpacked = system.notes, system.unpacked
+        return scenario
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
         json.dumps(content, ensure_ascii=False).encode()
@@ -180,6 +214,8 @@ def load_scenario(source: str | Path | dict[str, Any]) -> Scenario:
         raise InputError(f"'{path}' is not JSON: {error}") from None
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"'{path}' cannot be read: {error}") from None
+    if isinstance(content, dict):
+        content |= chosen
     return _validate(content, f"'{path}'", path.parent)
 
 
@@ -237,6 +273,7 @@ def _keys(location: tuple[int | str, ...]) -> list[str]:
         "events": Event,
         "log": LogOptions,
         "metrics": MetricsOptions,
+        "transformations": Transformation,
         "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),
     }
     fields = classes.get(first, Scenario).model_fields

@@ -214,6 +214,8 @@ def simulate(
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
     system = prepare(scenario, overrides, native)
     try:
+        for note in scenario.notes:
+            show(f"note: {note}")
         for warning in system.warnings:
             show(f"warning: {warning}")
         if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
@@ -374,6 +376,7 @@ def _describe(system: System) -> dict[str, Any]:
         "scenario": resolved,
         "seed": system.scenario.seed,
         "versions": {name: importlib.metadata.version(name) for name in ("cybership", "fmpy", "numpy")},
+        "notes": system.scenario.notes,
         "warnings": system.warnings,
     }
 

@@ -3,7 +3,7 @@
 import math
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
@@ -123,17 +123,22 @@ def prepare(scenario: Scenario, overrides: Overrides = (), native: bool = True) 
     _check_faults(system)
     _check_events(system)
     _choose_signals(system)
-    links = [
-        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
-        for c in system.connections
-    ]
     if scenario.algorithm == "gauss_seidel":
-        feedthrough = {name: model.feedthrough for name, model in system.models.items()}
-        system.order, late = execution_order(list(system.models), links, feedthrough)
+        system.order, late = newest_first(system)
         system.warnings += late
     else:
         system.order = list(system.models)
     return system
+
+
+def newest_first(system: System) -> tuple[list[str], list[str]]:
+    """The order of instances in which values travel farthest at one instant, and where that ends."""
+    links = [
+        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
+        for c in system.connections
+    ]
+    feedthrough = {name: model.feedthrough for name, model in system.models.items()}
+    return execution_order(list(system.models), links, feedthrough)
 
 
 def _read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
@@ -355,6 +360,14 @@ def _connect(system: System) -> None:
                 raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
             taken[target.name] = source
             system.connections.append(Connection(source, target, _link(source, target, ends, system)))
+    for name in system.scenario.transformations:
+        if name not in taken:
+            raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
+    _find_free_inputs(system, taken)
+
+
+def _find_free_inputs(system: System, taken: Collection[str]) -> None:
+    """Warn of inputs that nothing feeds and the scenario does not mention."""
     for name, model in system.models.items():
         free = [
             v.name
@@ -370,7 +383,12 @@ def _connect(system: System) -> None:
 
 
 def _link(source: Signal, target: Signal, ends: str, system: System) -> Conversion:
-    """The conversion of units between two ends; a warning where they cannot be compared."""
+    """What becomes of a value between two ends: a warning where units cannot be compared."""
+    given = system.scenario.transformations.get(target.name)
+    if given is not None:
+        if target.variable.type != "Real":
+            raise InputError(f"{ends}: a transformation needs a Real, not {target.variable.type}")
+        return Conversion(given.factor, given.offset)
     a, b = source.variable.unit, target.variable.unit
     how = conversion(a, b, ends)
     if how is None and a is not None and b is not None:

@@ -19,7 +19,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "yaw by drift": ("N_v", "N_|v|v", "N_|r|v", "N_|v|r"),
     "yaw at speed": ("N_ur", "N_uv"),
     "inertia": ("mass", "added_mass_X", "added_mass_Y", "added_mass_N"),
-    "propellers": ("loss_vsp", "loss_surge", "thrust_curve", "curve_vsp_x(c)"),
+    "propellers": ("loss_vsp", "loss_surge", "thrust_curve", "curve_vsp_x(c)", "curve_vsp_y(c)"),
     "side thrust": ("loss_sway", "loss_yaw", "attack_point"),
     "bow thruster": ("loss_bow", "bow_speed_loss", "curve_bow(|u|)", "bow_failure"),
     "small or large commands": ("deadband", "saturation"),

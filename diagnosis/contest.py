@@ -56,10 +56,8 @@ def candidates(p: Problem, at: Point, known: Set[str]) -> Step:
     base = evaluate(p.data, model)
     found = [c for c in library(p.data, model, base) if c.effect.id not in known]
     doubt = doubts(p, at, base)
-    sigma = p.sigma
-    if sigma is None:
-        straight = [s.columns for c in found for s in c.shapes[:1]]
-        sigma = noise(base, np.concatenate([*straight, doubt.columns], axis=2), FLOOR)
+    straight = [s.columns for c in found for s in c.shapes[:1]]
+    sigma = noise(base, np.concatenate([*straight, doubt.columns], axis=2), FLOOR)
     return weighed(p, sigma, base, doubt, found)
 
 
@@ -115,7 +113,7 @@ def contend(p: Problem, at: Point, step: Step) -> Contest:
     return Contest([e.id for e in effects], starts, refined, t, judged)
 
 
-def settle(p: Problem, at: Point, step: Step, least: np.ndarray) -> tuple[Problem, Step, Contest]:
+def settle(p: Problem, at: Point, step: Step) -> tuple[Problem, Step, Contest]:
     """A contest in which an error counts by what even the best of all leaves over.
 
     Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
@@ -123,9 +121,9 @@ def settle(p: Problem, at: Point, step: Step, least: np.ndarray) -> tuple[Proble
 
     Args:
         p, at, step: all candidates beside a model.
-        least: (3,), noise that is there in any case [N, N, N m].
     """
-    p = replace(p, sigma=step.wide.sigma)
+    least = step.wide.sigma
+    p = replace(p, sigma=least)
     contest = contend(p, at, step)
     for _ in range(WEIGHINGS):
         left = contest.refined[contest.judged[0].candidate].left

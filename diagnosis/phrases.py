@@ -86,11 +86,21 @@ def _(t: Told) -> str:
 
 @says("curve_vsp_x(c)")
 def _(t: Told) -> str:
+    return _pushes(t, "X")
+
+
+@says("curve_vsp_y(c)")
+def _(t: Told) -> str:
+    return _pushes(t, "Y")
+
+
+def _pushes(t: Told, axis: str) -> str:
     place, value = _peak(t)
     at = (2.0 * place - 1.0) * _reach(t)
+    way = {"X": "push", "Y": "push aside"}[axis]
     return (
-        "The propellers push by another curve over their command than the model's: "
-        f"{towards(value, 'N', 'X')} is missing at command {at:.2g}."
+        f"The propellers {way} by another curve over their command than the model's: "
+        f"{towards(value, 'N', axis)} is missing at command {at:.2g}."
     )
 
 

@@ -116,7 +116,7 @@ def learn(
     findings: list[Finding] = []
     while len(findings) < MOST:
         advance(f"effect {len(findings) + 1}: the best candidates where they fit best")
-        p, step, contest = settle(p, at, step, first.wide.sigma)
+        p, step, contest = settle(p, at, step)
         total = float(np.sum((first.base * p.weight) ** 2))
         ranking = ranking or ranked(step, contest)
         if not accepted(step.nothing, contest.judged[0], total):

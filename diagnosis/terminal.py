@@ -39,8 +39,11 @@ def show_diagnosis(r: Diagnosis, out: str) -> Iterator[RenderableType]:
         ]
         yield from _lines("Suspect coefficients", suspects)
     if r.effects:
-        best = ", ".join(f"{c.id} {_percent(c.q2, 1)}" for c in r.ranking[:BEST])
-        yield from _lines("Best candidates, share of the model error explained", [best])
+        first, *others = r.ranking[:BEST]
+        behind = [f"{c.id} +{(c.score or 0.0) - (first.score or 0.0):.3g}" for c in others]
+        yield from _lines(
+            "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
+        )
     yield from _errors(r.errors, learned=bool(r.effects))
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)

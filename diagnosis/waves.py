@@ -6,7 +6,7 @@ form let hardly any of them through.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,10 +17,11 @@ from fmus.frames import rotate_to_body
 from fmus.hull import mass_matrix
 
 from .model import Model, acceleration, by_mass, thrust
-from .smoothing import Smoothed
+from .smoothing import Smoothed, smooth
 
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for
 PEAK = 5.0  # times the spectrum around it
+FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, of the spectrum around
 SEGMENT = 25.0  # s
 NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
@@ -62,21 +63,23 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
         model: what it leaves over is looked at.
         rng: for the bootstrap.
     """
-    parts = [part for run in runs for part in stretches(model_error(run, model), run.time)]
-    if not parts:
+    left, noise = [], []
+    for run in runs:
+        error = model_error(run, model)
+        left += stretches(error, run.time)
+        noise += stretches(model_error(resmoothed(run, rng), model) - error, run.time)
+    if not left or not noise:
         return None
-    length = round(SEGMENT * RATE)
-    frequency, _, _ = spectrogram(parts[0], RATE, nperseg=length, axis=0)
-    segments = np.concatenate(
-        [spectrogram(x, RATE, nperseg=length, axis=0, detrend="linear")[2] for x in parts], axis=-1
-    )
+    frequency, segments = segments_of(left)
+    floor = segments_of(noise)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
-    level, found = peak(frequency, power)
-    if found.height < PEAK:
-        return None
+    level, found = peak(frequency, power, floor)
     count = segments.shape[-1]
+    least = PEAK + FEW / count
+    if found.height < least:
+        return None
     draws = rng.integers(0, count, (REPLICATES, count))
-    heights = [peak(frequency, segments[..., d].mean(axis=-1))[1].height for d in draws]
+    heights = [peak(frequency, segments[..., d].mean(axis=-1), floor)[1].height for d in draws]
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < NEAR * at
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
@@ -84,14 +87,36 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        float(np.mean(np.array(heights) >= PEAK)),
+        float(np.mean(np.array(heights) >= least)),
     )
 
 
-def peak(frequency: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, Peak]:
-    """The spectrum around each frequency (m, 3), and the highest peak above it in the waves' band."""
+def resmoothed(run: Smoothed, rng: np.random.Generator) -> Smoothed:
+    """The run as it was smoothed, with other noise of the same strength: what the noise alone makes."""
+    track = run.track
+    pose = run.eta + run.noise * rng.standard_normal(run.eta.shape)
+    used = run.used[:, None]
+    return smooth(replace(track, pose=np.where(used, pose, track.pose)))
+
+
+def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments)."""
+    length = round(SEGMENT * RATE)
+    found = [spectrogram(x, RATE, nperseg=length, axis=0, detrend="linear") for x in parts]
+    return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
+
+
+def peak(frequency: np.ndarray, power: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, Peak]:
+    """The spectrum around each frequency (m, 3), and the highest peak above it in the waves' band.
+
+    Args:
+        frequency: (m,) [Hz].
+        power: (m, 3), spectrum.
+        floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
+    """
     width = 2 * int(AROUND / frequency[1] / 2.0) + 1
-    level = median_filter(power, size=(width, 1), mode="nearest")
+    floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
+    level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
     height = np.where(inside[:, None], power / np.maximum(level, 1e-12), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)

@@ -12,23 +12,23 @@ class Measurement(NamedTuple):
 
     x_m: Annotated[float, "m", "measured north position"] = 0.0
     y_m: Annotated[float, "m", "measured east position"] = 0.0
-    psi_m: Annotated[float, "rad", "measured heading"] = 0.0
+    psi_m: Annotated[float, "rad", "measured heading, from north towards east"] = 0.0
 
 
 class Force(NamedTuple):
     """A body-fixed force in surge and sway and a yaw moment, tau."""
 
-    tau_X: Annotated[float, "N", "surge force"] = 0.0
-    tau_Y: Annotated[float, "N", "sway force"] = 0.0
-    tau_N: Annotated[float, "N.m", "yaw moment"] = 0.0
+    tau_X: Annotated[float, "N", "surge force, forward"] = 0.0
+    tau_Y: Annotated[float, "N", "sway force, to starboard"] = 0.0
+    tau_N: Annotated[float, "N.m", "yaw moment, bow to starboard"] = 0.0
 
 
 class Velocity(NamedTuple):
     """Body-fixed velocity through the water, nu."""
 
-    u: Annotated[float, "m/s", "surge velocity"] = 0.0
-    v: Annotated[float, "m/s", "sway velocity"] = 0.0
-    r: Annotated[float, "rad/s", "yaw rate"] = 0.0
+    u: Annotated[float, "m/s", "surge velocity, forward"] = 0.0
+    v: Annotated[float, "m/s", "sway velocity, to starboard"] = 0.0
+    r: Annotated[float, "rad/s", "yaw rate, bow to starboard"] = 0.0
 
 
 class Estimate(NamedTuple):

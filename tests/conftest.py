@@ -98,3 +98,38 @@ self.y = 0.0
 self.register_variable(Real("x", causality=Fmi2Causality.input))
 self.register_variable(Real("y", causality=Fmi2Causality.output))
 """
+
+
+@pytest.fixture
+def portable(ellipse):
+    """The ellipse scenario without what cannot travel."""
+    return ellipse | {"faults": [], "algorithm": "jacobi", "stop": 0.5}
+
+
+@pytest.fixture
+def own(portable):
+    """The same with parameters of its own."""
+    portable["fmus"]["vessel"]["parameters"] |= {"x_0": 4.5, "delta_X_u": -3.0}
+    return portable
+
+
+@pytest.fixture
+def chain(plain_fmu, tmp_path):
+    """Two foreign FMUs: a ramp, and a gain with a parameter that only it knows."""
+    plain_fmu("Ramp", "self.y = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))",
+              "self.y += h\nreturn True")  # fmt: skip
+    plain_fmu(
+        "Gain",
+        "self.u = 0.0\nself.y = 0.0\nself.k = 1.0\n"
+        "self.register_variable(Real('u', causality=Fmi2Causality.input))\n"
+        "self.register_variable(Real('y', causality=Fmi2Causality.output))\n"
+        "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
+        " variability=Fmi2Variability.tunable))",
+        "self.y = self.k * self.u\nreturn True",
+    )
+    return {
+        "name": "chain", "step": 0.25, "stop": 1.0, "algorithm": "jacobi",
+        "fmus": {"ramp": {"path": str(tmp_path / "Ramp.fmu")},
+                 "gain": {"path": str(tmp_path / "Gain.fmu"), "parameters": {"k": 3.0}}},
+        "connections": [["ramp.y", "gain.u"]],
+    }  # fmt: skip

@@ -248,6 +248,7 @@ def test_error_by_region_adds_up(evidence):
 SHAPES = {
     "curve_X(u)": {"curve_X_u_4": 0.2},
     "curve_vsp_x(c)": {"curve_vsp_x_c_11": -0.1},
+    "curve_vsp_y(c)": {"curve_vsp_y_c_11": -0.1},
     "curve_bow(|u|)": {"curve_bow_u_1": -0.5},
     "bow_speed_loss": {"bow_speed_loss": 2.0},
     "deadband": {"deadband": 0.05},

@@ -160,6 +160,7 @@ def form(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scal
 REACH: dict[str, tuple[Callable[[Motion], np.ndarray], bool]] = {
     "curve_X(u)": (lambda m: m.nu[:, 0], True),
     "curve_vsp_x(c)": (lambda m: m.asked[:, 0], True),
+    "curve_vsp_y(c)": (lambda m: m.asked[:, 1], True),
     "curve_bow(|u|)": (lambda m: np.abs(m.nu[:, 0]), False),
 }
 

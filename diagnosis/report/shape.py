@@ -63,6 +63,10 @@ def surge_command(e: Evidence) -> np.ndarray:
     return np.concatenate([each[:, 0] for each, _ in shares(e.integrals.run, Model())])
 
 
+def sway_command(e: Evidence) -> np.ndarray:
+    return np.concatenate([each[:, 1] for each, _ in shares(e.integrals.run, Model())])
+
+
 def vsp_force(e: Evidence) -> np.ndarray:
     return FULL.plant_F_vsp * surge_command(e)
 
@@ -79,6 +83,10 @@ def vsp(c: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
     return effect(Thrust(vsp_x=FULL.plant_F_vsp * c), Running(u_vsp_x=c)).vsp_x
 
 
+def vsp_aside(c: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
+    return effect(Thrust(vsp_y=FULL.plant_F_vsp * c), Running(u_vsp_y=c)).vsp_y
+
+
 def one_vsp(f: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
     return effect(Thrust(vsp_x=f), Running()).vsp_x
 
@@ -93,6 +101,7 @@ def bow_share(u: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
 
 _HULL = Sweep("surge speed u [m/s]", "damping in surge [N]", (-0.6, 0.6), hull, surge_speed)
 _VSP = Sweep("VSP command in surge [1]", "VSP surge force [N]", (-1.0, 1.0), vsp, surge_command)
+_ASIDE = Sweep("VSP command in sway [1]", "VSP sway force [N]", (-1.0, 1.0), vsp_aside, sway_command)
 _BOW = Sweep(
     "surge speed |u| [m/s]",
     "bow effectiveness [1]",
@@ -117,6 +126,7 @@ _BOW_FORCE = Sweep(
 SWEEPS: dict[str, tuple[Sweep, ...]] = {
     "curve_X(u)": (_HULL,),
     "curve_vsp_x(c)": (_VSP,),
+    "curve_vsp_y(c)": (_ASIDE,),
     "thrust_curve": (_VSP,),
     "curve_bow(|u|)": (_BOW,),
     "bow_speed_loss": (_BOW,),

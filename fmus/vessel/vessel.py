@@ -76,7 +76,7 @@ State = Ship
 class Pose(NamedTuple):
     x: Annotated[float, "m", "north position"] = 0.0
     y: Annotated[float, "m", "east position"] = 0.0
-    psi: Annotated[float, "rad", "heading, continuous over turns"] = 0.0
+    psi: Annotated[float, "rad", "heading, from north towards east, continuous over turns"] = 0.0
 
 
 class Outputs(NamedTuple):

@@ -1,0 +1,92 @@
+"""A system as one FMU, by the container of fmu-manipulation-toolbox: a small FMI master in C around the
+FMUs."""
+
+import logging
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from ..errors import InputError
+from ..system import System, newest_first
+from . import xml
+from .portable import Part
+
+
+def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Path) -> None:
+    """Write the container; it keeps the order of stepping.
+
+    All outputs are outputs of the container, called ``instance.variable``; so are inputs that nothing
+    feeds.
+
+    Args:
+        system: checked system.
+        parts: its instances; their FMUs are in the folder.
+        folder: where the FMUs are; also used for scratch.
+        fmu: the file to write.
+
+    Raises:
+        InputError: the toolbox is not installed, or cannot make the container.
+    """
+    try:
+        from fmu_manipulation_toolbox.container import FMUContainer
+        from fmu_manipulation_toolbox.container.errors import FMUContainerError
+    except ModuleNotFoundError:
+        raise InputError(
+            "a container FMU needs fmu-manipulation-toolbox: pip install 'cybership[export]'"
+        ) from None
+    # It tells of every output that goes nowhere; what it cannot do, it raises.
+    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.ERROR)
+    by_name = {part.name: part for part in parts}
+    # Every link becomes a local variable that is called after the FMU; the plain names are for outputs.
+    files = {part.name: f"link_{part.file}" for part in parts}
+    try:
+        container = _quiet(FMUContainer)(re.sub(r"^(?=\d)|\W", "_", fmu.stem), folder)
+        vars(container).update(start_time=0.0, stop_time=system.scenario.stop)
+        # The order of stepping is that of initialisation as well, which simultaneous steps need too.
+        order, _ = newest_first(system)
+        for name in order:
+            container.get_fmu(by_name[name].file, files[name])
+        for c in system.connections:
+            container.add_link(
+                files[c.source.instance],
+                c.source.variable.name,
+                files[c.target.instance],
+                c.target.variable.name,
+            )
+        for name in order:
+            _add_face(container, system, by_name[name], files[name])
+        container.make_fmu(
+            fmu, system.scenario.step, sequential=system.scenario.algorithm == "gauss_seidel"
+        )
+    except FMUContainerError as error:
+        raise InputError(f"the container cannot be made: {error.reason}") from None
+
+
+def _quiet(toolbox_container: Any) -> Any:
+    """The toolbox's class without what it claims of author and licence."""
+
+    class Container(toolbox_container):
+        def make_fmu_xml(self, xml_filename: Path, *arguments: Any, **options: Any) -> None:
+            super().make_fmu_xml(xml_filename, *arguments, **options)
+            tree = ElementTree.parse(xml_filename)
+            for claim in ("author", "license"):
+                tree.getroot().attrib.pop(claim, None)
+            tree.write(xml_filename, encoding="UTF-8", xml_declaration=True)
+
+    return Container
+
+
+def _add_face(container: Any, system: System, part: Part, file: str) -> None:
+    """Ports of the container, and start values."""
+    fed = {c.target.name for c in system.connections}
+    given = {v.name for v, _ in system.parameters[part.name]}
+    for v in part.model.variables.values():
+        name = f"{part.name}.{v.name}"
+        if v.causality == "output":
+            container.add_output(file, v.name, name)
+        elif v.causality == "input" and name not in fed and v.name not in given:
+            container.add_input(name, file, v.name)
+    for v, value in part.values:
+        container.add_start_value(file, v.name, xml.text(v, value))

@@ -1,0 +1,97 @@
+"""A system as a directory of the Open Simulation Platform: libcosim, cosim-cli, the demo app."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement
+
+from ..system import System
+from . import xml
+from .groups import osp_model_description
+from .portable import Part, converts
+
+STRUCTURE = "OspSystemStructure.xml"
+# The demo app offers what it finds there.
+SCENARIOS = "scenarios"
+NAMESPACE = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
+
+
+def write_osp(system: System, parts: Sequence[Part], folder: Path) -> None:
+    """Write structure, scenario and model descriptions beside the FMUs.
+
+    Args:
+        system: checked system.
+        parts: its instances; their FMUs are in the folder.
+        folder: receives the files.
+    """
+    xml.write(_structure(system, parts), folder / STRUCTURE)
+    for part in parts:
+        described = osp_model_description(part.model)
+        if described is not None:
+            xml.write(described, folder / f"{part.model.name}_OspModelDescription.xml")
+    (folder / SCENARIOS).mkdir()
+    path = folder / SCENARIOS / f"{system.scenario.name}.json"
+    path.write_text(json.dumps(_scenario(system), indent=2) + "\n")
+
+
+def _structure(system: System, parts: Sequence[Part]) -> Element:
+    """OspSystemStructure.xml. The end of the run has no place in it that every version knows."""
+    root = Element("OspSystemStructure", xmlns=NAMESPACE, version="0.1")
+    SubElement(root, "StartTime").text = "0.0"
+    SubElement(root, "BaseStepSize").text = repr(system.scenario.step)
+    SubElement(root, "Algorithm").text = "fixedStep"
+    simulators = SubElement(root, "Simulators")
+    for part in parts:
+        simulator = SubElement(simulators, "Simulator", name=part.name, source=part.file)
+        if system.every[part.name] > 1:
+            simulator.set("stepSize", repr(system.every[part.name] * system.scenario.step))
+        if part.values:
+            initial = SubElement(simulator, "InitialValues")
+            for v, value in part.values:
+                entry = SubElement(initial, "InitialValue", variable=v.name)
+                SubElement(entry, xml.kind(v), value=xml.text(v, value))
+    if any(converts(c) for c in system.connections):
+        functions = SubElement(root, "Functions")
+        for k, c in enumerate(system.connections):
+            if converts(c):
+                SubElement(
+                    functions,
+                    "LinearTransformation",
+                    name=f"conversion_{k}",
+                    factor=repr(c.conversion.factor),
+                    offset=repr(c.conversion.offset),
+                )
+    if system.connections:
+        root.append(_connections(system))
+    return root
+
+
+def _connections(system: System) -> Element:
+    listed = Element("Connections")
+    for c in system.connections:
+        if not converts(c):
+            wire = SubElement(listed, "VariableConnection")
+            for end in (c.source, c.target):
+                SubElement(wire, "Variable", simulator=end.instance, name=end.variable.name)
+    # Older schemas want plain connections first.
+    for k, c in enumerate(system.connections):
+        if converts(c):
+            for end, signal in ((c.source, "in"), (c.target, "out")):
+                wire = SubElement(listed, "SignalConnection")
+                SubElement(wire, "Variable", simulator=end.instance, name=end.variable.name)
+                SubElement(wire, "Signal", function=f"conversion_{k}", name=signal)
+    return listed
+
+
+def _scenario(system: System) -> dict[str, object]:
+    """The scenario file: events, and the end."""
+    events = [
+        event.model_dump(exclude_none=True)
+        for event in sorted(system.scenario.events, key=lambda e: e.time)
+        if event.action != "hold"
+    ]
+    return {
+        "description": system.scenario.description or system.scenario.name,
+        "events": events,
+        "end": system.scenario.stop,
+    }

@@ -1,0 +1,206 @@
+"""What of a checked system travels to other tools, and the FMUs as they travel: parameters baked in."""
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+from ..errors import InputError
+from ..fmu import Model, Variable
+from ..scenario import Value
+from ..system import Connection, System
+from . import xml
+
+
+@dataclass(frozen=True)
+class Format:
+    """Where a system goes.
+
+    Attributes:
+        name: for messages.
+        events: whether it can hold them.
+        own_steps: whether an instance may step less often than the base step.
+        conversions: whether a connection may convert units.
+        order: whether FMUs may step one after the other.
+    """
+
+    name: str
+    events: bool = False
+    order: bool = False
+    own_steps: bool = False
+    conversions: bool = False
+
+
+SSP = Format("an SSP archive")
+OSP = Format("an OSP directory", events=True, own_steps=True, conversions=True)
+CONTAINER = Format("a container FMU", order=True)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One instance as it travels.
+
+    Attributes:
+        name: of the instance.
+        model: its FMU as the scenario has it.
+        file: name of the FMU file that travels.
+        values: start values of the scenario that differ from those of ``model``.
+        baked: whether the file that travels starts from them by itself.
+    """
+
+    name: str
+    model: Model
+    file: str
+    values: tuple[tuple[Variable, Value], ...]
+    baked: bool
+
+
+def check(system: System, target: Format, drop: bool) -> list[str]:
+    """What stays behind, or is different there.
+
+    Args:
+        system: checked system.
+        target: where it goes.
+        drop: leave out what cannot travel, in place of refusing.
+
+    Returns:
+        Notes for the user.
+
+    Raises:
+        InputError: something cannot travel, and may not or cannot be left out.
+    """
+    _check_shape(system, target)
+    left = _left_behind(system, target)
+    if left and not drop:
+        raise InputError(f"{target.name} cannot hold {'; '.join(left)}; --drop-faults leaves that out")
+    notes = [f"left out: {what}" for what in left]
+    if system.scenario.algorithm == "gauss_seidel" and not target.order:
+        notes.append(
+            "other tools step all FMUs at once ('jacobi'), this scenario one after the other: "
+            "their values arrive a step later"
+        )
+    if any(every > 1 for every in system.every.values()):
+        notes.append("an instance with a longer step gets its inputs at the start of that step there")
+    return notes
+
+
+def _left_behind(system: System, target: Format) -> list[str]:
+    """The parts of the scenario that the format has no place for and that it can do without."""
+    left = [
+        f"the fault {type(fault).__name__.lower()} of {', '.join(fault.signals)}"
+        for fault in system.scenario.faults
+    ]
+    left += [
+        f"the isolation of {name}"
+        for name, entry in system.scenario.fmus.items()
+        if getattr(entry, "isolate", False)
+    ]
+    for event in system.scenario.events:
+        if not target.events or event.action == "hold":
+            left.append(
+                f"the event {event.action} of {event.model}.{event.variable} at {event.time:g} s"
+            )
+    return left
+
+
+def _check_shape(system: System, target: Format) -> None:
+    """Raise if the format has no place for something that the system cannot do without."""
+    for name, every in system.every.items():
+        if every > 1 and not target.own_steps:
+            raise InputError(
+                f"fmus.{name}: {target.name} cannot hold a step of {every * system.scenario.step:g} s "
+                f"beside that of {system.scenario.step:g} s"
+            )
+    for c in system.connections:
+        ends = f"{c.source.name} -> {c.target.name}"
+        kinds = (c.source.variable.type, c.target.variable.type)
+        if kinds[0] != kinds[1] or "Enumeration" in kinds:
+            raise InputError(
+                f"{ends}: {kinds[0]} to {kinds[1]}: other tools connect Real, Integer and Boolean, "
+                "each with its like"
+            )
+        if converts(c) and not target.conversions:
+            units = [v.unit.name if v.unit else "" for v in (c.source.variable, c.target.variable)]
+            raise InputError(
+                f"{ends}: {target.name} cannot convert '{units[0]}' to '{units[1]}' in every tool"
+            )
+
+
+def converts(connection: Connection) -> bool:
+    """Whether values change on their way."""
+    return (connection.conversion.factor, connection.conversion.offset) != (1.0, 0.0)
+
+
+def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
+    """Put the FMUs of a system into a folder, with the scenario's parameters baked in where that is
+    possible: in the project's own FMUs. A foreign FMU's start values are in its binary.
+
+    Args:
+        system: checked system.
+        folder: receives one FMU for each instance.
+
+    Returns:
+        The instances as they travel, and notes on parameters that travel outside of their FMUs.
+    """
+    parts: list[Part] = []
+    notes: list[str] = []
+    for name, stem in zip(system.models, file_stems(list(system.models)), strict=True):
+        model = system.models[name]
+        values = tuple(pair for pair in system.parameters[name] if not _is_start(*pair))
+        entry, beside = system.scenario.fmus[name], system.scenario.folder
+        # The project's own are named, and lie where they were built.
+        baked = PurePath(entry.path).name == entry.path and model.path != beside / entry.path
+        part = Part(name, model, f"{stem}.fmu", values, baked)
+        if values and baked:
+            _bake(part, folder)
+        else:
+            shutil.copyfile(model.path, folder / part.file)
+        if values and not baked:
+            notes.append(
+                f"{name}: {', '.join(v.name for v, _ in values)} cannot be baked into "
+                f"'{model.path.name}'; they travel beside it, and a tool that ignores such values "
+                "(FMPy) starts from the FMU's own"
+            )
+        parts.append(part)
+    return parts, notes
+
+
+def _is_start(variable: Variable, value: Value) -> bool:
+    """Whether a value is the one that the FMU starts from anyway."""
+    if variable.start is None:
+        return False
+    if variable.type == "String":
+        return variable.start == value
+    if variable.type == "Boolean":
+        return (variable.start in ("true", "1")) == bool(value)
+    return float(variable.start) == float(value)
+
+
+def _bake(part: Part, folder: Path) -> None:
+    """Have the project's FMU built again, with other start values."""
+    names = {f"{part.model.name}.{v.name}": (v, value) for v, value in part.values}
+    work = folder / f".{part.file}"
+    work.mkdir()
+    start = work / "start.ssv"
+    xml.write(xml.parameter_set(part.name, names, root=True), start)
+    command = [sys.executable, "-m", "fmus.build", "--parameters", start, "--out", work]
+    done = subprocess.run([*command, "--", part.model.name], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
+        raise InputError(reason[0].removeprefix("error: "))
+    shutil.move(work / f"{part.model.name}.fmu", folder / part.file)
+    shutil.rmtree(work)
+
+
+def file_stems(names: Sequence[str]) -> list[str]:
+    """File names for instances: letters that every file system and URI takes, each name once."""
+    found: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        while stem.lower() in (other.lower() for other in found):
+            stem += "_"
+        found.append(stem)
+    return found

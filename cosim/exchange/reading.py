@@ -1,0 +1,133 @@
+"""Systems of other tools as the content of a scenario, and what their readers share."""
+
+import math
+import shutil
+import tempfile
+import weakref
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from ..errors import InputError
+
+
+class Unpacked:
+    """A folder for what was unpacked, gone when nobody needs it any more."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="cosim_"))
+        weakref.finalize(self, shutil.rmtree, self.path, True)
+
+
+@dataclass
+class Imported:
+    """A system as a scenario.
+
+    Attributes:
+        content: what a scenario file would hold.
+        folder: what its paths are relative to.
+        notes: what was assumed or left out.
+        unpacked: keeps the folder alive, where it is a scratch one.
+    """
+
+    content: dict[str, Any]
+    folder: Path
+    notes: list[str] = field(default_factory=list)
+    unpacked: Unpacked | None = None
+
+
+def is_system(path: Path) -> bool:
+    """Whether this is for :func:`read_system`, not a scenario."""
+    return path.suffix in (".ssp", ".xml") or path.is_dir()
+
+
+def read_system(path: Path) -> Imported:
+    """A system from an SSP archive, an OSP directory or its OspSystemStructure.xml.
+
+    Raises:
+        InputError: missing, unreadable, or it has something that this master cannot do.
+    """
+    from .read_osp import read_osp
+    from .read_ssp import read_ssp
+
+    if not path.exists():
+        raise InputError(f"no such system: '{path}'")
+    return read_ssp(path) if path.suffix == ".ssp" else read_osp(path)
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Refuses document types, with which a short file can become a long one."""
+
+    def doctype(self, *_: Any) -> None:
+        raise ValueError("it has a document type, which is refused")
+
+
+def parse(text: bytes, where: str, tag: str, namespace: str = "") -> Element:
+    """The root of a document, which must be of this kind.
+
+    Args:
+        text: the document.
+        where: what messages call it.
+        tag: of the root.
+        namespace: of the root; any if empty.
+    """
+    try:
+        root = ElementTree.fromstring(text, ElementTree.XMLParser(target=_Builder()))
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise InputError(f"{where} cannot be read: {error}") from None
+    if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
+        raise InputError(f"{where} is no {tag} that this reader knows, but '{root.tag}'")
+    return root
+
+
+def need(element: Element, name: str, where: str) -> str:
+    """An attribute that must be there."""
+    value = element.get(name)
+    if value is None:
+        raise InputError(f"{where}: <{local(element)}> has no '{name}'")
+    return value
+
+
+def number(text: str | None, where: str) -> float:
+    """A finite number."""
+    with suppress(ValueError):
+        value = float(text or "")
+        if math.isfinite(value):
+            return value
+    raise InputError(f"{where} = '{text}' is not a number")
+
+
+def start_value(element: Element, where: str) -> bool | int | float | str:
+    """The value of an element called after its type: <Real value="1.0"/>, with any prefix."""
+    text = need(element, "value", where)
+    kind = local(element)
+    if kind == "String":
+        return text
+    if kind == "Boolean":
+        if text not in ("true", "false", "1", "0"):
+            raise InputError(f"{where} = '{text}' is neither true nor false")
+        return text in ("true", "1")
+    if kind == "Real":
+        return number(text, where)
+    if kind == "Integer":
+        with suppress(ValueError):
+            return int(text)
+        raise InputError(f"{where} = '{text}' is not a whole number")
+    raise InputError(f"{where}: values of type {kind} are not supported")
+
+
+def local(element: Element) -> str:
+    """The name of an element without its namespace."""
+    return element.tag.rpartition("}")[2]
+
+
+def file_of(source: str, where: str) -> str:
+    """The path that a URI means: relative, or absolute with the scheme ``file``."""
+    parts = urlsplit(source)
+    if parts.scheme not in ("", "file") or parts.netloc or parts.query or parts.fragment:
+        raise InputError(f"{where}: '{source}' is not a file; only files are supported")
+    return unquote(parts.path)

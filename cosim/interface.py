@@ -1,0 +1,87 @@
+"""What the FMUs of a scenario tell each other, as Markdown: ``python -m cosim.interface SCENARIO``.
+
+All of it is read from the FMUs: an FMU that is to take the place of another one needs these names.
+"""
+
+import argparse
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console
+
+from .command import BAD_INPUT, Output, run_command
+from .errors import InputError
+from .fmu import Variable
+from .scenario import load_scenario
+from .system import System, prepare
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m cosim.interface",
+        description="Tables of what each FMU of a scenario gets and gives: names, units, descriptions, "
+        "and where values come from and go to.",
+        epilog="examples:  python -m cosim.interface scenarios/ellipse.json\n"
+        "           python -m cosim.interface system.ssp > interface.md",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", help="JSON file, SSP archive or OSP directory")
+    options = parser.parse_args(arguments)
+    try:
+        system = prepare(load_scenario(options.scenario))
+    except InputError as error:
+        Console(stderr=True, highlight=False, soft_wrap=True).print(f"error: {error}", markup=False)
+        return BAD_INPUT
+    try:
+        Output(highlight=False, soft_wrap=True).print(interface(system), markup=False, end="")
+    finally:
+        system.close()
+    return 0
+
+
+def interface(system: System) -> str:
+    """Markdown: a section for each instance, with a table of its inputs and one of its outputs."""
+    return "\n".join(_section(system, name) for name in system.models)
+
+
+def _section(system: System, name: str) -> str:
+    model = system.models[name]
+    sources = {c.target.name: c.source.name for c in system.connections}
+    sinks: dict[str, list[str]] = {}
+    for c in system.connections:
+        sinks.setdefault(c.source.name, []).append(c.target.name)
+    groups: dict[str, list[Variable]] = {"input": [], "output": []}
+    for v in model.variables.values():
+        groups.setdefault(v.causality, []).append(v)
+    lines = [f"## `{name}`: {model.name}", "", f"{model.description.description or ''}.", ""]
+    if groups["input"]:
+        rows = [(v, sources.get(f"{name}.{v.name}")) for v in groups["input"]]
+        rows = [(v, "nothing" if source is None else f"`{source}`") for v, source in rows]
+        lines += _table("input", "comes from", rows)
+    used = [v for v in groups["output"] if f"{name}.{v.name}" in sinks]
+    if used:
+        rows = [(v, ", ".join(f"`{to}`" for to in sinks[f"{name}.{v.name}"])) for v in used]
+        lines += _table("output", "goes to", rows)
+    spare = [v for v in groups["output"] if v not in used]
+    if spare:
+        lines += [f"Further outputs, which go to the log only: {_names(spare)}.", ""]
+    if "parameter" in groups:
+        lines += [f"It has {len(groups['parameter'])} parameters.", ""]
+    return "\n".join(lines)
+
+
+def _table(kind: str, way: str, rows: Iterable[tuple[Variable, str]]) -> list[str]:
+    """Lines of a table, and an empty one."""
+    lines = [f"| {kind} | unit | what it is | {way} |", "|---|---|---|---|"]
+    for v, ends in rows:
+        unit = v.unit.name if v.unit is not None else ""
+        lines.append(f"| `{v.name}` | {unit} | {v.description.replace('|', '/')} | {ends} |")
+    return [*lines, ""]
+
+
+def _names(variables: Iterable[Variable]) -> str:
+    return ", ".join(f"`{v.name}`" for v in variables)
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,188 @@
+"""Scenarios in the formats of other tools: what is written and what is refused."""
+
+import json
+import sys
+from xml.etree import ElementTree
+
+import pytest
+from exchanged import log_of, need, write
+
+from cosim import InputError
+from cosim.exchange.groups import variable_groups
+from cosim.exchange.portable import file_stems
+from cosim.exchange.ssp import SPACES
+from cosim.export import export_fmu, export_osp, export_ssp
+from cosim.export import main as export
+from cosim.fmu import Model
+from cosim.scenario import load_scenario
+from cosim.system import prepare
+
+
+def test_parameters_are_baked_into_our_fmus(own, tmp_path):
+    """A tool that ignores parameter sets gets the right numbers: here they are taken out."""
+    write(own, tmp_path / "osp", export_osp)
+    structure = tmp_path / "osp" / "OspSystemStructure.xml"
+    tree = ElementTree.parse(structure)
+    taken = 0
+    for simulator in tree.iter():
+        for child in list(simulator):
+            if child.tag.endswith("InitialValues"):
+                simulator.remove(child)
+                taken += 1
+    assert taken == 1
+    tree.write(structure)
+    starts = Model(tmp_path / "osp" / "vessel.fmu").variables
+    assert float(starts["delta_X_u"].start) == -3.0
+    _, before = log_of(own, tmp_path / "before")
+    _, after = log_of(tmp_path / "osp", tmp_path / "after")
+    assert before == after
+
+
+def test_two_exports_are_the_same_bytes(portable, tmp_path):
+    for name in ("a.ssp", "b.ssp"):
+        write(portable, tmp_path / name, export_ssp)
+    assert (tmp_path / "a.ssp").read_bytes() == (tmp_path / "b.ssp").read_bytes()
+
+
+def test_exports_are_valid(portable, tmp_path):
+    """The schema of SSP by FMPy; that of OSP is in libcosim, which reads nothing else."""
+    from fmpy import read_model_description
+    from fmpy.ssp.ssd import read_ssd
+
+    write(portable, tmp_path / "system.ssp", export_ssp)
+    ssd = read_ssd(str(tmp_path / "system.ssp"))
+    assert [c.name for c in ssd.system.elements] == list(portable["fmus"])
+    need("container_jacobi")
+    write(portable, tmp_path / "1 system.fmu", export_fmu)
+    description = read_model_description(str(tmp_path / "1 system.fmu"), validate=True)
+    assert description.coSimulation.modelIdentifier.isidentifier()
+    outputs = {v.name for v in description.modelVariables if v.causality == "output"}
+    assert {"vessel.x", "observer.x_hat", "controller.tau_X"} <= outputs
+    assert description.author is None
+    assert description.license is None
+
+
+@pytest.mark.parametrize("suffix", ["ssp", "osp", "fmu"])
+def test_faults_are_refused_or_left_out(ellipse, tmp_path, capsys, suffix):
+    if suffix == "fmu":
+        need("container_jacobi")
+    (tmp_path / "s.json").write_text(json.dumps(ellipse))
+    path = tmp_path / f"out.{suffix}"
+    command = [str(tmp_path / "s.json"), f"--{suffix}", str(path)]
+    assert export(command) == 2
+    error = capsys.readouterr().err
+    assert "freeze of observer.x_m" in error
+    assert "--drop-faults" in error
+    assert not path.exists()
+    assert export([*command, "--drop-faults"]) == 0
+    assert path.exists()
+    assert "left out: the fault freeze" in capsys.readouterr().err
+
+
+def test_events_travel_in_an_osp_directory_only(portable, tmp_path):
+    portable["events"] = [
+        {"time": 0.2, "model": "vessel", "variable": "delta_Y_v", "action": "override", "value": -9.0}
+    ]
+    with pytest.raises(InputError, match=r"the event override of vessel\.delta_Y_v at 0\.2 s"):
+        write(portable, tmp_path / "s.ssp", export_ssp)
+    write(portable, tmp_path / "osp", export_osp)
+    _, before = log_of(portable, tmp_path / "before")
+    _, after = log_of(tmp_path / "osp", tmp_path / "after")
+    assert before == after
+    _, without = log_of(portable | {"events": []}, tmp_path / "without")
+    assert without != after
+    portable["events"].append({"time": 0.3, "model": "vessel", "variable": "x_m", "action": "hold"})
+    with pytest.raises(InputError, match="the event hold"):
+        write(portable, tmp_path / "osp", export_osp)
+
+
+def test_a_step_of_its_own_travels_to_osp_only(chain, tmp_path):
+    chain["fmus"]["gain"]["step"] = 0.5
+    with pytest.raises(InputError, match=r"cannot hold a step of 0\.5 s"):
+        write(chain, tmp_path / "s.ssp", export_ssp)
+    notes = write(chain, tmp_path / "osp", export_osp)
+    assert any("at the start of that step" in note for note in notes)
+    assert log_of(chain, tmp_path / "a")[1] == log_of(tmp_path / "osp", tmp_path / "b")[1]
+
+
+def test_a_transformation_needs_a_connection(chain, tmp_path):
+    chain["transformations"] = {"gain.x": {"factor": 2.0}}
+    with pytest.raises(InputError, match=r"gain\.x is not connected; did you mean 'gain\.u'"):
+        prepare(load_scenario(chain))
+
+
+def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
+    (tmp_path / "s.json").write_text(json.dumps(portable))
+    (tmp_path / "osp").mkdir()
+    (tmp_path / "osp" / "thesis.txt").write_text("mine")
+    command = [str(tmp_path / "s.json"), "--osp", str(tmp_path / "osp")]
+    assert export(command) == 2
+    assert "no OSP directory" in capsys.readouterr().err
+    assert [p.name for p in (tmp_path / "osp").iterdir()] == ["thesis.txt"]
+    (tmp_path / "osp" / "thesis.txt").unlink()
+    assert export(command) == 0
+    (tmp_path / "osp" / "stale.fmu").touch()
+    assert export(command) == 0
+    assert not (tmp_path / "osp" / "stale.fmu").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["osp", "s.json"]
+
+
+def test_isolation_stays_behind(chain, tmp_path):
+    chain["fmus"]["gain"] = {"path": chain["fmus"]["gain"]["path"], "isolate": True}
+    with pytest.raises(InputError, match="the isolation of gain"):
+        write(chain, tmp_path / "s.ssp", export_ssp)
+    assert "left out: the isolation of gain" in write(chain, tmp_path / "s.ssp", export_ssp, drop=True)
+
+
+def test_nothing_is_left_after_a_failure(portable, tmp_path, monkeypatch):
+    def fail(*arguments):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("cosim.exchange.xml.write", fail)
+    for fmu in portable["fmus"].values():
+        fmu.pop("parameters", None)
+    with pytest.raises(OSError, match="disk full"):
+        write(portable, tmp_path / "s.ssp", export_ssp)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_toolbox_is_told(chain, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fmu_manipulation_toolbox.container", None)
+    with pytest.raises(InputError, match=r"cybership\[export\]"):
+        write(chain, tmp_path / "c.fmu", export_fmu)
+
+
+def test_file_names_are_safe_and_differ():
+    stems = file_stems(["a b", "a/b", "A_B", "../x", "ship"])
+    assert len({stem.lower() for stem in stems}) == 5
+    assert all(stem.replace("_", "").isalnum() for stem in stems)
+
+
+def test_variable_groups_hold_what_belongs_together(fmus):
+    """Along the axes, one causality and one unit in each, nothing twice."""
+    for path in fmus.values():
+        model = Model(path)
+        groups = variable_groups(model)
+        for name, (quantity, names) in groups.items():
+            members = [model.variables[n] for n in names]
+            assert 1 <= len(members) <= 3
+            assert len({m.causality for m in members}) == 1
+            assert len({m.unit.name for m in members}) == 1
+            assert name.startswith(quantity.word)
+        names = [n for _, (_, members) in groups.items() for n in members]
+        assert len(names) == len(set(names))
+    vessel = variable_groups(Model(fmus["vessel"]))
+    assert vessel["force_tau"][1] == ["tau_X", "tau_Y"]
+    assert vessel["torque_tau"][1] == ["tau_N"]
+    assert vessel["linear_velocity"][1] == ["u", "v"]
+    assert vessel["angular_displacement_m"][1] == ["psi_m"]
+
+
+def test_the_namespaces_are_those_of_the_standard():
+    """libcosim and Ecos look for prefixes, FMPy for namespaces."""
+    assert {prefix: uri.rpartition("/")[2] for prefix, uri in SPACES.items()} == {
+        "ssd": "SystemStructureDescription",
+        "ssc": "SystemStructureCommon",
+        "ssv": "SystemStructureParameterValues",
+        "osp": "OSPAnnotations",
+    }
