@@ -1,0 +1,151 @@
+"""Each measured run left out in turn: what is learned from the others, and what it is worth there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Diagnosed, Model, outcome
+from diagnosis.evidence import Evidence
+from diagnosis.measurement import propellers
+from diagnosis.model import delayed
+from diagnosis.results import Diagnosis
+from diagnosis.steps import Advance
+from diagnosis.uncertainty import omega_std
+from diagnosis.weak import Integrals, omega
+
+SAME = 1e-6
+TOGETHER = 2  # blocks of 15 s: what counts as independent
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """What was learned without one run, and how it does there.
+
+    Attributes:
+        found: what was learned; its last evidence is that of the run left out.
+        seen: fall (3,) of the model error on this run when it is among those learned from.
+    """
+
+    found: Diagnosed
+    seen: np.ndarray | None = None
+
+    @property
+    def evidence(self) -> Evidence:
+        return self.found.runs.evidence[-1]
+
+    @property
+    def name(self) -> str:
+        return self.evidence.name
+
+    @property
+    def content(self) -> Diagnosis:
+        """As in ``diagnosis.json``."""
+        return outcome.diagnosis(self.found, None, [])
+
+    @property
+    def model(self) -> Model:
+        return self.found.learned.model
+
+    @property
+    def fall(self) -> np.ndarray:
+        """(3,): RMS of the model error before over that after."""
+        return fall(self.evidence)
+
+    @property
+    def ceiling(self) -> np.ndarray:
+        """(3,): the fall at which only the measurement's own noise is left."""
+        std = np.sqrt(np.mean(omega_std(self.evidence.integrals) ** 2, axis=0))
+        return self.evidence.before.omega_rms / std
+
+
+def fall(e: Evidence) -> np.ndarray:
+    """(3,): RMS of the model error before over that after."""
+    return e.before.omega_rms / e.after.omega_rms
+
+
+def leave_out(runs: Sequence[Integrals], k: int, prior: float, advance: Advance) -> Fold:
+    """Learn from all runs but one.
+
+    Args:
+        runs: at least two.
+        k: which one is left out.
+        prior: relative standard deviation believed of every nominal coefficient.
+        advance: told what is being done.
+    """
+    others = [w for i, w in enumerate(runs) if i != k]
+    return Fold(diagnosis.diagnose(others, [runs[k]], prior, advance=advance))
+
+
+def gather(files: Sequence[Path], advance: Advance) -> list[Integrals]:
+    """Measured runs, enough to leave one out.
+
+    Raises:
+        InputError: there is one only, or one cannot be used.
+    """
+    if len(files) < 2:
+        raise InputError(f"one run alone, '{files[0]}', cannot be left out of training")
+    return diagnosis.gather(files, advance)
+
+
+def steered(w: Integrals) -> bool:
+    """Whether a controller steered for most of the time: both VSP then have one sway command."""
+    five = w.run.five
+    return five is not None and bool(np.mean(np.abs(five[:, 1] - five[:, 3]) < SAME) > 0.5)
+
+
+def at_full_power(w: Integrals) -> np.ndarray:
+    """RMS (3,) of the nominal model error of who does not know the power settings."""
+    track = w.smoothed.track
+    run = replace(track.run, power=None)
+    blind = replace(w, smoothed=replace(w.smoothed, track=replace(track, run=run)), memory={})
+    return np.sqrt(np.mean(omega(blind, Model()) ** 2, axis=0))
+
+
+class Commanded(NamedTuple):
+    """Shares (3,) of what is left, 0 to 1, that the commands of the VSP would explain on each axis.
+
+    Attributes:
+        both: the sums of the two VSP's commands, as in a model with one law for both.
+        single: the commands of each.
+    """
+
+    both: np.ndarray
+    single: np.ndarray
+
+
+def commanded(e: Evidence, model: Model) -> Commanded:
+    """How much of what is left goes with the commands of the VSP, in any direction of the force.
+
+    Fitted are commands and their sizes, delayed as in the model, and judged on blocks that were not
+    fitted; where that is no better than nothing, the share is 0.
+
+    Args:
+        e: the run.
+        model: the learned one.
+    """
+    w = e.integrals
+    if w.run.five is None:
+        return Commanded(np.zeros(3), np.zeros(3))
+    power = 1.0 if w.run.power is None else w.run.power[:, :1]
+    late, _ = model.drive.dynamics
+    one, other = np.moveaxis(propellers(w.run.five), 1, 0)
+    first, second = (delayed(w.run.time, part, late)[:, :2] for part in (one, other))
+    two, four = first + second, np.hstack([first, second])
+    return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
+
+
+def _explained(w: Integrals, left: np.ndarray, commands: np.ndarray) -> np.ndarray:
+    """Cross-validated share (3,) of the squares of ``left`` (K, 3)."""
+    columns = w.held @ np.hstack([commands, np.abs(commands)])
+    fold = np.unique(w.block // TOGETHER, return_inverse=True)[1]
+    missed = np.zeros(3)
+    for k in range(fold.max() + 1):
+        out = fold == k
+        fitted = np.linalg.lstsq(columns[~out], left[~out], rcond=None)[0]
+        missed += np.sum((left[out] - columns[out] @ fitted) ** 2, axis=0)
+    return np.clip(1.0 - missed / np.sum(left**2, axis=0), 0.0, 1.0)

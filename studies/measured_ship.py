@@ -1,0 +1,114 @@
+"""What the thesis' model lacks of the real ship: ``python -m studies.measured_ship DATA``.
+
+Each of the measured runs is left out in turn, the model learns from the others, and is held against the
+one left out. What all runs teach of the propellers is held against bollard pulls, which were never
+learned from.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+
+import cosim
+import diagnosis
+from diagnosis import Diagnosed, outcome
+from diagnosis.library import MEASURED
+from diagnosis.steps import Advance, steps
+from diagnosis.weak import Integrals
+
+from . import basin, bollard, ship_tables
+from .command import run_study, study_parser
+from .leave_one_out import Fold, fall, gather, leave_out
+from .report import Report
+
+PRIOR = 1.0
+# Profiles of the model error over all covariates: a megabyte that the reports of single runs have.
+LEFT_OUT = {"where", "where_after"}
+
+
+def learned(runs: Sequence[Integrals], prior: float, quick: bool, advance: Advance) -> list[Fold]:
+    """Each run left out in turn; the first alone for a first look."""
+
+    def without(name: str) -> Advance:
+        return lambda what: advance(f"without {name}: {what}")
+
+    chosen = runs[:1] if quick else runs
+    return [leave_out(runs, k, prior, without(w.run.name)) for k, w in enumerate(chosen)]
+
+
+def with_all(folds: Sequence[Fold], found: Diagnosed) -> list[Fold]:
+    """The folds with what their run gives when it is learned from as well."""
+    seen = {e.name: fall(e) for e in found.runs.evidence}
+    return [Fold(f.found, seen[f.name]) for f in folds]
+
+
+def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
+    """Learn from the measured runs and write the report; returns its path."""
+    pulls, files = bollard.read(data), basin.files(data)
+    with steps(Console(stderr=True)) as advance:
+        runs = gather(files, advance)
+        folds = learned(runs, prior, quick, advance)
+        last = diagnosis.diagnose(runs, (), prior, advance=lambda what: advance(f"all runs: {what}"))
+    folds = with_all(folds, last)
+    try:
+        report = Report(out, "The real ship")
+    except OSError as error:
+        raise cosim.InputError(f"cannot write to '{out}': {error.strerror}") from None
+    damping, thrusters = 100.0 * prior, 100.0 * min(prior, MEASURED)
+    names = ", ".join(w.run.name for w in runs)
+    report.text(
+        f"NTNU's measured runs of CyberShip Enterprise 1: {names}. Each is left out in turn; what the "
+        "model lacks is learned from the others, as by "
+        f"`python -m diagnosis.learn --prior {prior:g}`: coefficients of the damping, borrowed from "
+        f"another ship, are believed to {damping:.0f} %, masses and thrusters to {thrusters:.0f} %."
+    )
+    ship_tables.write_falls(report, folds)
+    ship_tables.write_windows(report, folds)
+    ship_tables.write_expected(report, folds)
+    ship_tables.write_curve(report, folds, last.learned.model, pulls)
+    for f in folds:
+        ship_tables.write_findings(report, f"Learned without {f.name}", f.content)
+        caption = f"{f.name}: the force that the model lacks, before and after, not learned from it."
+        report.figure(f"omega_{f.name}", ship_tables.course(f.evidence), caption)
+    everything = outcome.diagnosis(last, None, [])
+    ship_tables.write_findings(report, "Learned from all runs", everything)
+    contents = {f"without {f.name}": f.content for f in folds} | {"all runs": everything}
+    report.result(
+        "diagnoses", {n: c.model_dump(mode="json", exclude=LEFT_OUT) for n, c in contents.items()}
+    )
+    report.result("prior", prior)
+    return report.write()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = study_parser(
+        "measured_ship",
+        "Learn what the model lacks of the real ship, each measured run left out in turn.",
+        "  python -m studies.measured_ship ~/data\n"
+        "  python -m studies.measured_ship ~/data --prior 0.1 --out results/careful\n"
+        "  python -m studies.measured_ship ~/data --quick",
+        seeds=None,
+        jobs=False,
+    )
+    parser.add_argument(
+        "data",
+        type=Path,
+        metavar="DATA",
+        help="folder with cse1/*.mat, measured runs, and cse1_static/*.csv, bollard pulls",
+    )
+    parser.add_argument(
+        "--prior",
+        type=float,
+        default=PRIOR,
+        metavar="SHARE",
+        help="relative standard deviation believed of every damping coefficient (%(default)s)",
+    )
+    options = parser.parse_args(arguments)
+    run_study(partial(study, options.data, options.out, options.prior, options.quick))
+
+
+if __name__ == "__main__":
+    main()

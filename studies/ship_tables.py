@@ -1,0 +1,193 @@
+"""The tables and pictures of the real ship's study."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from diagnosis import Model
+from diagnosis.evidence import Evidence
+from diagnosis.results import Diagnosis, EffectResult
+
+from . import bollard
+from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, reason, wanted
+from .leave_one_out import Fold, at_full_power, commanded, steered
+from .report import Report
+
+UNITS = ("N", "N", "N m")
+RUNS_AWAY = "runs away"
+
+
+def kind(fold: Fold) -> str:
+    return STEERED if steered(fold.evidence.integrals) else BY_HAND
+
+
+def falls(fold: Fold) -> list[Fall]:
+    """The fall of each axis, and what bounds it."""
+    seen = np.full(3, np.nan) if fold.seen is None else fold.seen
+    columns = zip(fold.fall, seen, fold.ceiling, *commanded(fold.evidence, fold.model), strict=True)
+    return [Fall(*map(float, row)) for row in columns]
+
+
+def write_falls(report: Report, folds: Sequence[Fold]) -> None:
+    """The model error before and after on the run left out, beside what was asked."""
+    report.heading("The model error on the run left out")
+    report.text(
+        "RMS of the force that the model lacks, in windows of 3 s with the thrusters at work. Before: "
+        "the nominal model with the power settings that the run logged; in brackets as if they were not "
+        "known. After: with what was learned from the other runs. The last column: the fall if this run "
+        "is among those learned from."
+    )
+    rows, results = [], {}
+    for f in folds:
+        blind, e = at_full_power(f.evidence.integrals), f.evidence
+        results[f.name] = {"kind": kind(f), "axes": {}}
+        for k, (axis, x) in enumerate(zip(AXES, falls(f), strict=True)):
+            before, after = float(e.before.omega_rms[k]), float(e.after.omega_rms[k])
+            target = wanted(axis, kind(f))
+            said = "–" if target is None else f"{target:g}×: {'' if x.out >= target else 'not '}reached"
+            changes = f"{before:.3g} ({blind[k]:.3g})", f"{after:.3g}", f"{x.out:.2f}×"
+            name = f"{f.name}, {kind(f)}"
+            rows.append([name, f"{axis} [{UNITS[k]}]", *changes, said, _times(x.seen)])
+            results[f.name]["axes"][axis] = {
+                "before": before,
+                "before_without_power": float(blind[k]),
+                "after": after,
+                "target": target,
+                **x._asdict(),
+            }
+    header = ["run left out", "axis", "before", "after", "fall", "target", "learned from it"]
+    report.table(header, rows)
+    least = min(x.most for f in folds for x in falls(f))
+    report.text(f"Noise of the measurement is not what is left: it would allow {least:.0f}× or more.")
+    worse = [
+        f"{axis} of {f.name}"
+        for f in folds
+        for axis, x in zip(AXES, falls(f), strict=True)
+        if x.out < 1.0
+    ]
+    if worse:
+        report.text(f"The learned model is worse than the nominal one in {', '.join(worse)}.")
+    missed = [
+        f"{f.name}, {axis} ({x.out:.2f}× of {target:g}×): {reason(x, target)}."
+        for f in folds
+        for axis, x in zip(AXES, falls(f), strict=True)
+        if (target := wanted(axis, kind(f))) is not None and x.out < target
+    ]
+    if missed:
+        report.text("Not reached, and why, as far as the numbers tell:")
+        report.items(missed)
+    report.result("falls", results)
+
+
+def _times(x: float) -> str:
+    return f"{x:.2f}×" if isfinite(x) else "–"
+
+
+def window_error(value: float, scale: float) -> str:
+    """An error of the windows of 8 s for people; inf is a model that runs away."""
+    return f"{scale * value:.3g}" if isfinite(value) else RUNS_AWAY if np.isinf(value) else "–"
+
+
+def write_windows(report: Report, folds: Sequence[Fold]) -> None:
+    """Errors of prediction over 8 s."""
+    report.heading("Prediction over 8 s on the run left out")
+
+    def row(e: Evidence) -> list[str]:
+        position = [window_error(s.position, 1000.0) for s in (e.before, e.after)]
+        heading = [window_error(s.heading, 180.0 / np.pi) for s in (e.before, e.after)]
+        return [e.name, *position, *heading]
+
+    header = ["run left out", "position [mm]: before", "after", "heading [°]: before", "after"]
+    report.table(header, [row(f.evidence) for f in folds])
+    seen = [(f.name, f.evidence.before, f.evidence.after) for f in folds]
+    farther = [name for name, before, after in seen if after.position > before.position]
+    askew = [name for name, before, after in seen if after.heading > before.heading]
+    for what, names in (("position", farther), ("heading", askew)):
+        if names:
+            report.text(
+                f"The {what} is predicted worse than by the nominal model in {', '.join(names)}."
+            )
+    away = [f.name for f in folds if np.isinf(f.evidence.after.position)]
+    if away:
+        report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
+
+
+def write_expected(report: Report, folds: Sequence[Fold]) -> None:
+    """What was expected before looking, and what came."""
+    report.heading("What was expected")
+    rows = expectations([f.content for f in folds])
+    header = ["expected", *(f"without {f.name}" for f in folds)]
+    report.table(header, [[row.expected, *row.came] for row in rows], words=True)
+    report.result("expected", rows)
+
+
+def write_findings(report: Report, name: str, d: Diagnosis) -> None:
+    """What one set of runs taught."""
+    report.heading(name)
+
+    def row(e: EffectResult) -> list[str]:
+        numbers = [f"{x:.2f}" for x in (e.confidence or 0.0, e.share_of_error or 0.0)]
+        return [f"`{e.id}`", e.equation, *numbers, ", ".join(e.indistinguishable) or "none"]
+
+    if d.effects:
+        header = [
+            "effect",
+            "with 95 % intervals",
+            "confidence",
+            "share of error",
+            "not to be told apart",
+        ]
+        report.table(header, [row(e) for e in d.effects], words=True)
+    else:
+        report.text("No effect was found.")
+    suspects = [f"{s.name} = {s.value:.3g} (z = {s.z:.1f})" for s in d.suspect_coefficients]
+    report.text(f"Nominal coefficients that are likely wrong: {', '.join(suspects) or 'none'}.")
+    s = d.stability
+    least = f"{s.learned_min_dissipation:.3g} 1/s (nominal {s.nominal_min_dissipation:.3g})"
+    held = "holds" if s.bounded else "does not hold"
+    report.text(
+        f"A controller {held} the learned ship on ellipse and eight. Least dissipation {least}."
+        + (f" Less than nominal: {s.region}." if s.region else "")
+    )
+
+
+def write_curve(report: Report, folds: Sequence[Fold], last: Model, pulls: bollard.Pulls) -> None:
+    """The learned VSP beside bollard pulls."""
+    report.heading("The VSP beside bollard pulls")
+    models = {"nominal": Model(), "all runs": last} | {f"without {f.name}": f.model for f in folds}
+    found = {name: bollard.difference(m, pulls) for name, m in models.items()}
+    rms = found["all runs"].rms
+    said = "reached" if rms <= CURVE_WITHIN else "not reached"
+    report.text(
+        f"RMS difference to the pulls at |pitch| ≤ {bollard.WITHIN:g}: {rms:.3f} N learned from all "
+        f"runs, {found['nominal'].rms:.3f} N nominal; asked were {CURVE_WITHIN:g} N: {said}. It is not "
+        "known at which speed the propellers ran in the pulls: with one factor on the model's force, "
+        "fitted to the pulls, only the shape counts."
+    )
+    header = ["learned from", "RMS [N]", "best factor", "RMS with it [N]"]
+    report.table(header, [[name, *map(float, x)] for name, x in found.items()])
+    figure = bollard.picture(pulls, last, {f.name: f.model for f in folds})
+    report.figure("bollard", figure, "Surge force of one VSP at rest: learned, nominal, and pulled.")
+    forces = {name: bollard.surge_force(m, pulls.command) for name, m in models.items()}
+    report.result("bollard", {"pulls": pulls, "forces": forces, "differences": found})
+
+
+def course(e: Evidence) -> Figure:
+    """The model error of a run over time, before and after."""
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True)
+    # A gap in time is a gap in the line.
+    gaps = np.flatnonzero(np.diff(e.integrals.middle) > 3.0) + 1
+    time = np.insert(e.integrals.middle, gaps, np.nan)
+    for k, panel in enumerate(panels):
+        for seen, label, color in ((e.before, "before", "0.6"), (e.after, "after", "tab:blue")):
+            panel.plot(
+                time, np.insert(seen.omega[:, k], gaps, np.nan), color=color, linewidth=0.9, label=label
+            )
+        panel.set_ylabel(f"{AXES[k]} [{UNITS[k]}]")
+        panel.grid(alpha=0.3)
+    panels[0].legend(loc="upper right")
+    panels[-1].set_xlabel("time [s]")
+    return figure

@@ -1,0 +1,269 @@
+"""The study of the real ship: pulls, folds and expectations on made-up inputs, and the whole of it."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import ROOT
+from measured import DATA, needs_data, sail
+from scipy.io import savemat
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Model, session
+from diagnosis.evidence import Evidence, Seen
+from diagnosis.selection import Finding, Learned, Suspect
+from diagnosis.weak import integrals, omega
+from fmus.signals import Force, Velocity
+from fmus.thrusters.allocation import allocate
+from fmus.thrusters.chain import Inputs
+from fmus.thrusters.thrusters import COMPONENT
+from studies import bollard, expected, leave_one_out, measured_ship, ship_tables
+from studies.expected import BY_HAND, STEERED, Fall
+
+CURVE = {"thrust_curve_ahead": 0.2, "thrust_curve_astern": -0.1, "thrust_curve_deadband": 0.2}
+COMMANDS = np.linspace(-1.0, 1.0, 11)
+
+
+def five(run):
+    """The commands of both VSP, each with half of the force, and of the bow."""
+    x, y, bow = allocate(*run.tau_cmd.T, COMPONENT.params().allocation)
+    return np.column_stack([x / 2, y / 2, x / 2, y / 2, bow])
+
+
+def windows(commands=None, power=None, seconds=64.0):
+    run, _ = sail(seconds, h=0.05)
+    run = replace(run, five=five(run) if commands is None else commands(run), power=power)
+    return integrals(diagnosis.smooth(diagnosis.clean(run)))
+
+
+# What the propellers give
+
+
+def test_nominal_force_is_a_straight_line():
+    assert bollard.surge_force(Model(), COMMANDS) == pytest.approx(1.165 * COMMANDS)
+
+
+def test_force_is_that_of_the_fmu_at_rest():
+    model = Model().plus({**CURVE, "deadband": 0.05, "loss_surge": 0.1, "plant_F_vsp": 0.2})
+    p = model.drive
+    for command in COMMANDS:
+        inputs = Inputs(Force(1.165 * command, 0.0, 0.0), Velocity())
+        _, out = COMPONENT.advance(COMPONENT.init(inputs, p), inputs, COMPONENT.prepared(p), 0.01)
+        force = bollard.surge_force(model, np.array([command]))
+        assert force == pytest.approx([out.tau_act_X], abs=1e-12)
+
+
+def test_difference_is_none_to_the_model_itself_and_the_factor_is_found():
+    model = Model().plus(CURVE)
+    pulls = bollard.Pulls(COMMANDS, bollard.surge_force(model, COMMANDS))
+    assert bollard.difference(model, pulls) == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    found = bollard.difference(model, pulls._replace(force=1.5 * pulls.force))
+    assert found.rms > 0.1
+    assert found.factor == pytest.approx(1.5)
+    assert found.scaled == pytest.approx(0.0, abs=1e-12)
+
+
+def test_only_pulls_within_the_range_count():
+    far = np.abs(COMMANDS) > bollard.WITHIN
+    pulls = bollard.Pulls(COMMANDS, 1.165 * COMMANDS + 9.0 * far)
+    assert bollard.difference(Model(), pulls).rms == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"pitch": [0.1], "F_per_vps": [0.1]}, "F_per_vsp"),
+        ({"pitch": [0.1, "x"], "F_per_vsp": [0.1, 0.2]}, "no numbers"),
+        ({"pitch": [0.9], "F_per_vsp": [1.2]}, "at most 0.7"),
+    ],
+)
+def test_pulls_that_are_none(tmp_path, table, said):
+    (tmp_path / "cse1_static").mkdir()
+    pd.DataFrame(table).to_csv(tmp_path / bollard.PULLS, index=False)
+    with pytest.raises(InputError, match=said):
+        bollard.read(tmp_path)
+
+
+# What bounds the fall
+
+
+def test_who_steers_is_told_by_the_sway_commands():
+    assert leave_one_out.steered(windows())
+
+    def other(run):
+        commands = five(run)
+        commands[:, 3] += 0.01
+        return commands
+
+    assert not leave_one_out.steered(windows(other))
+
+
+def test_power_that_is_full_changes_nothing():
+    w = windows()
+    known = np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0))
+    assert leave_one_out.at_full_power(w) == pytest.approx(known)
+    half = windows(power=np.full((w.run.time.size, 2), 0.5))
+    assert leave_one_out.at_full_power(half) == pytest.approx(known)
+    assert np.sqrt(np.mean(omega(half, Model())[:, 0] ** 2)) > 1.2 * known[0]
+
+
+def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
+    def crossed(run):
+        commands = five(run)
+        turn = 0.2 * np.sin(0.7 * run.time)
+        return commands + np.column_stack([turn, 0.0 * turn, -turn, 0.0 * turn, 0.0 * turn])
+
+    w = windows(crossed, seconds=160.0)
+    model = Model().plus({"delay": 0.2})
+    late = leave_one_out.delayed(w.run.time, w.run.five[:, [0, 2, 4]], 0.2)
+    omega_left = np.random.default_rng(0).normal(size=(w.middle.size, 3))
+    omega_left[:, 1] = w.held @ (late[:, 0] - late[:, 1])
+    e = Evidence(w, None, True, *[Seen(omega_left, np.zeros((0, 3)), None)] * 2)
+    found = leave_one_out.commanded(e, model)
+    assert found.single[1] == pytest.approx(1.0)
+    assert max(*found.both, found.single[0], found.single[2]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("fall", "said"),
+    [
+        (Fall(2.0, 2.2, 2.3, 0.1, 0.9), "noise alone allows 2.3×"),
+        (Fall(2.0, 6.0, 99.0, 0.1, 0.9), "does not hold here"),
+        (Fall(2.0, 2.2, 99.0, 0.1, 0.9), "90 % .* one law together"),
+        (Fall(2.0, float("nan"), 99.0, 0.1, 0.9), "not known"),
+    ],
+)
+def test_reason_follows_the_numbers(fall, said):
+    assert re.search(said, expected.reason(fall, 2.5))
+    assert "together" not in expected.reason(fall._replace(both=0.8), 2.5)
+    assert "VSP" not in expected.reason(fall._replace(single=0.0), 2.5)
+
+
+def test_targets_are_for_the_runs_that_they_name():
+    assert expected.wanted("surge", STEERED) == 4.0
+    assert expected.wanted("surge", BY_HAND) is None
+    assert expected.wanted("yaw", BY_HAND) == expected.wanted("yaw", STEERED) == 2.5
+
+
+def found(*effects, suspects=()):
+    made = []
+    for name, value, alike in effects:
+        coefficient = {"delay": SimpleNamespace(value=value)}
+        made.append(SimpleNamespace(id=name, coefficients=coefficient, indistinguishable=alike))
+    named = [SimpleNamespace(name=n, value=v) for n, v in suspects]
+    return SimpleNamespace(effects=made, suspect_coefficients=named)
+
+
+def test_expectations_say_what_came():
+    full = found(
+        ("curve_vsp_x(c)", 0.0, []), ("delay", 0.4, []), ("N_r", 1.0, []), suspects=[("Y_r", 0.566)]
+    )
+    early = found(("deadband", 0.0, ["thrust_curve"]), ("delay", 0.1, []))
+    rows = expected.expectations([full, early, found(("lag", 0.3, []))])
+    assert [row.came for row in rows] == [
+        ["curve_vsp_x(c)", "only as indistinguishable (thrust_curve)", "no"],
+        ["Y_r = 0.566", "no", "no"],
+        ["N_r", "no", "no"],
+        ["0.4 s", "0.1 s, not as expected", "no; lag in its place"],
+    ]
+
+
+def test_error_of_a_model_that_runs_away():
+    assert ship_tables.window_error(0.0123, 1000.0) == "12.3"
+    assert ship_tables.window_error(float("inf"), 1000.0) == "runs away"
+    assert ship_tables.window_error(float("nan"), 1000.0) == "–"
+
+
+# The whole
+
+
+def measure(folder, seeds=(1, 2), seconds=64.0):
+    """Files as NTNU's of a ship with a thrust curve, and pulls of its propellers."""
+    for part in ("cse1", "cse1_static"):
+        (folder / part).mkdir()
+    for seed in seeds:
+        run, _ = sail(seconds, h=0.05, thrusters=CURVE, seed=seed)
+        x, y, psi = run.pose.T
+        none = np.zeros_like(x)
+        settings = none + 0.4, none + 0.5
+        rows = [run.time, x + seed, y, none, none, none, psi, *five(run).T, *settings]
+        savemat(folder / "cse1" / f"run{seed}.mat", {"cse1_data": np.array(rows)})
+    pulls = {"pitch": COMMANDS, "F_per_vsp": bollard.surge_force(Model().plus(CURVE), COMMANDS)}
+    pd.DataFrame(pulls).to_csv(folder / bollard.PULLS, index=False)
+
+
+def test_report_has_all_that_was_learned(tmp_path, monkeypatch):
+    measure(tmp_path)
+    model = Model().plus(CURVE)
+    sure = {name: (value - 0.1, value + 0.1) for name, value in CURVE.items()}
+    finding = Finding("thrust_curve", CURVE, sure, 0.9, ["deadband"], 0.8, 0.8, model)
+    told = Learned([finding], [], model, [Suspect("Y_r", 74.0, 0.5)])
+    sound = SimpleNamespace(
+        nominal_min_dissipation=0.1,
+        learned_min_dissipation=0.2,
+        bounded=True,
+        region=None,
+        mass_definite=True,
+        notes=(),
+    )
+    monkeypatch.setattr(session, "learn", lambda *_: told)
+    monkeypatch.setattr(session, "check", lambda *_: sound)
+    report = measured_ship.study(tmp_path, tmp_path / "out", 1.0, quick=False)
+    text = report.read_text(encoding="utf-8")
+    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    assert set(results["diagnoses"]) == {"without run1", "without run2", "all runs"}
+    assert "| `thrust_curve` |" in text
+    assert "Y_r = 0.5 (z = 74.0)" in text
+    nominal, learned = (results["bollard"]["differences"][n]["rms"] for n in ("nominal", "all runs"))
+    assert learned == pytest.approx(0.0, abs=1e-12)
+    assert nominal > 0.1
+    assert "RMS difference to the pulls at |pitch| ≤ 0.7: 0.000 N" in text
+    pictures = [line.split("(")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
+    assert sorted(pictures) == ["bollard.png", "omega_run1.png", "omega_run2.png"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {*pictures, "report.md", "results.json"}
+
+
+def test_folders_without_runs_or_pulls(tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="no bollard pulls"):
+        measured_ship.study(tmp_path, out, 1.0, quick=False)
+    measure(tmp_path, seeds=(1,))
+    with pytest.raises(InputError, match="one run alone"):
+        measured_ship.study(tmp_path, out, 1.0, quick=False)
+    assert not out.exists()
+
+
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "studies.measured_ship",
+        tmp_path / "nowhere",
+        "--out",
+        tmp_path / "out",
+    ]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("error: no bollard pulls")
+    assert ended.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@needs_data
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_real_ship_is_explained_where_it_was_not_learned_from(tmp_path):
+    report = measured_ship.study(DATA, tmp_path, 1.0, quick=True)
+    results = json.loads(report.with_name("results.json").read_text(encoding="utf-8"))
+    axes = results["falls"]["dptest1"]["axes"]
+    assert axes["surge"]["out"] > 2.0
+    assert min(axis["out"] for axis in axes.values()) > 1.0
+    found = results["bollard"]["differences"]
+    assert found["all runs"]["rms"] < found["nominal"]["rms"]
