@@ -1,6 +1,6 @@
 """``python -m diagnosis`` tells which commands there are."""
 
-import sys
+from cosim.command import run_command
 
 COMMANDS = """Holds a ship model against measurements, and learns what it lacks.
 
@@ -9,6 +9,12 @@ COMMANDS = """Holds a ship model against measurements, and learns what it lacks.
 
 Each tells more with --help; docs/diagnosis.md tells what the numbers mean."""
 
-if __name__ == "__main__":
+
+def main() -> int:
+    """Print them; returns the exit code."""
     print(COMMANDS)
-    sys.exit(0)
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(main)
