@@ -67,6 +67,7 @@ GRIDS: dict[str, tuple[str, tuple[float, ...], tuple[str, ...]]] = {
 }
 # kg, kg, kg, kg m2: heavier by about half of what moves along each axis.
 HEAVY = {"mass": 7.0, "added_mass_X": 8.0, "added_mass_Y": 12.0, "added_mass_N": 1.4}
+MOMENTS = 150
 SATURATIONS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 # An effect that is not straight, but nearly so where it is small.
 NEARLY = ("current",)
@@ -91,6 +92,11 @@ def shape(
     columns = [(start - evaluate(data, model.plus({**given, name: step}))) / step for name in free]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
     return Shape(dict(given), list(free), base - start if given else None, stacked)
+
+
+def moments_apart(data: Sequence[Integrals]) -> float:
+    """Time between two moments [s] at which a failure is tried: long runs must not take more memory."""
+    return max(5.0, float(max(w.run.time[-1] for w in data)) / MOMENTS)
 
 
 def stiffness(e: Effect, base: np.ndarray, columns: np.ndarray) -> np.ndarray | None:
@@ -119,8 +125,8 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
         name, values, free = GRIDS[e.id]
         shapes = [shape(data, model, base, {name: v} if v else {}, free) for v in values]
     elif e.id == "bow_failure":
-        longest = max(w.run.time[-1] for w in data)
-        times = np.arange(5.0, longest, 5.0)
+        spacing = moments_apart(data)
+        times = np.arange(spacing, max(w.run.time[-1] for w in data), spacing)
         shapes = [shape(data, model, base, {"bow_failure_time": float(t)}, ()) for t in times]
     elif e.id == "saturation":
         most = {"saturation_vsp": 1.165, "saturation_bow": 2.629}

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from fmus.declare import Variable
 from fmus.effects import EFFECTS
 
-from .library import NOMINAL, Shape, beliefs, evaluate
+from .library import NOMINAL, Shape, beliefs, evaluate, moments_apart
 from .model import Model
 from .ranking import RIDGE
 from .table import OVERLAP, Doubt
@@ -215,7 +215,8 @@ def moment(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:
         return refine(p, at, doubt, replace(begin, values={MOMENT: max(time, MOMENT_STEPS[-1])}))
 
     all_tried = [tried(begin.values[MOMENT])]
-    for size in MOMENT_STEPS:
+    apart = moments_apart(p.data)
+    for size in (*([apart / 5.0] if apart / 5.0 > MOMENT_STEPS[0] else []), *MOMENT_STEPS):
         middle = best(all_tried).point.values[MOMENT]
         all_tried += [tried(middle + k * size) for k in range(-5, 6)]
     found = best(all_tried)

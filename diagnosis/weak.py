@@ -22,7 +22,8 @@ from .smoothing import Smoothed
 
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
-BLOCK = 15.0  # s
+BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
+BLOCKS = 64
 MEASURED = [p.name for e in EFFECTS.values() if e.kind == "measurement" for p in e.parameters]
 
 
@@ -46,7 +47,7 @@ class Integrals:
     Attributes:
         smoothed: the run.
         middle: (K,) [s].
-        block: (K,), number of the 15 s block that the middle lies in.
+        block: (K,), number of the block that the middle lies in.
         smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
             times one that is held from each sample to the next.
         memory: parts of the model error that were computed lately.
@@ -110,6 +111,7 @@ def integrals(smoothed: Smoothed) -> Integrals:
     after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
     gap = np.gradient(t)[columns]
     shape = (middles.size, t.size)
+    block = max(BLOCK, float(t[-1] - t[0]) / BLOCKS)
 
     def matrix(values: np.ndarray) -> csr_matrix:
         return csr_matrix((values, (rows, columns)), shape=shape)
@@ -117,7 +119,7 @@ def integrals(smoothed: Smoothed) -> Integrals:
     return Integrals(
         smoothed,
         middles,
-        np.floor((middles - t[0]) / BLOCK).astype(int),
+        np.floor((middles - t[0]) / block).astype(int),
         matrix(kernel(s) / half * gap),
         matrix(-kernel_rate(s) / half**2 * gap),
         matrix(kernel_integral(after) - kernel_integral(s)),
