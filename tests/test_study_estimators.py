@@ -127,13 +127,15 @@ def test_data_that_is_none_ends_in_exit_code_2(tmp_path, capsys):
 
 @needs_data
 def test_measured_runs_can_be_read():
+    full_ahead = []
     for path in basin.files(DATA):
         log = basin.read(path)
         assert 0.8 < basin.valid(log).mean() < 1.0
         assert np.median(np.diff(log["time"])) == pytest.approx(0.05, abs=1e-3)
-        assert np.abs(log["observer.tau_X"]).max() == pytest.approx(2.33, rel=0.01), "full ahead, once"
+        full_ahead.append(np.abs(log["observer.tau_X"]).max())
         moving = basin.reference(log)["u"]
         assert 0.005 < np.nanstd(moving) < 0.5
+    assert max(full_ahead) == pytest.approx(2.33, rel=0.01), "once, by one run at full power"
 
 
 @needs_data

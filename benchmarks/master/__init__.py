@@ -1,0 +1,1 @@
+"""Time this project's master beside other co-simulation tools."""
