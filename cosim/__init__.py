@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .errors import InputError, SimulationError
+    from .files import whole
     from .log import read_log
     from .scenario import Scenario, load_scenario
     from .simulation import Result, simulate
@@ -30,6 +31,7 @@ __all__ = [
     "read_log",
     "read_parameters",
     "simulate",
+    "whole",
     "write_parameters",
 ]
 
@@ -44,6 +46,7 @@ _HOME = {
     "Parameter": "ssv",
     "ParameterSet": "ssv",
     "read_parameters": "ssv",
+    "whole": "files",
     "write_parameters": "ssv",
 }
 

@@ -1,16 +1,14 @@
 """The log of a run: written as it goes, so that whatever ends the run leaves a readable file."""
 
-import json
-import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import orjson
 
 from .errors import InputError, nearest
+from .files import whole
 
 CSV = "log.csv"
 PARQUET = "log.parquet"
@@ -63,34 +61,14 @@ def _header(line: str) -> list[str]:
     return next(csv.reader([line]))
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write a JSON file so that it is never half there."""
-    write_whole(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file so that it is never half there."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def to_parquet(folder: Path) -> Path:
     """Turn the CSV log of a folder into Parquet; the CSV goes only when the new file is whole."""
     from pyarrow import csv, parquet
 
-    target = folder / PARQUET
-    part = folder / f".{PARQUET}.{os.getpid()}.part"
-    try:
-        parquet.write_table(csv.read_csv(folder / CSV), part)
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole(folder / PARQUET) as scratch:
+        parquet.write_table(csv.read_csv(folder / CSV), scratch)
     (folder / CSV).unlink()
-    return target
+    return folder / PARQUET
 
 
 def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:

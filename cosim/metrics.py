@@ -6,7 +6,6 @@ one-dimensional array; the columns are those of ``log.csv``.
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from rich.table import Table
 
 from .command import Output, run_command
 from .errors import InputError
+from .files import whole
 from .log import CSV, SIDECAR, read_log
 
 Log = Mapping[str, np.ndarray]
@@ -290,8 +290,7 @@ def table(metrics: Mapping[str, float]) -> Table:
 
 def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
     """Write columns as CSV, whole or not at all."""
-    scratch = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    try:
+    with whole(file) as scratch:
         np.savetxt(
             scratch,
             np.column_stack(list(columns.values())),
@@ -300,9 +299,6 @@ def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
             header=",".join(columns),
             comments="",
         )
-        os.replace(scratch, file)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def _parser() -> argparse.ArgumentParser:

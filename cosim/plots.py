@@ -7,7 +7,6 @@ or leaves global state behind.
 """
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from .command import run_command
 from .errors import InputError
+from .files import whole
 from .log import read_log
 from .metrics import (
     AXES,
@@ -224,12 +224,8 @@ def _save(figure: "Figure", file: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
-    scratch = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-    try:
+    with whole(file) as scratch:
         figure.savefig(scratch, format="png", dpi=DPI)
-        os.replace(scratch, file)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def _along(

@@ -18,6 +18,7 @@ import numpy as np
 from . import log as logs
 from . import metrics, plots
 from .errors import InputError, SimulationError
+from .files import write_json
 from .master import Master, Table, quiet_collector
 from .scenario import Scenario
 from .ssv import read_parameters
@@ -226,7 +227,7 @@ def simulate(
         except SimulationError as error:
             _clear(folder, show)
             failure = {**_describe(system), "status": "failed", "rows": 0, "message": str(error)}
-            logs.write_json(folder / logs.SIDECAR, failure)
+            write_json(folder / logs.SIDECAR, failure)
             return Result("failed", folder, message=str(error), warnings=system.warnings)
         try:
             _clear(folder, show)
@@ -268,7 +269,7 @@ def _record(
     result = Result("running", folder, warnings=system.warnings)
     sidecar = _describe(system)
     try:
-        logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
+        write_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
         recorder = Recorder(system, master, folder)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
@@ -296,7 +297,7 @@ def _record(
     if result.message:
         sidecar["message"] = result.message
     with _disk(result):
-        logs.write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
+        write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
     return result, recorder
 
 
@@ -394,7 +395,7 @@ def _finish(
     try:
         result.metrics = metrics.compute(columns, window.start, window.stop)
         with _disk(result):
-            logs.write_json(result.folder / logs.METRICS, result.metrics)
+            write_json(result.folder / logs.METRICS, result.metrics)
     except metrics.MetricsError as error:
         show(f"note: no metrics: {error}")
     if pictures and result.status != "interrupted":

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from .archive import check_xml
 from .errors import InputError
-from .log import write_whole
+from .files import write_text
 from .units import BASE, Unit, conversion
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -168,7 +168,7 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
         _write_entries(SubElement(annotations, f"{{{SSC}}}Annotation", type=BESIDE), content.beside)
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
-    write_whole(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+    write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
 def _write_entries(parent: Element, entries: Mapping[str, Parameter]) -> None:

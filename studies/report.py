@@ -4,11 +4,12 @@ import json
 import math
 import os
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from cosim import whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,17 +17,6 @@ if TYPE_CHECKING:
 REPORT, RESULTS = "report.md", "results.json"
 PACKAGES = ("cybership", "numpy", "scipy", "matplotlib")
 DPI = 150
-
-
-@contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """A scratch path that takes the place of ``path`` when all went well: no file is half there."""
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield scratch
-        os.replace(scratch, path)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def machine() -> str:

@@ -7,7 +7,7 @@ import pytest
 
 import cosim
 from studies.command import study_parser
-from studies.report import Report, seeds_line, whole
+from studies.report import Report, seeds_line
 from studies.runs import Interval, interval, paired, ratio, run_all, shipped, vary, without
 
 
@@ -102,7 +102,7 @@ def test_what_fails_half_way_leaves_the_file_of_before(tmp_path):
     path.write_text("before")
 
     def fail():
-        with whole(path) as scratch:
+        with cosim.whole(path) as scratch:
             scratch.write_text("half")
             raise RuntimeError("stopped half way")
 

@@ -1,11 +1,12 @@
 """Puts the report together: what is in the JSON file in words and tables, and the figures."""
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+import cosim
 
 from ..evidence import Evidence
 from . import figures, tracks, words
@@ -80,12 +81,8 @@ def write_report(
         where=words.sentences(result.get("where")),
         provenance=[(label, result[k]) for k, label in PROVENANCE.items() if result.get(k) is not None],
     )
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    with cosim.whole(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
-        os.replace(scratch, path)
-    finally:
-        scratch.unlink(missing_ok=True)
     return path
 
 
