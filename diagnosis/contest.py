@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from .library import Candidate, evaluate, library
-from .ranking import Judged, Pieces, judge, pieces
+from .library import NOMINAL, Candidate, evaluate, library
+from .ranking import RIDGE, Judged, Pieces, judge, pieces
 from .refining import MOMENT, Point, Problem, Refined, Start, doubts, polished, settled
 from .table import Doubt, Table, noise, table
 
@@ -19,6 +19,8 @@ CONTENDERS = 8
 SEPARATION = 0.05
 WEIGHINGS = 4
 CHANGED = 1.5
+# A candidate of whose force less than this is new beside what was found only pulls that to and fro.
+NEW = 1e-3
 # A free shape that can do what a plain effect does is not listed as another explanation of it.
 FREE_SHAPE = 5
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
@@ -66,8 +68,28 @@ def weighed(
 ) -> Step:
     """Judge candidates with an error counted in units of sigma (3,) [N, N, N m]."""
     wide = table(base, p.blocks, found, doubt, sigma)
-    order = in_order([judge(wide, k, len(c.shapes)) for k, c in enumerate(found)])
+    free = len(doubt.moved) - len(NOMINAL)
+    new = [k for k in range(len(found)) if novelty(wide, k, free) > NEW]
+    order = in_order([judge(wide, k, len(found[k].shapes)) for k in new])
     return Step(base, doubt, wide, found, order, judge(wide, -1, 1))
+
+
+def novelty(t: Table, candidate: int, free: int) -> float:
+    """Share of a straight candidate's force that what was found cannot give, set freely; else 1.
+
+    Args:
+        t: the table it stands in.
+        candidate: its number.
+        free: how many parameters of what was found are fitted along, the first of all that are.
+    """
+    offset, mine = t.place[candidate, 0]
+    if free == 0 or offset >= 0 or not mine:
+        return 1.0
+    its = t.doubt[:free]
+    own, gram, across = t.total[mine][:, mine], t.total[its][:, its], t.total[its][:, mine]
+    gram = gram + RIDGE * np.diag(np.diag(gram) + 1.0)
+    left = np.diag(own - across.T @ np.linalg.solve(gram, across))
+    return float(np.max(left / np.maximum(np.diag(own), 1e-12)))
 
 
 def in_order(judged: Sequence[Judged]) -> list[Judged]:

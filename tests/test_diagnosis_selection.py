@@ -5,7 +5,9 @@ import pytest
 from measured import sail
 
 from diagnosis import clean, smooth
+from diagnosis.contest import NEW, candidates, novelty
 from diagnosis.model import Model
+from diagnosis.refining import Point, Problem
 from diagnosis.selection import learn
 from diagnosis.weak import integrals, kernel, kernel_integral, kernel_rate, omega
 from fmus.effects import EFFECTS
@@ -101,3 +103,20 @@ def test_coefficients_within_the_prior_are_no_finding():
     off = {"X_u": -0.6, "Y_v": -1.45, "N_r": -2.0, "Y_r": -6.9}
     w, _ = data(ship=off)
     assert list(learn([w], prior=0.1).findings) == []
+
+
+def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
+    """A loss of surge force is a straight curve; what needs the yaw moment or the speed is not."""
+    w, _ = data()
+    effect = EFFECTS["curve_vsp_x(c)"]
+    names = [p.name for p in effect.parameters if p.name in effect.coefficients]
+    curve = dict(zip(names, 0.1 * np.linspace(-1.0, 1.0, len(names)) ** 3, strict=True))
+    at = Point(Model(), curve, stiff=np.zeros((len(names), len(names))))
+    step = candidates(Problem([w], w.block, None, 0.1), at, {effect.id})
+    new = {c.effect.id: novelty(step.wide, k, len(names)) > NEW for k, c in enumerate(step.candidates)}
+    assert not new["loss_surge"]
+    assert new["loss_yaw"]
+    assert new["X_u"]
+    assert new["curve_vsp_y(c)"]
+    assert {step.candidates[j.candidate].effect.id for j in step.order} == {e for e in new if new[e]}
+    assert all(novelty(step.wide, k, 0) == 1.0 for k in range(len(new))), "beside nothing all is new"
