@@ -15,7 +15,7 @@ from .errors import SimulationError
 if TYPE_CHECKING:
     from .fmu import Instance, Variable
 
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
+WARNING, DISCARD, ERROR, FATAL, PENDING = 1, 2, 3, 4, 5
 INT_LIMIT = 2**31
 
 _SETTERS = {

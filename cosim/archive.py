@@ -21,6 +21,7 @@ DEVICE = re.compile(
     r"(con|prn|aux|nul|conin\$|conout\$|com[0-9¹²³]|lpt[0-9¹²³])\s*(\.|$)", re.IGNORECASE
 )
 ENCRYPTED = 0x1
+XML = (".xml", ".ssd", ".ssv", ".ssm")
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,14 @@ class Limits:
         files: entries.
         size: of all entries together, unpacked [bytes].
         ratio: of that size to the size of the archive; does not count below ``always`` [bytes].
+        xml: of one XML file, which takes many times as much memory to read [bytes].
     """
 
     files: int = 50_000
     size: int = 4 * 2**30
     ratio: float = 200.0
     always: int = 64 * 2**20
+    xml: int = 128 * 2**20
 
 
 LIMITS = Limits()
@@ -71,6 +74,10 @@ def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
             f"and {limits.ratio:g} times the size of the archive)"
         )
     for entry in entries:
+        if entry.file_size > limits.xml and entry.filename.lower().endswith(XML):
+            raise InputError(
+                f"'{path}' is refused: its {entry.filename[:100]} is larger than {limits.xml} bytes"
+            )
         if reason := _fault(entry):
             raise InputError(f"'{path}' is refused: its entry {entry.orig_filename[:100]!r} {reason}")
     if clash := _clash([entry.filename for entry in entries]):

@@ -17,6 +17,11 @@ MOVE_HEAD = struct.Struct("<Bd")
 PUT, STEP, GET = 1, 2, 4
 
 _FRAME = struct.Struct("<BI")
+LONGEST = 2**28  # bytes of a frame
+
+
+class GarbledError(Exception):
+    """What arrived is no frame: somebody else has written to the pipe."""
 
 
 class Channel:
@@ -47,11 +52,14 @@ class Channel:
 
         Raises:
             EOFError: the other end is gone.
+            GarbledError: what arrived is no frame.
         """
         head = self._reader.read(_FRAME.size)
         if len(head) < _FRAME.size:
             raise EOFError
         kind, length = _FRAME.unpack(head)
+        if kind > LOG or length > LONGEST:
+            raise GarbledError
         body = self._reader.read(length) if length else b""
         if len(body) < length:
             raise EOFError

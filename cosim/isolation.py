@@ -16,7 +16,7 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from .access import WARNING, Access, Memory, Port
-from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
+from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
 from .errors import InputError, SimulationError
 from .fmu import Model, Variable
 
@@ -108,8 +108,12 @@ class IsolatedInstance:
             self._give_up()
         self._talking = False
 
-    def _answer(self) -> bytes:
-        """Await the answer to what was asked, and pass on what the FMU logs meanwhile."""
+    def _answer(self, length: int | None = None) -> bytes:
+        """Await the answer to what was asked, and pass on what the FMU logs meanwhile.
+
+        Args:
+            length: of the answer [bytes]; None if any will do.
+        """
         if self._lost:
             raise SimulationError(self._lost)
         self._talking = True
@@ -117,33 +121,44 @@ class IsolatedInstance:
         try:
             kind, body = self._channel.receive()
             while kind == LOG:
-                self._on_message(self.name, *json.loads(body))
+                status, text = json.loads(body)
+                self._on_message(self.name, status, text)
                 kind, body = self._channel.receive()
+            complaint = "" if kind == DONE else body.decode()
+            if kind == DONE and length not in (None, len(body)):
+                raise GarbledError
         except EOFError:
             self._give_up()
+        except (GarbledError, ValueError):
+            self._give_up(is_garbled=True)
         self._waiting_since = None
         what, self._talking, self._asked = self._asked, False, ""
         if kind == DONE:
             return body
         if what == START:
-            self._lost = body.decode()  # nothing there to be terminated or freed
-        raise (InputError if kind == REFUSED else SimulationError)(body.decode())
+            self._lost = complaint  # nothing there to be terminated or freed
+        raise (InputError if kind == REFUSED else SimulationError)(complaint)
 
-    def _give_up(self) -> NoReturn:
-        """The process is gone: tell why.
+    def _give_up(self, is_garbled: bool = False) -> NoReturn:
+        """The process is gone, or can no longer be understood: tell why.
 
         Raises:
             SimulationError: always.
         """
         self._waiting_since = None
         self._closed.set()
+        if is_garbled:
+            self._kill()
         try:
             code = self._process.wait(PATIENCE)
         except subprocess.TimeoutExpired:  # closed its pipes and lives on
             self._kill()
             code = self._process.wait()
+        self._kill()
         if self._is_late:
             how = f"{self._asked} took longer than {self._allowed():g} s; its process was ended"
+        elif is_garbled:
+            how = f"it wrote into the pipe to the master in {self._asked}; its process was ended"
         else:
             how = f"its process died in {self._asked} ({_reason(code)})"
         self._lost = f"{self.name}: {how}"
@@ -151,7 +166,12 @@ class IsolatedInstance:
 
     def _call(self, what: str, name: str, *arguments: Any) -> Any:
         self._send(what, CALL, json.dumps([name, *arguments]).encode())
-        return json.loads(self._answer())
+        answer = self._answer()
+        try:
+            return json.loads(answer)
+        except ValueError:
+            self._asked = what
+            self._give_up(is_garbled=True)
 
     def set_value(self, variable: Variable, value: float | int | bool | str) -> None:
         """Set one variable, outside the step loop."""
@@ -192,7 +212,7 @@ class IsolatedInstance:
 
         def get() -> None:
             move("getting its outputs", GET, 0.0)
-            own_outputs[:] = self._answer()
+            own_outputs[:] = self._answer(len(own_outputs))
 
         def begin(t: float) -> None:
             move(f"the step from t = {t} s", STEP, t)
@@ -200,7 +220,7 @@ class IsolatedInstance:
         def step(t: float) -> None:
             if not self._asked:
                 begin(t)
-            own_outputs[:] = self._answer()
+            own_outputs[:] = self._answer(len(own_outputs))
 
         return Access(put, get, step, begin)
 
@@ -223,11 +243,10 @@ class IsolatedInstance:
             with suppress(OSError):
                 if pipe is not None:
                     pipe.close()
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            self._kill()
-            self._process.wait()
+        self._kill()  # if only what the FMU has started
+        self._process.wait()
 
 
 def _stretch(ports: Sequence[Port], memory: Memory) -> memoryview:

@@ -3,6 +3,7 @@
 import gc
 import importlib.metadata
 import math
+import os
 import signal
 import threading
 import time
@@ -161,14 +162,16 @@ class Recorder:
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Turns Ctrl-C and a termination request into a flag that the loop reads between steps.
 
-    An exception would surface inside whatever FMU happens to run. A second Ctrl-C acts as usual.
+    An exception would surface inside whatever FMU happens to run. A second one, of any kind, acts as
+    Ctrl-C usually does.
     """
     asked = False
 
     def ask(number: int, frame: Any) -> None:
         nonlocal asked
         asked = True
-        signal.signal(number, signal.default_int_handler)
+        for each in numbers:
+            signal.signal(each, signal.default_int_handler)
 
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
@@ -213,6 +216,10 @@ def simulate(
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
+    # FMUs may go to another folder, and are not followed there.
+    here = os.getcwd()
+    given = Path(out) if out is not None else Path("results") / scenario.name
+    folder = Path(os.path.abspath(given))
     system = prepare(scenario, overrides, native)
     try:
         for note in scenario.notes:
@@ -221,14 +228,13 @@ def simulate(
             show(f"warning: {warning}")
         if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
             raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
-        folder = Path(out) if out is not None else Path("results") / scenario.name
         try:
             master = Master(system, lambda text: show(f"warning: {text}"))
         except SimulationError as error:
             _clear(folder, show)
             failure = {**_describe(system), "status": "failed", "rows": 0, "message": str(error)}
             write_json(folder / logs.SIDECAR, failure)
-            return Result("failed", folder, message=str(error), warnings=system.warnings)
+            return Result("failed", given, message=str(error), warnings=system.warnings)
         try:
             _clear(folder, show)
             result, recorder = _record(system, master, folder, realtime, progress)
@@ -236,7 +242,9 @@ def simulate(
             master.close()
     finally:
         system.close()
+        os.chdir(here)
     _finish(system, result, recorder, pictures, show)
+    result.folder = given
     return result
 
 
@@ -273,31 +281,36 @@ def _record(
         recorder = Recorder(system, master, folder)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
-    with interruptible() as interrupted:
-        pace: Pace | None = None
-        try:
-            with quiet_collector():
-                # Not before: collecting what is there takes several steps' time.
-                pace = None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
-                stopped = _loop(system, master, recorder, pace, interrupted, progress)
-            result.status = "interrupted" if stopped else "done"
-        except (SimulationError, OSError, KeyboardInterrupt) as error:
-            with suppress(SimulationError, OSError):
-                recorder.flush()
-            # Whoever asks twice may hit an FMU in the middle of its step.
-            result.status = "interrupted" if interrupted() else "failed"
-            result.message = str(error)
-    recorder.close()
-    result.rows = sidecar["rows"] = recorder.rows
-    if pace is not None:
-        result.pace = sidecar["realtime"] = pace.summary()
-    sidecar["messages"] = [
-        {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
-    ]
-    if result.message:
-        sidecar["message"] = result.message
-    with _disk(result):
-        write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
+    pace: Pace | None = None
+    result.status = "failed"  # whatever may end it, until it is known better
+    try:
+        with interruptible() as interrupted:
+            try:
+                with quiet_collector():
+                    # Not before: collecting what is there takes several steps' time.
+                    pace = (
+                        None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
+                    )
+                    stopped = _loop(system, master, recorder, pace, interrupted, progress)
+                result.status = "interrupted" if stopped else "done"
+            except (SimulationError, OSError, KeyboardInterrupt) as error:
+                # Whoever asks twice may hit an FMU in the middle of its step.
+                result.status = "interrupted" if interrupted() else "failed"
+                result.message = str(error)
+    finally:
+        with suppress(SimulationError, OSError):
+            recorder.flush()
+        recorder.close()
+        result.rows = sidecar["rows"] = recorder.rows
+        if pace is not None:
+            result.pace = sidecar["realtime"] = pace.summary()
+        sidecar["messages"] = [
+            {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
+        ]
+        if result.message:
+            sidecar["message"] = result.message
+        with _disk(result):
+            write_json(folder / logs.SIDECAR, {**sidecar, "status": result.status})
     return result, recorder
 
 

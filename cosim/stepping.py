@@ -7,15 +7,17 @@ the step is done again in shorter ones.
 from __future__ import annotations
 
 import ctypes
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from .access import DISCARD
+from .access import DISCARD, PENDING
 
 if TYPE_CHECKING:
     from .fmu import Instance
 
-LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # of fmi2StatusKind
+DO_STEP_STATUS, LAST_SUCCESSFUL_TIME, TERMINATED = 0, 2, 3  # of fmi2StatusKind
+GLANCE = 1e-4  # s between two questions whether a step is over
 # Shorter steps in place of one, before the FMU is believed that it cannot go on.
 MOST_TRIES = 60
 
@@ -35,7 +37,8 @@ def plain(instance: Instance, h: float) -> Callable[[float], None]:
 
     def step(t: float) -> None:
         now.value = t
-        if (status := do_step(*arguments)) >= DISCARD:
+        status = do_step(*arguments)
+        if status >= DISCARD and (status := _awaited(instance, status)) >= DISCARD:
             _refuse(instance, t, status)
 
     return step
@@ -54,6 +57,7 @@ def redoing(instance: Instance, h: float) -> Callable[[float], None]:
         while True:
             # The last argument promises that the FMU will not be set back.
             status = do_step(component, ctypes.c_double(t), ctypes.c_double(length), int(not saved))
+            status = _awaited(instance, status)
             if status < DISCARD:
                 if goal == end:
                     return
@@ -70,6 +74,16 @@ def redoing(instance: Instance, h: float) -> Callable[[float], None]:
             length = goal - t
 
     return step
+
+
+def _awaited(instance: Instance, status: int) -> int:
+    """What became of a step that the FMU may still be doing, after fmi2DoStep has returned."""
+    component, found = ctypes.c_void_p(instance.component), ctypes.c_int(status)
+    ask = instance.function("fmi2GetStatus")
+    while found.value == PENDING and ask(component, DO_STEP_STATUS, ctypes.byref(found)) < DISCARD:
+        if found.value == PENDING:
+            time.sleep(GLANCE)
+    return found.value
 
 
 def _refuse(instance: Instance, t: float, status: int) -> None:

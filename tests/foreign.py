@@ -21,7 +21,7 @@ SOURCE = r"""
 typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
 typedef struct { Logger logger; void *(*allocate)(size_t, size_t); void (*release)(void *);
                  void *step_finished; void *environment; } Callbacks;
-typedef struct { double u, y, T; int steps; int on; double last; int done;
+typedef struct { double u, y, T; int steps; int on; double last; int done; int pending; double pending_step;
                  const Callbacks *callbacks; char name[64]; } Lag;
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -67,7 +67,13 @@ int fmi2DoStep(void *c, double t, double h, int no_set) {
     return 0;
 }
 int fmi2CancelStep(void *c) { return 3; }
-int fmi2GetStatus(void *c, int k, int *v) { return 2; }
+int fmi2GetStatus(void *c, int k, int *v) { /* of a step in its own time: ready at the third question */
+    Lag *m = c;
+    if (k != 0 || !m->pending) return 2;
+    if (--m->pending) { *v = 5; return 0; }
+    m->y += m->pending_step / m->T * (m->u - m->y); m->steps++;
+    *v = 0; return 0;
+}
 int fmi2GetRealStatus(void *c, int k, double *v) { *v = ((Lag *)c)->last; return k == 2 ? 0 : 2; }
 int fmi2GetIntegerStatus(void *c, int k, int *v) { return 2; }
 int fmi2GetBooleanStatus(void *c, int k, int *v) { *v = ((Lag *)c)->done; return k == 3 ? 0 : 2; }

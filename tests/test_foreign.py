@@ -1,6 +1,8 @@
 """An FMU that is no Python: a first-order lag in C, compiled here, run beside ours."""
 
+import json
 import zipfile
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -121,6 +123,31 @@ def test_step_is_halved_where_the_fmu_does_not_tell_how_far_it_got(tmp_path):
     assert cosim.read_log(tmp_path / "out")["lag.steps"][-1] > 4 + 6 * 3
 
 
+@pytest.mark.parametrize("capabilities", [ANY_STEP, f"{ANY_STEP} {STATE}"])
+def test_step_that_goes_on_after_the_call_is_awaited(tmp_path, capabilities):
+    habit = "m->pending = 3; m->pending_step = h; return 5;"
+    asynchronous = f'canRunAsynchronuously="true" {capabilities}'  # as the standard spells it
+    logs = []
+    for name, how in (("plain", ""), ("late", habit)):
+        fmu = build_lag(tmp_path, name, how, asynchronous)
+        content = alone(fmu) | {"name": name}
+        assert cosim.simulate(cosim.load_scenario(content), tmp_path / name).status == "done"
+        logs.append((tmp_path / name / "log.csv").read_text())
+    assert logs[0] == logs[1]
+
+
+def test_fmu_that_goes_to_another_folder_is_not_followed(tmp_path, monkeypatch):
+    """Results stay in the folder that was meant when the run began."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    fmu = build_lag(tmp_path, "lag", 'if (chdir("/")) return 3;')
+    result = cosim.simulate(cosim.load_scenario(alone(fmu)))
+    assert result.status == "done"
+    assert result.folder == Path("results") / "alone"
+    assert Path.cwd() == tmp_path / "here"
+    assert {p.name for p in result.folder.iterdir()} == {"log.csv", "log.json"}
+
+
 @pytest.mark.parametrize("capabilities", [ANY_STEP, STATE])
 def test_discarded_step_that_cannot_be_done_again_tells_how_far_it_got(tmp_path, capabilities):
     fmu = build_lag(tmp_path, "lag", CORNER, capabilities)
@@ -164,7 +191,11 @@ def test_last_words_of_a_crashing_fmu_are_heard(tmp_path, capfd):
     assert capfd.readouterr().err.count("so it ends") == 1
 
 
-@pytest.mark.parametrize("habit", ["abort();", "raise(11);", "_exit(0);", "for (;;) sleep(1);"])
+# Into whatever is open, the pipe to the master too.
+RUBBISH = 'for (int f = 3; f < 50; f++) if (write(f, "rubbish", 7)) {}'
+
+
+@pytest.mark.parametrize("habit", ["abort();", "raise(11);", "_exit(0);", "for (;;) sleep(1);", RUBBISH])
 def test_compiled_fmu_that_crashes_or_hangs_is_one_message(tmp_path, habit):
     fmu = build_lag(tmp_path, "lag", f"if (t > 0.45) {{ {habit} }}")
     content = alone(fmu)
@@ -172,6 +203,7 @@ def test_compiled_fmu_that_crashes_or_hangs_is_one_message(tmp_path, habit):
     result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
     assert result.status == "failed"
     assert "the step from t = 0.5 s" in result.message
+    assert json.loads((tmp_path / "out" / "log.json").read_text())["status"] == "failed"
     assert len(cosim.read_log(tmp_path / "out")["time"]) == 6
 
 

@@ -204,6 +204,24 @@ def test_what_it_prints_goes_to_standard_error(plain_fmu, tmp_path):
     assert "to the world" not in done.stdout
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.parametrize("last", ["return True", "return t < 0.45", "os._exit(0)"])
+def test_what_an_fmu_has_started_ends_with_it(plain_fmu, tmp_path, last):
+    mark = tmp_path / "pid"
+    step = f"""
+        if t == 0.0:
+            if child := os.fork():
+                open({str(mark)!r}, "w").write(str(child))
+            else:
+                time.sleep(1000)
+        {last}
+    """
+    cosim.simulate(
+        cosim.load_scenario(one(plain_fmu(f"Forks{len(last)}", GAIN, step))), tmp_path / "out"
+    )
+    assert gone([int(mark.read_text())])
+
+
 @pytest.fixture
 def running(ellipse, plain_fmu, tmp_path):
     """A long run with an isolated observer and an isolated FMU that will hang at t = 10 s if told so."""
@@ -241,10 +259,11 @@ def test_interrupted_run_keeps_its_log_and_leaves_no_process(running, tmp_path):
     assert gone(workers)
 
 
-def test_second_interrupt_does_not_wait_for_an_fmu_that_hangs(running, tmp_path):
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
+def test_second_interrupt_does_not_wait_for_an_fmu_that_hangs(running, tmp_path, first):
     process, workers = running(hang=True)
-    for _ in range(2):
-        process.send_signal(signal.SIGINT)
+    for number in (first, signal.SIGINT):
+        process.send_signal(number)
         time.sleep(0.3)
     _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 
 import pytest
 from conftest import GAIN, ROOT
@@ -99,6 +100,9 @@ def test_bombs_are_refused_before_anything_is_unpacked(tmp_path):
     large = archive(tmp_path / "size.fmu", *((f"{k}", os.urandom(1000) * 1000) for k in range(9)))
     with pytest.raises(InputError, match="at most"):
         unpack(large, tmp_path / "out", small)
+    text = archive(tmp_path / "xml.fmu", ("modelDescription.xml", os.urandom(2000)))
+    with pytest.raises(InputError, match=r"modelDescription\.xml is larger than 1000 bytes"):
+        unpack(text, tmp_path / "out", replace(small, xml=1000))
     many = archive(tmp_path / "many.fmu", *(f"{k}" for k in range(11)))
     with pytest.raises(InputError, match="11 entries are more than 10"):
         unpack(many, tmp_path / "out", small)
