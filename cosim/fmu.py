@@ -263,10 +263,10 @@ class Instance:
         resources = folder / "resources"
         # pythonfmu undoes no escapes but that of the space.
         uri = f"file://{str(resources).replace(' ', '%20')}" if self.is_python else resources.as_uri()
-        # A module of the same name that is there already would be taken for the FMU's own.
-        script = folder / SLAVE_MODULE
-        module = script.read_text().strip() if self.is_python else ""
-        other = sys.modules.pop(module, None)
+        # Modules of the same names that are there already would be taken for the FMU's own, or for those
+        # of Python FMUs that it contains.
+        own = {script.read_text().strip() for script in folder.rglob(Path(SLAVE_MODULE).name)}
+        others = {name: sys.modules.pop(name) for name in own & sys.modules.keys()}
         component = self._fmu.fmi2Instantiate(
             self.name.encode(),
             fmi2.fmi2CoSimulation,
@@ -277,10 +277,9 @@ class Instance:
             fmi2.fmi2True,
         )
         self._fmu.component = component
-        if self.is_python:
+        if own:
             self.model.forget_modules()
-        if other is not None:
-            sys.modules[module] = other
+        sys.modules.update(others)
         if not component:
             why = f": {self.complaint}" if self.complaint else ""
             why += _tool_hint(self.model, folder)

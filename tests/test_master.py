@@ -326,7 +326,7 @@ def test_sidecar_says_what_ran(ellipse, tmp_path):
     sidecar = json.loads((tmp_path / "log.json").read_text())
     assert sidecar["status"] == "done"
     assert list(sidecar["columns"]) == list(log)
-    assert sidecar["columns"]["vessel.u"] == {"unit": "m/s", "description": "surge velocity"}
+    assert sidecar["columns"]["vessel.u"] == {"unit": "m/s", "description": "surge velocity, forward"}
     assert sidecar["seed"] == 0
     assert len(sidecar["fmus"]["vessel"]["sha256"]) == 64
     assert sidecar["order"] == ["vessel", "observer", "guidance", "controller", "thrusters"]
