@@ -205,7 +205,7 @@ def test_unknown_effect_names_the_nearest(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["X_u", "loss_yaw", "N_r"])
+@pytest.mark.parametrize("effect", ["loss_yaw", "N_r"])
 def test_hidden_effect_is_found(fmus, effect):
     row = trial(Cell((effect,), "n4", False, 0), fmus, False)
     assert row.in_set

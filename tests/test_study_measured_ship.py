@@ -260,10 +260,15 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path):
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_real_ship_is_explained_where_it_was_not_learned_from(tmp_path):
-    report = measured_ship.study(DATA, tmp_path, 1.0, quick=True)
+    """Two of the four runs; of the pulls only the shape counts, as their propeller speed is not known."""
+    (tmp_path / "cse1").mkdir()
+    (tmp_path / "cse1_static").symlink_to(DATA / "cse1_static")
+    for name in ("dptest1.mat", "dptest3.mat"):
+        (tmp_path / "cse1" / name).symlink_to(DATA / "cse1" / name)
+    report = measured_ship.study(tmp_path, tmp_path / "out", 1.0, quick=True)
     results = json.loads(report.with_name("results.json").read_text(encoding="utf-8"))
     axes = results["falls"]["dptest1"]["axes"]
     assert axes["surge"]["out"] > 2.0
     assert min(axis["out"] for axis in axes.values()) > 1.0
     found = results["bollard"]["differences"]
-    assert found["all runs"]["rms"] < found["nominal"]["rms"]
+    assert found["all runs"]["scaled"] < found["nominal"]["scaled"]
