@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from .table import Table
+from .table import Fold, Table
 
-FOLDS = 8
 RIDGE = 1e-9
 # Below this a column holds nothing on these data.
 NOTHING = 1e-12
@@ -126,22 +125,21 @@ class Judged:
 def judge(t: Table, candidate: int, shapes: int) -> Judged:
     """Cross-validated loss of a candidate, its shape chosen by the training part of each fold."""
     options = [pieces(t, candidate, k) for k in range(shapes)]
-    found = unseen(t, options, np.arange(len(t.grams)) % FOLDS)
-    by_run = unseen(t, options, t.runs) if len(np.unique(t.runs)) > 1 else found
+    found = unseen(t, options, t.by_block)
+    by_run = unseen(t, options, t.by_run) if len(t.by_run) > 1 else found
     whole = [o.fitted(t.total) for o in options]
     shape = int(np.argmin([float(w.loss(t.total)) + w.unlikely for w in whole]))
     charge = options[shape].size(t.total) * t.price + whole[shape].unlikely
     return Judged(candidate, shape, found, float(by_run.sum()), charge)
 
 
-def unseen(t: Table, options: Sequence[Pieces], fold: np.ndarray) -> np.ndarray:
+def unseen(t: Table, options: Sequence[Pieces], folds: Sequence[Fold]) -> np.ndarray:
     """Loss of each block by the fit, of the shape that does best, to all other folds (blocks,)."""
     found = np.empty(len(t.grams))
-    for f in np.unique(fold):
-        train = t.total - t.grams[fold == f].sum(axis=0)
+    for held, train in folds:
         fits = [o.fitted(train) for o in options]
         best = min(fits, key=lambda one, train=train: float(one.loss(train)) + one.unlikely)
-        found[fold == f] = best.loss(t.grams[fold == f])
+        found[held] = [best.loss(t.grams[k]) for k in held]
     return found
 
 

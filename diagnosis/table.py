@@ -6,6 +6,7 @@ Folds, bootstrap replicates and changes of the prior then cost next to nothing.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .library import Candidate
 OVERLAP = 4.0
 # Blocks are numbered from here on in each run.
 RUN = 10_000
+FOLDS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,13 @@ class Doubt:
     columns: np.ndarray
     stiff: np.ndarray
     moved: np.ndarray
+
+
+class Fold(NamedTuple):
+    """Blocks held out (h,), and the Gram matrix (p, p) of all others."""
+
+    held: np.ndarray
+    train: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +76,20 @@ class Table:
     def total(self) -> np.ndarray:
         """(p, p), over all blocks."""
         return self.grams.sum(axis=0)
+
+    @cached_property
+    def by_block(self) -> list[Fold]:
+        """Folds of blocks all over the runs."""
+        return self._folds(np.arange(len(self.grams)) % FOLDS)
+
+    @cached_property
+    def by_run(self) -> list[Fold]:
+        """Each run as a fold of its own."""
+        return self._folds(self.runs)
+
+    def _folds(self, number: np.ndarray) -> list[Fold]:
+        held = [np.flatnonzero(number == n) for n in np.unique(number)]
+        return [Fold(k, self.total - self.grams[k].sum(axis=0)) for k in held]
 
     @property
     def price(self) -> float:
