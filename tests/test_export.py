@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -121,10 +122,53 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
     assert [p.name for p in (tmp_path / "osp").iterdir()] == ["thesis.txt"]
     (tmp_path / "osp" / "thesis.txt").unlink()
     assert export(command) == 0
-    (tmp_path / "osp" / "stale.fmu").touch()
     assert export(command) == 0
-    assert not (tmp_path / "osp" / "stale.fmu").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["osp", "s.json"]
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "scenarios/mine.json", "empty/"])
+def test_an_osp_directory_with_a_file_of_somebody_is_not_replaced(chain, tmp_path, name):
+    folder = tmp_path / "osp"
+    write(chain, folder, export_osp)
+    (folder / name).mkdir() if name.endswith("/") else (folder / name).write_text("mine")
+    before = {path: path.stat() for path in folder.rglob("*")}
+    with pytest.raises(InputError, match=f"also holds {name.rstrip('/')}, which this export"):
+        write(chain, folder, export_osp)
+    assert {path: path.stat() for path in folder.rglob("*")} == before
+
+
+@pytest.mark.parametrize("suffix", ["ssp", "fmu", "osp"])
+def test_a_relative_path_is_as_good(chain, tmp_path, monkeypatch, suffix):
+    if suffix == "fmu":
+        need("container_jacobi")
+    monkeypatch.chdir(tmp_path)
+    kind = {"ssp": export_ssp, "fmu": export_fmu, "osp": export_osp}[suffix]
+    write(chain, Path(f"sub/system.{suffix}"), kind)
+    assert [path.name for path in (tmp_path / "sub").iterdir()] == [f"system.{suffix}"]
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "message"),
+    [
+        (".", {}, "is the working directory"),
+        ("sub/..", {}, "is the working directory"),
+        ("x" * 300, {}, "cannot be written: File name too long"),
+        ("x" * 300 + ".ssp", {}, "cannot be written: File name too long"),
+        ("osp", {"name": "n" * 260}, "'osp' cannot be written: File name too long: 'nnn"),
+    ],
+)
+def test_a_path_that_cannot_be_written_is_told(chain, tmp_path, monkeypatch, path, change, message):
+    work = tmp_path / "work"
+    (work / "sub").mkdir(parents=True)
+    write(chain, work / "osp", export_osp)
+    for part in (work / "osp").iterdir():
+        part.rename(work / part.name)
+    (work / "osp").rmdir()
+    before = sorted(work.rglob("*"))
+    monkeypatch.chdir(work)
+    with pytest.raises(InputError, match=message):
+        write(chain | change, Path(path), export_ssp if path.endswith(".ssp") else export_osp)
+    assert sorted(work.rglob("*")) == before
 
 
 def test_isolation_stays_behind(chain, tmp_path):
@@ -141,7 +185,7 @@ def test_nothing_is_left_after_a_failure(portable, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.exchange.xml.write", fail)
     for fmu in portable["fmus"].values():
         fmu.pop("parameters", None)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InputError, match="disk full"):
         write(portable, tmp_path / "s.ssp", export_ssp)
     assert list(tmp_path.iterdir()) == []
 
