@@ -9,7 +9,7 @@ from exchanged import log_of, write
 
 import cosim
 from cosim import InputError
-from cosim.exchange.read_ssp import MAPPINGS
+from cosim.exchange.bindings import MAPPINGS
 from cosim.export import export_osp, export_ssp
 from cosim.scenario import load_scenario
 from cosim.system import prepare
@@ -75,7 +75,7 @@ def test_what_ssp_archives_may_hold(chain, tmp_path, edits, factor):
         ([("resources/gain.fmu", "resources/ramps.fmu")], "did you mean 'resources/ramp.fmu'"),
         ([("resources/gain.fmu", "http://example.org/gain.fmu")], "is not a file"),
         ([("resources/gain.fmu", "../../gain.fmu")], "has no '../../gain.fmu'"),
-        ([('startElement="ramp"', 'startElement="rump"')], "no component 'rump'; did you mean 'ramp'"),
+        ([('startElement="ramp"', 'startElement="rump"')], "there is no 'rump'; did you mean 'ramp'"),
         ([("x-fmu-sharedlibrary", "x-ssp-package")], "type 'application/x-ssp-package' is not supported"),
         ([('startTime="0.0"', 'startTime="5.0"')], "starts at 5.0 s"),
         ([(' stopTime="1.0"', "")], "does not say its stop; give it by --stop"),
@@ -121,7 +121,7 @@ def edited(chain, tmp_path, edits):
         (("</Simulators>", '</Simulators><Functions><Sum name="s" inputCount="2"/></Functions>'), "Sum is not supported"),
         (('source="gain.fmu"', 'source="proxyfmu://host?file=gain.fmu"'), "is not a file"),
         (('source="gain.fmu"', 'source="gone.fmu"'), "no such FMU"),
-        (('simulator="ramp"', 'simulator="rump"'), "no simulator 'rump'; did you mean 'ramp'"),
+        (('simulator="ramp"', 'simulator="rump"'), "there is no 'rump'; did you mean 'ramp'"),
         (('value="3.0"', 'value="x"'), "k = 'x' is not a number"),
         (("</OspSystemStructure>", ""), "cannot be read"),
     ],

@@ -1,18 +1,25 @@
 """Systems of other tools as the content of a scenario, and what their readers share."""
 
-import math
 import shutil
 import tempfile
 import weakref
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from ..errors import InputError
+from ..archive import real, whole
+from ..errors import InputError, nearest
+
+if TYPE_CHECKING:
+    from ..fmu import Model, Variable
+
+# No system has longer paths.
+LONGEST = 4096
 
 
 class Unpacked:
@@ -84,6 +91,18 @@ def parse(text: bytes, where: str, tag: str, namespace: str = "") -> Element:
     return root
 
 
+def read_file(path: Path) -> bytes:
+    """What a file holds.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read: {error.strerror}") from None
+
+
 def need(element: Element, name: str, where: str) -> str:
     """An attribute that must be there."""
     value = element.get(name)
@@ -94,11 +113,10 @@ def need(element: Element, name: str, where: str) -> str:
 
 def number(text: str | None, where: str) -> float:
     """A finite number."""
-    with suppress(ValueError):
-        value = float(text or "")
-        if math.isfinite(value):
-            return value
-    raise InputError(f"{where} = '{text}' is not a number")
+    value = real(text or "")
+    if value is None:
+        raise InputError(f"{where} = '{text}' is not a number")
+    return value
 
 
 def start_value(element: Element, where: str) -> bool | int | float | str:
@@ -114,10 +132,25 @@ def start_value(element: Element, where: str) -> bool | int | float | str:
     if kind == "Real":
         return number(text, where)
     if kind == "Integer":
-        with suppress(ValueError):
-            return int(text)
-        raise InputError(f"{where} = '{text}' is not a whole number")
+        value = whole(text)
+        if value is None:
+            raise InputError(f"{where} = '{text[:100]}' is not a whole number")
+        return value
     raise InputError(f"{where}: values of type {kind} are not supported")
+
+
+def variable(models: Mapping[str, "Model"], instance: str, name: str, where: str) -> "Variable":
+    """The variable that one end of a connection means; * is a wildcard in scenarios only.
+
+    Raises:
+        InputError: no such instance, or it has no such variable.
+    """
+    if instance not in models:
+        raise InputError(f"{where}: there is no '{instance}'{nearest(instance, models)}")
+    known = models[instance].variables
+    if name not in known or "*" in name:
+        raise InputError(f"{where}: '{instance}' has no variable '{name}'{nearest(name, known)}")
+    return known[name]
 
 
 def local(element: Element) -> str:
@@ -127,7 +160,9 @@ def local(element: Element) -> str:
 
 def file_of(source: str, where: str) -> str:
     """The path that a URI means: relative, or absolute with the scheme ``file``."""
-    parts = urlsplit(source)
-    if parts.scheme not in ("", "file") or parts.netloc or parts.query or parts.fragment:
-        raise InputError(f"{where}: '{source}' is not a file; only files are supported")
-    return unquote(parts.path)
+    with suppress(ValueError):
+        parts = urlsplit(source)
+        is_plain = not (parts.netloc or parts.query or parts.fragment) and len(source) <= LONGEST
+        if parts.scheme in ("", "file") and is_plain:
+            return unquote(parts.path)
+    raise InputError(f"{where}: '{source[:100]}' is not a file; only files are supported")
