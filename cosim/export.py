@@ -92,7 +92,7 @@ def export_osp(system: System, folder: Path, drop: bool = False) -> list[str]:
         new = work / "new"
         new.mkdir()
         parts, more = portable.pack(system, new)
-        write_osp(system, parts, new)
+        more += write_osp(system, parts, new)
         if foreign := sorted(_inside(target) - _inside(new)):
             raise InputError(
                 f"'{folder}' also holds {', '.join(foreign[:3])}{', ...' if foreign[3:] else ''}, which "

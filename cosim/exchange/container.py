@@ -36,13 +36,14 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(
             "a container FMU needs fmu-manipulation-toolbox: pip install 'cybership[export]'"
         ) from None
-    # It tells of every output that goes nowhere; what it cannot do, it raises.
-    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.ERROR)
+    # It tells of all that is connected to nothing; what it cannot do, it raises.
+    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
     by_name = {part.name: part for part in parts}
     # Every link becomes a local variable that is called after the FMU; the plain names are for outputs.
     files = {part.name: f"link_{part.file}" for part in parts}
     try:
-        container = _quiet(FMUContainer)(re.sub(r"^(?=\d)|\W", "_", fmu.stem), folder)
+        identifier = re.sub(r"^(?=\d)|\W", "_", fmu.stem, flags=re.ASCII)
+        container = _honest(FMUContainer, _convention(parts))(identifier, folder)
         vars(container).update(start_time=0.0, stop_time=system.scenario.stop)
         # The order of stepping is that of initialisation as well, which simultaneous steps need too.
         order, _ = newest_first(system)
@@ -64,8 +65,18 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(f"the container cannot be made: {error.reason}") from None
 
 
-def _quiet(toolbox_container: Any) -> Any:
-    """The toolbox's class without what it claims of author and licence."""
+def _convention(parts: Sequence[Part]) -> str:
+    """Whether ``instance.variable`` is what FMI calls a structured name."""
+    structured = all(
+        re.fullmatch(r"[A-Za-z_]\w*", part.name, re.ASCII)
+        and part.model.description.variableNamingConvention == "structured"
+        for part in parts
+    )
+    return "structured" if structured else "flat"
+
+
+def _honest(toolbox_container: Any, convention: str) -> Any:
+    """The toolbox's class without what it claims of author, licence and names."""
 
     class Container(toolbox_container):
         def make_fmu_xml(self, xml_filename: Path, *arguments: Any, **options: Any) -> None:
@@ -73,6 +84,7 @@ def _quiet(toolbox_container: Any) -> Any:
             tree = ElementTree.parse(xml_filename)
             for claim in ("author", "license"):
                 tree.getroot().attrib.pop(claim, None)
+            tree.getroot().set("variableNamingConvention", convention)
             tree.write(xml_filename, encoding="UTF-8", xml_declaration=True)
 
     return Container
@@ -89,4 +101,9 @@ def _add_face(container: Any, system: System, part: Part, file: str) -> None:
         elif v.causality == "input" and name not in fed and v.name not in given:
             container.add_input(name, file, v.name)
     for v, value in part.values:
+        if v.type == "String" and str(value).split() != [value]:
+            raise InputError(
+                f"fmus.{part.name}: {v.name}: a container FMU cannot hold an empty text or one with "
+                f"blanks: {value!r}"
+            )
         container.add_start_value(file, v.name, xml.text(v, value))
