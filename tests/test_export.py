@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from conftest import with_unit
 from exchanged import log_of, need, write
 
 from cosim import InputError
@@ -169,6 +170,99 @@ def test_a_path_that_cannot_be_written_is_told(chain, tmp_path, monkeypatch, pat
     with pytest.raises(InputError, match=message):
         write(chain | change, Path(path), export_ssp if path.endswith(".ssp") else export_osp)
     assert sorted(work.rglob("*")) == before
+
+
+@pytest.mark.parametrize("how", [export_ssp, export_osp, export_fmu])
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [({"description": "one\x01two"}, "description"), ({"name": "one\ufffetwo"}, "name")],
+)
+def test_what_xml_cannot_hold_is_refused(chain, tmp_path, how, change, where):
+    suffix = how.__name__.removeprefix("export_")
+    with pytest.raises(InputError, match=f"^{where}: XML cannot hold the character"):
+        write(chain | change, tmp_path / f"out.{suffix}", how)
+    assert not (tmp_path / f"out.{suffix}").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "fits", "message"),
+    [
+        ("\x02", (), "fmus.a: file: XML cannot hold"),
+        (
+            "a b\n",
+            (export_ssp, export_osp),
+            "fmus.a: file: a container FMU cannot hold a text with blanks",
+        ),
+        ('é<&">', (export_ssp, export_osp, export_fmu), ""),
+    ],
+)
+def test_texts_travel_where_they_can(plain_fmu, tmp_path, text, fits, message):
+    need("container_jacobi")
+    init = """
+        self.file = "route.csv"
+        self.register_variable(String("file", start="route.csv", causality=Fmi2Causality.parameter, variability=Fmi2Variability.fixed))
+    """
+    entry = {"path": str(plain_fmu("Texts", init)), "parameters": {"file": text}}
+    content = {"name": "x", "step": 0.1, "stop": 1.0, "fmus": {"a": entry}}
+    for how, suffix in ((export_ssp, "ssp"), (export_osp, "osp"), (export_fmu, "fmu")):
+        path = tmp_path / f"out.{suffix}"
+        if how not in fits:
+            with pytest.raises(InputError, match=message):
+                write(content, path, how)
+            continue
+        write(content, path, how)
+        if how is not export_fmu:
+            assert load_scenario(path, {"stop": 1.0, "step": 0.1}).fmus["a"].parameters == {"file": text}
+
+
+def test_a_refused_transformation_is_named(chain, tmp_path):
+    chain["transformations"] = {"gain.u": {"factor": 2.0}}
+    with pytest.raises(InputError, match=r"can transform values: transformations\.gain\.u"):
+        write(chain, tmp_path / "s.ssp", export_ssp)
+
+
+def test_a_conversion_that_is_switched_off_stays_off(angles, tmp_path):
+    with pytest.raises(InputError, match="can convert 'deg' to 'rad'"):
+        write(angles, tmp_path / "s.ssp", export_ssp)
+    angles["transformations"] = {"gain.u": {}}
+    write(angles, tmp_path / "s.ssp", export_ssp)
+    assert log_of(angles, tmp_path / "a")[1] == log_of(tmp_path / "s.ssp", tmp_path / "b")[1]
+
+
+def test_models_of_one_name_have_one_description_or_none(plain_fmu, tmp_path):
+    """libcosim finds it by the model's name."""
+
+    def model(file, variable):
+        (tmp_path / file).mkdir()
+        init = (
+            f"self.{variable} = 0.0\n"
+            f"self.register_variable(Real('{variable}', causality=Fmi2Causality.output))"
+        )
+        fmu = plain_fmu("Same", init, edits=with_unit("m", 'm="1"'))
+        return {"path": str(fmu.rename(tmp_path / file / "Same.fmu"))}
+
+    one, other = model("one", "pos_x"), model("other", "target_x")
+    content = {"name": "x", "step": 0.1, "stop": 1.0, "algorithm": "jacobi"}
+    for second, notes in ((one, 0), (other, 1)):
+        fmus = {"a": one, "b": second}
+        folder = tmp_path / f"osp_{notes}"
+        found = write(content | {"fmus": fmus}, folder, export_osp)
+        assert len([note for note in found if "'Same_OspModelDescription.xml'" in note]) == notes
+        assert (folder / "Same_OspModelDescription.xml").exists() == (notes == 0)
+
+
+@pytest.mark.parametrize(("name", "convention"), [("ramp", "structured"), ("é ü-1", "flat")])
+def test_a_container_is_honest_about_its_names(chain, tmp_path, name, convention, caplog):
+    from fmpy import read_model_description
+
+    need("container_jacobi")
+    chain["fmus"] = {name: chain["fmus"]["ramp"], "gain": chain["fmus"]["gain"]}
+    chain["connections"] = []
+    write(chain, tmp_path / f"{name}.fmu", export_fmu)
+    description = read_model_description(str(tmp_path / f"{name}.fmu"), validate=True)
+    assert description.variableNamingConvention == convention
+    assert description.coSimulation.modelIdentifier.isascii()
+    assert "not connected" not in caplog.text
 
 
 def test_isolation_stays_behind(chain, tmp_path):

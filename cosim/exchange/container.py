@@ -101,9 +101,8 @@ def _add_face(container: Any, system: System, part: Part, file: str) -> None:
         elif v.causality == "input" and name not in fed and v.name not in given:
             container.add_input(name, file, v.name)
     for v, value in part.values:
-        if v.type == "String" and str(value).split() != [value]:
+        if v.type == "String" and any(c.isspace() for c in str(value)):
             raise InputError(
-                f"fmus.{part.name}: {v.name}: a container FMU cannot hold an empty text or one with "
-                f"blanks: {value!r}"
+                f"fmus.{part.name}: {v.name}: a container FMU cannot hold a text with blanks: {value!r}"
             )
         container.add_start_value(file, v.name, xml.text(v, value))
