@@ -23,21 +23,6 @@ DEVICE = re.compile(
     r"(con|prn|aux|nul|conin\$|conout\$|com[0-9¹²³]|lpt[0-9¹²³])\s*(\.|$)", re.IGNORECASE
 )
 ENCRYPTED = 0x1
-# What zipfile raises for no archive, a damaged one, or one that is packed in a way that it cannot undo.
-DAMAGED = (
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    EOFError,
-    OSError,
-    RuntimeError,  # NotImplementedError is one
-    ValueError,
-)
-# An entry of a gigabyte is one that somebody means to fill the memory with.
-LARGEST = 2**30
-# Numbers as XML writes them; Python itself takes underscores and digits of other scripts too.
-REAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-WHOLE = re.compile(r"[+-]?\d{1,30}", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -57,6 +42,21 @@ class Limits:
 
 
 LIMITS = Limits()
+# What zipfile raises for no archive, a damaged one, or one that is packed in a way that it cannot undo.
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    OSError,
+    RuntimeError,  # NotImplementedError is one
+    ValueError,
+)
+# An entry of a gigabyte is one that somebody means to fill the memory with.
+LARGEST = 2**30
+# Numbers as XML writes them; Python itself takes underscores and digits of other scripts too.
+REAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+INTEGER = re.compile(r"[+-]?\d{1,30}", re.ASCII)
 
 
 def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
@@ -193,7 +193,7 @@ class Archive:
             raise InputError(f"'{self.path}': '{name}' cannot be unpacked: {error}") from None
 
 
-def check_xml(data: bytes, path: Path, what: str) -> None:
+def check_xml(data: bytes, path: Path | str, what: str) -> None:
     """Refuse XML that declares a document type: bombs and theft by entities are its only users left.
 
     Args:
@@ -222,6 +222,6 @@ def real(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def whole(text: str) -> int | None:
+def integer(text: str) -> int | None:
     """A whole number as XML writes it (xs:integer); None for anything else."""
-    return int(text) if WHOLE.fullmatch(text := text.strip()) else None
+    return int(text) if INTEGER.fullmatch(text := text.strip()) else None

@@ -103,7 +103,7 @@ class Bindings:
         if source is None:
             return element.find(inline, NAMES)
         file = file_inside(source, where)
-        return parse(self.archive.read(file), f"'{file}'", inline.rpartition(":")[2], namespace)
+        return parse(self.archive.read(file), file, inline.rpartition(":")[2], namespace)
 
 
 def linear(parent: Element, where: str) -> Conversion | None:

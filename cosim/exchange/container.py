@@ -6,12 +6,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from ..errors import InputError
 from ..system import System, newest_first
 from . import xml
 from .portable import Part
+from .reading import parse
 
 
 def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Path) -> None:
@@ -81,11 +81,11 @@ def _honest(toolbox_container: Any, convention: str) -> Any:
     class Container(toolbox_container):
         def make_fmu_xml(self, xml_filename: Path, *arguments: Any, **options: Any) -> None:
             super().make_fmu_xml(xml_filename, *arguments, **options)
-            tree = ElementTree.parse(xml_filename)
+            root = parse(xml_filename.read_bytes(), xml_filename, "fmiModelDescription")
             for claim in ("author", "license"):
-                tree.getroot().attrib.pop(claim, None)
-            tree.getroot().set("variableNamingConvention", convention)
-            tree.write(xml_filename, encoding="UTF-8", xml_declaration=True)
+                root.attrib.pop(claim, None)
+            root.set("variableNamingConvention", convention)
+            xml.write(root, xml_filename)
 
     return Container
 

@@ -114,7 +114,7 @@ def variables_of_group(file: Path, name: str) -> list[str]:
     Raises:
         InputError: no model description, or it has no such group.
     """
-    root = parse(read_file(file), f"'{file}'", "OspModelDescription")
+    root = parse(read_file(file), file, "OspModelDescription")
     groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "Variable"}
     if name not in groups:
         raise InputError(f"'{file}' has no variable group '{name}'{nearest(name, groups)}")

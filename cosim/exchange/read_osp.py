@@ -38,7 +38,7 @@ def read_osp(path: Path) -> Imported:
     file = path / STRUCTURE if path.is_dir() else path
     if not file.exists():
         raise InputError(f"'{path}' is a folder without {STRUCTURE}")
-    root = parse(read_file(file), f"'{file}'", "OspSystemStructure", NAMESPACE)
+    root = parse(read_file(file), file, "OspSystemStructure", NAMESPACE)
     return _Reader(file, root).read()
 
 

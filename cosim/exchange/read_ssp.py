@@ -39,9 +39,8 @@ class _Reader:
         self.models: dict[str, Model] = {}
 
     def read(self) -> Imported:
-        root = parse(
-            self.archive.read(STRUCTURE), f"'{self.path}'", "SystemStructureDescription", SPACES["ssd"]
-        )
+        text = self.archive.read(STRUCTURE)
+        root = parse(text, self.path, "SystemStructureDescription", SPACES["ssd"])
         if root.get("version") not in ("1.0", "1.0.1"):
             raise InputError(f"'{self.path}' is of SSP {root.get('version')}; this reader knows 1.0")
         system = root.find("ssd:System", NAMES)

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from ..archive import real, whole
+from ..archive import check_xml, integer, real
 from ..errors import InputError, nearest
 
 if TYPE_CHECKING:
@@ -66,28 +66,25 @@ def read_system(path: Path) -> Imported:
     return read_ssp(path) if path.suffix == ".ssp" else read_osp(path)
 
 
-class _Builder(ElementTree.TreeBuilder):
-    """Refuses document types, with which a short file can become a long one."""
-
-    def doctype(self, *_: Any) -> None:
-        raise ValueError("it has a document type, which is refused")
-
-
-def parse(text: bytes, where: str, tag: str, namespace: str = "") -> Element:
+def parse(text: bytes, path: Path | str, tag: str, namespace: str = "") -> Element:
     """The root of a document, which must be of this kind.
 
     Args:
         text: the document.
-        where: what messages call it.
+        path: where it comes from.
         tag: of the root.
         namespace: of the root; any if empty.
+
+    Raises:
+        InputError: it has a DOCTYPE, is not XML, or of another kind.
     """
+    check_xml(text, path, tag)
     try:
-        root = ElementTree.fromstring(text, ElementTree.XMLParser(target=_Builder()))
+        root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise InputError(f"{where} cannot be read: {error}") from None
+        raise InputError(f"'{path}' cannot be read as {tag}: {error}") from None
     if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
-        raise InputError(f"{where} is no {tag} that this reader knows, but '{root.tag}'")
+        raise InputError(f"'{path}' is no {tag} that this reader knows, but '{root.tag}'")
     return root
 
 
@@ -132,7 +129,7 @@ def start_value(element: Element, where: str) -> bool | int | float | str:
     if kind == "Real":
         return number(text, where)
     if kind == "Integer":
-        value = whole(text)
+        value = integer(text)
         if value is None:
             raise InputError(f"{where} = '{text[:100]}' is not a whole number")
         return value
