@@ -4,6 +4,8 @@ An FMU is a program, and whoever runs it trusts it. But reading one must not wri
 folder, fill the disk or the memory, or mean another file on the next computer.
 """
 
+import lzma
+import math
 import re
 import shutil
 import stat
@@ -14,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
-from .errors import InputError
+from .errors import InputError, nearest
 
 # What Windows takes for a device, with any extension.
 DEVICE = re.compile(
@@ -43,6 +45,21 @@ class Limits:
 
 
 LIMITS = Limits()
+# What zipfile raises for no archive, a damaged one, or one that is packed in a way that it cannot undo.
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    OSError,
+    RuntimeError,  # NotImplementedError is one
+    ValueError,
+)
+# An entry of a gigabyte is one that somebody means to fill the memory with.
+LARGEST = 2**30
+# Numbers as XML writes them; Python itself takes underscores and digits of other scripts too.
+REAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+INTEGER = re.compile(r"[+-]?\d{1,30}", re.ASCII)
 
 
 def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
@@ -62,7 +79,7 @@ def check_archive(path: Path, limits: Limits = LIMITS) -> list[zipfile.ZipInfo]:
         packed = path.stat().st_size
     except FileNotFoundError:
         raise InputError(f"no such file: '{path}'") from None
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+    except DAMAGED as error:
         raise InputError(f"'{path}' is not a zip archive: {error}") from None
     if len(entries) > limits.files:
         raise InputError(f"'{path}' is refused: {len(entries)} entries are more than {limits.files}")
@@ -148,11 +165,42 @@ def unpack(path: Path, folder: Path, limits: Limits = LIMITS) -> None:
                 # zipfile reads no more than the announced size; "x" never follows what is there.
                 with archive.open(entry) as reader, target.open("xb") as writer:
                     shutil.copyfileobj(reader, writer)
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError) as error:
+    except DAMAGED as error:
         raise InputError(f"'{path}' cannot be unpacked: {error}") from error
 
 
-def check_xml(data: bytes, path: Path, what: str) -> None:
+class Archive:
+    """The files of an archive, after :func:`check_archive`.
+
+    Args:
+        path: a zip archive.
+
+    Raises:
+        InputError: refused.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._sizes = {entry.filename: entry.file_size for entry in check_archive(path)}
+
+    def read(self, name: str) -> bytes:
+        """What a file of the archive holds.
+
+        Raises:
+            InputError: it is not there, larger than ``LARGEST``, or damaged.
+        """
+        if name not in self._sizes:
+            raise InputError(f"'{self.path}' has no '{name}'{nearest(name, self._sizes)}")
+        if self._sizes[name] > LARGEST:
+            raise InputError(f"'{self.path}': '{name}' is larger than {LARGEST // 2**30} GiB")
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                return archive.read(name)
+        except DAMAGED as error:
+            raise InputError(f"'{self.path}': '{name}' cannot be unpacked: {error}") from None
+
+
+def check_xml(data: bytes, path: Path | str, what: str) -> None:
     """Refuse XML that declares a document type: bombs and theft by entities are its only users left.
 
     Args:
@@ -173,3 +221,14 @@ def check_xml(data: bytes, path: Path, what: str) -> None:
         parser.Parse(data, True)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as {what}: {error}") from None
+
+
+def real(text: str) -> float | None:
+    """A finite number as XML writes it (xs:double); None for anything else."""
+    value = float(text) if REAL.fullmatch(text := text.strip()) else math.nan
+    return value if math.isfinite(value) else None
+
+
+def integer(text: str) -> int | None:
+    """A whole number as XML writes it (xs:integer); None for anything else."""
+    return int(text) if INTEGER.fullmatch(text := text.strip()) else None

@@ -79,20 +79,49 @@ def export_fmu(system: System, fmu: Path, drop: bool = False) -> list[str]:
 
 
 def export_osp(system: System, folder: Path, drop: bool = False) -> list[str]:
-    """Write a system as an OSP directory, in place of an earlier one; as :func:`export_ssp`."""
+    """Write a system as an OSP directory, in place of an earlier one; as :func:`export_ssp`.
+
+    A file that the new directory would not hold is somebody's, and is never deleted: InputError.
+    """
     notes = portable.check(system, portable.OSP, drop)
-    free = not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))
-    if not free and not (folder / STRUCTURE).is_file():
-        raise InputError(f"'{folder}' is there already, and is no OSP directory to replace")
-    with _beside(folder) as work:
+    with _beside(folder) as (work, target):
+        if target.exists() and not _is_replaceable(target):
+            raise InputError(f"'{folder}' is there already, and is no OSP directory to replace")
+        if Path.cwd().is_relative_to(target):
+            raise InputError(f"'{folder}' is the working directory, which cannot be replaced")
         new = work / "new"
         new.mkdir()
         parts, more = portable.pack(system, new)
-        write_osp(system, parts, new)
-        if folder.exists():
-            os.replace(folder, work / "old")
-        os.replace(new, folder)
+        more += write_osp(system, parts, new)
+        if foreign := sorted(_inside(target) - _inside(new)):
+            raise InputError(
+                f"'{folder}' also holds {', '.join(foreign[:3])}{', ...' if foreign[3:] else ''}, which "
+                "this export does not write; take it out, or choose another folder"
+            )
+        _replace(target, new, work / "old")
     return notes + more
+
+
+def _is_replaceable(folder: Path) -> bool:
+    return folder.is_dir() and (not any(folder.iterdir()) or (folder / STRUCTURE).is_file())
+
+
+def _inside(folder: Path) -> set[str]:
+    """All files and folders in a folder, at any depth."""
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
+
+
+def _replace(folder: Path, new: Path, old: Path) -> None:
+    """Put a folder in the place of another, which comes back if that fails."""
+    if not folder.exists():
+        os.replace(new, folder)
+        return
+    os.replace(folder, old)
+    try:
+        os.replace(new, folder)
+    except BaseException:
+        os.replace(old, folder)
+        raise
 
 
 def _file(
@@ -100,30 +129,39 @@ def _file(
 ) -> list[str]:
     if path.suffix != suffix:
         raise InputError(f"'{path}' should end in {suffix}")
-    if path.is_dir():
-        raise InputError(f"'{path}' is a folder")
     notes = portable.check(system, target, drop)
-    with _beside(path) as work:
+    with _beside(path) as (work, whole):
+        if whole.is_dir():
+            raise InputError(f"'{path}' is a folder")
         parts, more = portable.pack(system, work)
         (work / "out").mkdir()
         new = work / "out" / path.name
         write(system, parts, work, new)
-        os.replace(new, path)
+        os.replace(new, whole)
     return notes + more
 
 
 @contextmanager
-def _beside(path: Path) -> Iterator[Path]:
-    """A scratch folder on the same file system, gone afterwards."""
+def _beside(path: Path) -> Iterator[tuple[Path, Path]]:
+    """A scratch folder on the same file system, gone afterwards, and the path without links and dots.
+
+    Raises:
+        InputError: the system refuses to read or write something there.
+    """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=".export_", dir=path.parent))
+        whole = Path(os.path.realpath(path))
+        whole.parent.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(prefix=".export_", dir=whole.parent))
+        try:
+            yield work, whole
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
-        raise InputError(f"cannot write to '{path.parent}': {error.strerror}") from None
-    try:
-        yield work
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+        name = Path(error.filename or path).name
+        raise InputError(
+            f"'{path}' cannot be written: {error.strerror or error}"
+            + (f": '{name}'" if name != path.name else "")
+        ) from error
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -91,7 +91,7 @@ class Model:
 
     def __init__(self, path: Path, folder: Path | None = None) -> None:
         self.path = path
-        if not path.is_file():
+        if not os.path.isfile(path):  # Path.is_file raises for names that are too long
             raise InputError(f"no such FMU: '{path}'")
         entries = {entry.filename for entry in archive.check_archive(path)}
         if DESCRIPTION not in entries:

@@ -1,14 +1,12 @@
 """Parameter sets of the SSP standard (``.ssv``): values for FMUs, by model name."""
 
-import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from .archive import check_xml
+from .archive import check_xml, real
 from .errors import InputError
 from .files import write_text
 from .units import BASE, Unit, conversion
@@ -131,11 +129,10 @@ def _parameter(entry: Element, where: str) -> Parameter:
 
 
 def _number(text: str, message: str) -> float:
-    with suppress(ValueError):
-        value = float(text)
-        if math.isfinite(value) and "_" not in text:
-            return value
-    raise InputError(message)
+    value = real(text)
+    if value is None:
+        raise InputError(message)
+    return value
 
 
 def _exponents(base: Element, where: str) -> dict[str, float]:

@@ -136,11 +136,28 @@ def own(portable):
     return portable
 
 
+def with_unit(name, base):
+    """Edits of a model description that give all its Reals a unit, defined by attributes of BaseUnit."""
+    definition = f'<UnitDefinitions><Unit name="{name}"><BaseUnit {base}/></Unit></UnitDefinitions>'
+    return [("<LogCategories>", f"{definition}<LogCategories>"), ("<Real", f'<Real unit="{name}"')]
+
+
 @pytest.fixture
 def chain(plain_fmu, tmp_path):
     """Two foreign FMUs: a ramp, and a gain with a parameter that only it knows."""
+    return ramp_and_gain(plain_fmu, tmp_path)
+
+
+@pytest.fixture
+def angles(plain_fmu, tmp_path):
+    """The same, where the ramp is in degrees and the gain in radians."""
+    degrees = with_unit("deg", 'rad="1" factor="0.017453292519943295"')
+    return ramp_and_gain(plain_fmu, tmp_path, degrees, with_unit("rad", 'rad="1"'))
+
+
+def ramp_and_gain(plain_fmu, tmp_path, ramp_edits=(), gain_edits=()):
     plain_fmu("Ramp", "self.y = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))",
-              "self.y += h\nreturn True")  # fmt: skip
+              "self.y += h\nreturn True", ramp_edits)  # fmt: skip
     plain_fmu(
         "Gain",
         "self.u = 0.0\nself.y = 0.0\nself.k = 1.0\n"
@@ -149,6 +166,7 @@ def chain(plain_fmu, tmp_path):
         "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
         " variability=Fmi2Variability.tunable))",
         "self.y = self.k * self.u\nreturn True",
+        gain_edits,
     )
     return {
         "name": "chain", "step": 0.25, "stop": 1.0, "algorithm": "jacobi",

@@ -2,9 +2,11 @@
 
 import json
 import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from conftest import with_unit
 from exchanged import log_of, need, write
 
 from cosim import InputError
@@ -121,10 +123,146 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
     assert [p.name for p in (tmp_path / "osp").iterdir()] == ["thesis.txt"]
     (tmp_path / "osp" / "thesis.txt").unlink()
     assert export(command) == 0
-    (tmp_path / "osp" / "stale.fmu").touch()
     assert export(command) == 0
-    assert not (tmp_path / "osp" / "stale.fmu").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["osp", "s.json"]
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "scenarios/mine.json", "empty/"])
+def test_an_osp_directory_with_a_file_of_somebody_is_not_replaced(chain, tmp_path, name):
+    folder = tmp_path / "osp"
+    write(chain, folder, export_osp)
+    (folder / name).mkdir() if name.endswith("/") else (folder / name).write_text("mine")
+    before = {path: path.stat() for path in folder.rglob("*")}
+    with pytest.raises(InputError, match=f"also holds {name.rstrip('/')}, which this export"):
+        write(chain, folder, export_osp)
+    assert {path: path.stat() for path in folder.rglob("*")} == before
+
+
+@pytest.mark.parametrize("suffix", ["ssp", "fmu", "osp"])
+def test_a_relative_path_is_as_good(chain, tmp_path, monkeypatch, suffix):
+    if suffix == "fmu":
+        need("container_jacobi")
+    monkeypatch.chdir(tmp_path)
+    kind = {"ssp": export_ssp, "fmu": export_fmu, "osp": export_osp}[suffix]
+    write(chain, Path(f"sub/system.{suffix}"), kind)
+    assert [path.name for path in (tmp_path / "sub").iterdir()] == [f"system.{suffix}"]
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "message"),
+    [
+        (".", {}, "is the working directory"),
+        ("sub/..", {}, "is the working directory"),
+        ("x" * 300, {}, "cannot be written: File name too long"),
+        ("x" * 300 + ".ssp", {}, "cannot be written: File name too long"),
+        ("osp", {"name": "n" * 260}, "'osp' cannot be written: File name too long: 'nnn"),
+    ],
+)
+def test_a_path_that_cannot_be_written_is_told(chain, tmp_path, monkeypatch, path, change, message):
+    work = tmp_path / "work"
+    (work / "sub").mkdir(parents=True)
+    write(chain, work / "osp", export_osp)
+    for part in (work / "osp").iterdir():
+        part.rename(work / part.name)
+    (work / "osp").rmdir()
+    before = sorted(work.rglob("*"))
+    monkeypatch.chdir(work)
+    with pytest.raises(InputError, match=message):
+        write(chain | change, Path(path), export_ssp if path.endswith(".ssp") else export_osp)
+    assert sorted(work.rglob("*")) == before
+
+
+@pytest.mark.parametrize("how", [export_ssp, export_osp, export_fmu])
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [({"description": "one\x01two"}, "description"), ({"name": "one\ufffetwo"}, "name")],
+)
+def test_what_xml_cannot_hold_is_refused(chain, tmp_path, how, change, where):
+    suffix = how.__name__.removeprefix("export_")
+    with pytest.raises(InputError, match=f"^{where}: XML cannot hold the character"):
+        write(chain | change, tmp_path / f"out.{suffix}", how)
+    assert not (tmp_path / f"out.{suffix}").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "fits", "message"),
+    [
+        ("\x02", (), "fmus.a: file: XML cannot hold"),
+        (
+            "a b\n",
+            (export_ssp, export_osp),
+            "fmus.a: file: a container FMU cannot hold a text with blanks",
+        ),
+        ('é<&">', (export_ssp, export_osp, export_fmu), ""),
+    ],
+)
+def test_texts_travel_where_they_can(plain_fmu, tmp_path, text, fits, message):
+    need("container_jacobi")
+    init = """
+        self.file = "route.csv"
+        self.register_variable(String("file", start="route.csv", causality=Fmi2Causality.parameter, variability=Fmi2Variability.fixed))
+    """
+    entry = {"path": str(plain_fmu("Texts", init)), "parameters": {"file": text}}
+    content = {"name": "x", "step": 0.1, "stop": 1.0, "fmus": {"a": entry}}
+    for how, suffix in ((export_ssp, "ssp"), (export_osp, "osp"), (export_fmu, "fmu")):
+        path = tmp_path / f"out.{suffix}"
+        if how not in fits:
+            with pytest.raises(InputError, match=message):
+                write(content, path, how)
+            continue
+        write(content, path, how)
+        if how is not export_fmu:
+            assert load_scenario(path, {"stop": 1.0, "step": 0.1}).fmus["a"].parameters == {"file": text}
+
+
+def test_a_refused_transformation_is_named(chain, tmp_path):
+    chain["transformations"] = {"gain.u": {"factor": 2.0}}
+    with pytest.raises(InputError, match=r"can transform values: transformations\.gain\.u"):
+        write(chain, tmp_path / "s.ssp", export_ssp)
+
+
+def test_a_conversion_that_is_switched_off_stays_off(angles, tmp_path):
+    with pytest.raises(InputError, match="can convert 'deg' to 'rad'"):
+        write(angles, tmp_path / "s.ssp", export_ssp)
+    angles["transformations"] = {"gain.u": {}}
+    write(angles, tmp_path / "s.ssp", export_ssp)
+    assert log_of(angles, tmp_path / "a")[1] == log_of(tmp_path / "s.ssp", tmp_path / "b")[1]
+
+
+def test_models_of_one_name_have_one_description_or_none(plain_fmu, tmp_path):
+    """libcosim finds it by the model's name."""
+
+    def model(file, variable):
+        (tmp_path / file).mkdir()
+        init = (
+            f"self.{variable} = 0.0\n"
+            f"self.register_variable(Real('{variable}', causality=Fmi2Causality.output))"
+        )
+        fmu = plain_fmu("Same", init, edits=with_unit("m", 'm="1"'))
+        return {"path": str(fmu.rename(tmp_path / file / "Same.fmu"))}
+
+    one, other = model("one", "pos_x"), model("other", "target_x")
+    content = {"name": "x", "step": 0.1, "stop": 1.0, "algorithm": "jacobi"}
+    for second, notes in ((one, 0), (other, 1)):
+        fmus = {"a": one, "b": second}
+        folder = tmp_path / f"osp_{notes}"
+        found = write(content | {"fmus": fmus}, folder, export_osp)
+        assert len([note for note in found if "'Same_OspModelDescription.xml'" in note]) == notes
+        assert (folder / "Same_OspModelDescription.xml").exists() == (notes == 0)
+
+
+@pytest.mark.parametrize(("name", "convention"), [("ramp", "structured"), ("é ü-1", "flat")])
+def test_a_container_is_honest_about_its_names(chain, tmp_path, name, convention, caplog):
+    from fmpy import read_model_description
+
+    need("container_jacobi")
+    chain["fmus"] = {name: chain["fmus"]["ramp"], "gain": chain["fmus"]["gain"]}
+    chain["connections"] = []
+    write(chain, tmp_path / f"{name}.fmu", export_fmu)
+    description = read_model_description(str(tmp_path / f"{name}.fmu"), validate=True)
+    assert description.variableNamingConvention == convention
+    assert description.coSimulation.modelIdentifier.isascii()
+    assert "not connected" not in caplog.text
 
 
 def test_isolation_stays_behind(chain, tmp_path):
@@ -141,7 +279,7 @@ def test_nothing_is_left_after_a_failure(portable, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.exchange.xml.write", fail)
     for fmu in portable["fmus"].values():
         fmu.pop("parameters", None)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InputError, match="disk full"):
         write(portable, tmp_path / "s.ssp", export_ssp)
     assert list(tmp_path.iterdir()) == []
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS, GAIN
+from conftest import COMPONENTS, GAIN, with_unit
 
 import cosim
 from cosim.log import LogWriter
@@ -216,19 +216,15 @@ def test_event_at_the_start_acts_from_the_start(ellipse, tmp_path):
 
 
 def test_units_are_converted_where_the_dimension_agrees(plain_fmu, tmp_path):
-    def unit(name, base):
-        definition = f'<UnitDefinitions><Unit name="{name}"><BaseUnit {base}/></Unit></UnitDefinitions>'
-        return [("<LogCategories>", f"{definition}<LogCategories>"), ("<Real", f'<Real unit="{name}"')]
-
     degrees = plain_fmu(
         "Degrees", 'self.y = 0.0\nself.register_variable(Real("y", causality=Fmi2Causality.output))',
-        "self.y = 90.0\nreturn True", unit("deg", 'rad="1" factor="0.017453292519943295"'),
+        "self.y = 90.0\nreturn True", with_unit("deg", 'rad="1" factor="0.017453292519943295"'),
     )  # fmt: skip
     kelvin = plain_fmu(
         "Celsius", 'self.y = 0.0\nself.register_variable(Real("y", causality=Fmi2Causality.output))',
-        "self.y = 20.0\nreturn True", unit("degC", 'K="1" offset="273.15"'),
+        "self.y = 20.0\nreturn True", with_unit("degC", 'K="1" offset="273.15"'),
     )  # fmt: skip
-    reader = plain_fmu("Reader", GAIN, edits=unit("K", 'K="1"'))
+    reader = plain_fmu("Reader", GAIN, edits=with_unit("K", 'K="1"'))
     content = {
         "name": "units", "step": 0.1, "stop": 1.0,
         "fmus": {

@@ -178,7 +178,7 @@ def test_whoever_reads_xml_or_unpacks_looks_first():
         if any(parser in source for parser in parsers) and path.name != "container.py":
             assert "check_xml(" in source, path
             readers.append(path.name)
-    assert {"fmu.py", "ssv.py"} <= set(readers)
+    assert {"fmu.py", "ssv.py", "reading.py"} <= set(readers)
 
 
 def test_text_in_a_scenario_stays_text(ellipse, tmp_path):

@@ -6,12 +6,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from ..errors import InputError
 from ..system import System, newest_first
 from . import xml
 from .portable import Part
+from .reading import parse
 
 
 def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Path) -> None:
@@ -36,13 +36,14 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(
             "a container FMU needs fmu-manipulation-toolbox: pip install 'cybership[export]'"
         ) from None
-    # It tells of every output that goes nowhere; what it cannot do, it raises.
-    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.ERROR)
+    # It tells of all that is connected to nothing; what it cannot do, it raises.
+    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
     by_name = {part.name: part for part in parts}
     # Every link becomes a local variable that is called after the FMU; the plain names are for outputs.
     files = {part.name: f"link_{part.file}" for part in parts}
     try:
-        container = _quiet(FMUContainer)(re.sub(r"^(?=\d)|\W", "_", fmu.stem), folder)
+        identifier = re.sub(r"^(?=\d)|\W", "_", fmu.stem, flags=re.ASCII)
+        container = _honest(FMUContainer, _convention(parts))(identifier, folder)
         vars(container).update(start_time=0.0, stop_time=system.scenario.stop)
         # The order of stepping is that of initialisation as well, which simultaneous steps need too.
         order, _ = newest_first(system)
@@ -64,16 +65,27 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(f"the container cannot be made: {error.reason}") from None
 
 
-def _quiet(toolbox_container: Any) -> Any:
-    """The toolbox's class without what it claims of author and licence."""
+def _convention(parts: Sequence[Part]) -> str:
+    """Whether ``instance.variable`` is what FMI calls a structured name."""
+    structured = all(
+        re.fullmatch(r"[A-Za-z_]\w*", part.name, re.ASCII)
+        and part.model.description.variableNamingConvention == "structured"
+        for part in parts
+    )
+    return "structured" if structured else "flat"
+
+
+def _honest(toolbox_container: Any, convention: str) -> Any:
+    """The toolbox's class without what it claims of author, licence and names."""
 
     class Container(toolbox_container):
         def make_fmu_xml(self, xml_filename: Path, *arguments: Any, **options: Any) -> None:
             super().make_fmu_xml(xml_filename, *arguments, **options)
-            tree = ElementTree.parse(xml_filename)
+            root = parse(xml_filename.read_bytes(), xml_filename, "fmiModelDescription")
             for claim in ("author", "license"):
-                tree.getroot().attrib.pop(claim, None)
-            tree.write(xml_filename, encoding="UTF-8", xml_declaration=True)
+                root.attrib.pop(claim, None)
+            root.set("variableNamingConvention", convention)
+            xml.write(root, xml_filename)
 
     return Container
 
@@ -89,4 +101,8 @@ def _add_face(container: Any, system: System, part: Part, file: str) -> None:
         elif v.causality == "input" and name not in fed and v.name not in given:
             container.add_input(name, file, v.name)
     for v, value in part.values:
+        if v.type == "String" and any(c.isspace() for c in str(value)):
+            raise InputError(
+                f"fmus.{part.name}: {v.name}: a container FMU cannot hold a text with blanks: {value!r}"
+            )
         container.add_start_value(file, v.name, xml.text(v, value))

@@ -5,9 +5,12 @@ in m become the group ``linear_displacement_hat``. Variables whose names say no 
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from ..errors import InputError, nearest
 from ..fmu import Model, Variable
+from .reading import local, parse, read_file
 
 NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
 
@@ -103,3 +106,16 @@ def osp_model_description(model: Model) -> Element | None:
                     unit = model.variables[variable].unit
                     SubElement(group, "Variable", ref=variable, unit=unit.name if unit else "")
     return root
+
+
+def variables_of_group(file: Path, name: str) -> list[str]:
+    """The variables of a group in an OSP-IS model description, nested groups included.
+
+    Raises:
+        InputError: no model description, or it has no such group.
+    """
+    root = parse(read_file(file), file, "OspModelDescription")
+    groups = {g.get("name", ""): g for g in root.iter() if g is not root and local(g) != "Variable"}
+    if name not in groups:
+        raise InputError(f"'{file}' has no variable group '{name}'{nearest(name, groups)}")
+    return [v.get("ref", "") for v in groups[name].iter() if local(v) == "Variable"]

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ..system import System
@@ -16,22 +17,41 @@ SCENARIOS = "scenarios"
 NAMESPACE = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 
-def write_osp(system: System, parts: Sequence[Part], folder: Path) -> None:
+def write_osp(system: System, parts: Sequence[Part], folder: Path) -> list[str]:
     """Write structure, scenario and model descriptions beside the FMUs.
 
     Args:
         system: checked system.
         parts: its instances; their FMUs are in the folder.
         folder: receives the files.
+
+    Returns:
+        Notes on model descriptions that are left out.
     """
     xml.write(_structure(system, parts), folder / STRUCTURE)
-    for part in parts:
-        described = osp_model_description(part.model)
-        if described is not None:
-            xml.write(described, folder / f"{part.model.name}_OspModelDescription.xml")
+    notes = _describe(parts, folder)
     (folder / SCENARIOS).mkdir()
     path = folder / SCENARIOS / f"{system.scenario.name}.json"
     path.write_text(json.dumps(_scenario(system), indent=2) + "\n")
+    return notes
+
+
+def _describe(parts: Sequence[Part], folder: Path) -> list[str]:
+    """Write the model descriptions. libcosim finds them by the model's name, so that models of one name
+    have one or none."""
+    by_file: dict[str, dict[bytes, Element | None]] = {}
+    for part in parts:
+        described = osp_model_description(part.model)
+        content = b"" if described is None else ElementTree.tostring(described)
+        by_file.setdefault(f"{part.model.name}_OspModelDescription.xml", {})[content] = described
+    notes: list[str] = []
+    for file, contents in by_file.items():
+        described, *more = contents.values()
+        if more:
+            notes.append(f"left out: '{file}', because FMUs of that name have different variable groups")
+        elif described is not None:
+            xml.write(described, folder / file)
+    return notes
 
 
 def _structure(system: System, parts: Sequence[Part]) -> Element:

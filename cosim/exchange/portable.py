@@ -14,6 +14,9 @@ from ..scenario import Value
 from ..system import Connection, System
 from . import xml
 
+# What XML 1.0 has no place for, not even as a reference (section 2.2).
+NOT_XML = re.compile(r"[^\t\n\r\x20-\uD7FF\uE000-\uFFFD\U00010000-\U0010FFFF]")
+
 
 @dataclass(frozen=True)
 class Format:
@@ -73,6 +76,7 @@ def check(system: System, target: Format, drop: bool) -> list[str]:
         InputError: something cannot travel, and may not or cannot be left out.
     """
     _check_shape(system, target)
+    _check_texts(system)
     left = _left_behind(system, target)
     if left and not drop:
         raise InputError(f"{target.name} cannot hold {'; '.join(left)}; --drop-faults leaves that out")
@@ -124,9 +128,22 @@ def _check_shape(system: System, target: Format) -> None:
             )
         if converts(c) and not target.conversions:
             units = [v.unit.name if v.unit else "" for v in (c.source.variable, c.target.variable)]
-            raise InputError(
-                f"{ends}: {target.name} cannot convert '{units[0]}' to '{units[1]}' in every tool"
+            what = (
+                f"transform values: transformations.{c.target.name}"
+                if c.target.name in system.scenario.transformations
+                else f"convert '{units[0]}' to '{units[1]}'"
             )
+            raise InputError(f"{ends}: not every tool that reads {target.name} can {what}")
+
+
+def _check_texts(system: System) -> None:
+    """Raise if a text has a character that no XML file can hold."""
+    texts = {"name": system.scenario.name, "description": system.scenario.description}
+    for name, values in system.parameters.items():
+        texts |= {f"fmus.{name}: {v.name}": str(value) for v, value in values if v.type == "String"}
+    for where, text in texts.items():
+        if wrong := NOT_XML.search(text):
+            raise InputError(f"{where}: XML cannot hold the character {wrong[0]!r} in {text[:100]!r}")
 
 
 def converts(connection: Connection) -> bool:

@@ -2,21 +2,31 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from ..errors import InputError, nearest
 from ..fmu import Model
+from ..units import SAME, conversion
+from .groups import variables_of_group
 from .osp import NAMESPACE, SCENARIOS, STRUCTURE
-from .reading import Imported, file_of, local, need, number, parse, start_value
+from .reading import Imported, file_of, local, need, number, parse, read_file, start_value, variable
 
 NAMES = {"osp": NAMESPACE}
 # What libcosim takes where the file gives none [s].
 DEFAULT_STEP = 0.1
 
-Pairs = list[tuple[str, str]]
+# What each kind of connection connects.
+ENDS = {
+    "VariableConnection": ("Variable", "Variable"),
+    "VariableGroupConnection": ("VariableGroup", "VariableGroup"),
+    "SignalConnection": ("Variable", "Signal"),
+}
+
+# Simulator, and name of a variable or group.
+End = tuple[str, str]
 
 
 def read_osp(path: Path) -> Imported:
@@ -26,13 +36,9 @@ def read_osp(path: Path) -> Imported:
         InputError: no system structure, or it has something that this master cannot do.
     """
     file = path / STRUCTURE if path.is_dir() else path
-    try:
-        text = file.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"'{path}' is a folder without {STRUCTURE}") from None
-    except OSError as error:
-        raise InputError(f"'{file}' cannot be read: {error.strerror}") from None
-    root = parse(text, f"'{file}'", "OspSystemStructure", NAMESPACE)
+    if not file.exists():
+        raise InputError(f"'{path}' is a folder without {STRUCTURE}")
+    root = parse(read_file(file), file, "OspSystemStructure", NAMESPACE)
     return _Reader(file, root).read()
 
 
@@ -90,56 +96,85 @@ class _Reader:
             if simulator.get("stepSize") is not None:
                 fmus[name]["step"] = number(simulator.get("stepSize"), f"{where}: stepSize")
             for entry in simulator.iterfind("osp:InitialValues/osp:InitialValue", NAMES):
-                variable = need(entry, "variable", where)
-                for typed in entry:
-                    value = start_value(typed, f"{where}: {variable}")
-                    fmus[name]["parameters"][variable] = value
+                parameter = need(entry, "variable", where)
+                if len(entry) != 1:
+                    raise InputError(f"{where}: {parameter} needs one value, not {len(entry)}")
+                value = start_value(entry[0], f"{where}: {parameter}")
+                fmus[name]["parameters"][parameter] = value
         return fmus
+
+    def connections(self) -> tuple[list[list[str]], dict[str, dict[str, float]]]:
+        """Connections, and the transformation at each input that has one."""
+        found: list[list[str]] = []
+        transformations: dict[str, dict[str, float]] = {}
+        functions = self.functions()
+        into: dict[str, str] = {}
+        out_of: list[tuple[str, str]] = []
+        for wire in self.root.iterfind("osp:Connections/*", NAMES):
+            kind, (first, second) = local(wire), self.ends(wire)
+            if kind == "SignalConnection":
+                function, signal = self.signal(second, functions)
+                name = ".".join(self.end(first))
+                if signal == "out":
+                    out_of.append((function, name))
+                elif into.setdefault(function, name) != name:
+                    raise InputError(f"'{self.file}': two variables feed the function '{function}'")
+            else:
+                pairs = [(self.end(first), self.end(second))]
+                if kind == "VariableGroupConnection":
+                    pairs = self.grouped(*pairs[0])
+                for a, b in pairs:
+                    output, target = self.directed(a, b)
+                    found.append([output, target])
+                    if self.units_differ(a, b):
+                        transformations[target] = {"factor": 1.0, "offset": 0.0}
+        for function, target in out_of:
+            if function not in into:
+                raise InputError(f"'{self.file}': nothing feeds the function '{function}'")
+            found.append([into[function], target])
+            factor, offset = functions[function]
+            transformations[target] = {"factor": factor, "offset": offset}
+        return found, transformations
+
+    def ends(self, wire: Element) -> tuple[Element, Element]:
+        """The two ends of a connection."""
+        kind = local(wire)
+        if kind not in ENDS:
+            raise InputError(f"'{self.file}': {kind} is not supported")
+        ends = sorted(wire, key=local, reverse=True)
+        if tuple(local(end) for end in ends) != ENDS[kind]:
+            raise InputError(f"'{self.file}': a {kind} needs a {ENDS[kind][0]} and a {ENDS[kind][1]}")
+        return ends[0], ends[1]
 
     def end(self, element: Element) -> tuple[str, str]:
         """Simulator and name of one end of a connection."""
         where = f"'{self.file}': a connection"
         simulator, name = need(element, "simulator", where), need(element, "name", where)
-        if simulator not in self.models:
-            raise InputError(f"{where}: no simulator '{simulator}'{nearest(simulator, self.models)}")
+        if local(element) == "Variable":
+            variable(self.models, simulator, name, where)
+        elif simulator not in self.models:
+            raise InputError(f"{where}: there is no '{simulator}'{nearest(simulator, self.models)}")
         return simulator, name
 
-    def connections(self) -> tuple[list[list[str]], dict[str, dict[str, float]]]:
-        """Connections, and the transformation at each input that has one."""
-        found: list[list[str]] = []
-        functions = self.functions()
-        into: dict[str, str] = {}
-        out_of: dict[str, list[str]] = {}
-        for wire in self.root.iterfind("osp:Connections/*", NAMES):
-            kind = local(wire)
-            ends = [child for child in wire if local(child) in ("Variable", "VariableGroup")]
-            if kind == "VariableConnection":
-                found.append(self.directed(*(self.end(e) for e in ends)))
-            elif kind == "VariableGroupConnection":
-                first, second = (self.end(e) for e in ends)
-                found += [self.directed(a, b) for a, b in self.grouped(first, second)]
-            elif kind == "SignalConnection":
-                signal = next(child for child in wire if local(child) == "Signal")
-                function = need(signal, "function", f"'{self.file}': a connection")
-                if function not in functions:
-                    raise InputError(
-                        f"'{self.file}': no function '{function}'{nearest(function, functions)}"
-                    )
-                variable = ".".join(self.end(ends[0]))
-                if signal.get("name") == "in":
-                    into[function] = variable
-                else:
-                    out_of.setdefault(function, []).append(variable)
-            else:
-                raise InputError(f"'{self.file}': {kind} is not supported")
-        transformations: dict[str, dict[str, float]] = {}
-        for function, (factor, offset) in functions.items():
-            for target in out_of.get(function, []):
-                if function not in into:
-                    raise InputError(f"'{self.file}': nothing feeds the function '{function}'")
-                found.append([into[function], target])
-                transformations[target] = {"factor": factor, "offset": offset}
-        return found, transformations
+    def signal(self, element: Element, functions: Collection[str]) -> tuple[str, str]:
+        """Function and signal of one end of a connection."""
+        where = f"'{self.file}': a connection"
+        function, name = need(element, "function", where), need(element, "name", where)
+        if function not in functions:
+            raise InputError(f"'{self.file}': no function '{function}'{nearest(function, functions)}")
+        if name not in ("in", "out"):
+            raise InputError(f"{where}: '{function}' has no signal '{name}'; there are in, out")
+        return function, name
+
+    def units_differ(self, a: End, b: End) -> bool:
+        """Whether a scenario would convert between two ends, which libcosim does not."""
+        ends = f"{'.'.join(a)} and {'.'.join(b)}"
+        one, other = (self.models[simulator].variables[name].unit for simulator, name in (a, b))
+        if conversion(one, other, f"'{self.file}': {ends}") in (None, SAME):
+            return False
+        names = " and ".join(f"'{unit.name}'" for unit in (one, other) if unit is not None)
+        self.notes.append(f"{ends} are in {names}; values pass unchanged, as in libcosim")
+        return True
 
     def functions(self) -> dict[str, tuple[float, float]]:
         """Linear transformations: name -> factor, offset."""
@@ -149,20 +184,21 @@ class _Reader:
             where = f"'{self.file}': function '{name}'"
             if local(function) != "LinearTransformation":
                 raise InputError(f"{where}: {local(function)} is not supported")
+            if name in found:
+                raise InputError(f"{where} stands there twice")
             found[name] = (
                 number(function.get("factor", "1"), f"{where}: factor"),
                 number(function.get("offset", "0"), f"{where}: offset"),
             )
         return found
 
-    def directed(self, a: tuple[str, str], b: tuple[str, str]) -> list[str]:
+    def directed(self, a: End, b: End) -> tuple[str, str]:
         """A connection in the direction in which values go; the file may tell either."""
-        known = self.models[a[0]].variables.get(a[1])
-        if known is not None and known.causality == "input":
+        if self.models[a[0]].variables[a[1]].causality == "input":
             a, b = b, a
-        return [".".join(a), ".".join(b)]
+        return ".".join(a), ".".join(b)
 
-    def grouped(self, a: tuple[str, str], b: tuple[str, str]) -> list[tuple[Any, Any]]:
+    def grouped(self, a: End, b: End) -> list[tuple[End, End]]:
         """The connections of two variable groups."""
         first, second = self.group(*a), self.group(*b)
         if len(first) != len(second):
@@ -178,14 +214,13 @@ class _Reader:
         described = f"{model.name}_OspModelDescription.xml"
         for file in (model.path.parent / described, self.folder / described):
             if file.is_file():
-                root = parse(file.read_bytes(), f"'{file}'", "OspModelDescription")
                 break
         else:
             raise InputError(f"'{self.file}': {simulator}.{name} needs '{described}'")
-        groups = {g.get("name", ""): g for g in _inside(root) if local(g) != "Variable"}
-        if name not in groups:
-            raise InputError(f"'{file}' has no variable group '{name}'{nearest(name, groups)}")
-        return [v.get("ref", "") for v in _inside(groups[name]) if local(v) == "Variable"]
+        found = variables_of_group(file, name)
+        for reference in found:
+            variable(self.models, simulator, reference, f"'{file}': group '{name}'")
+        return found
 
     def scenario(self) -> dict[str, Any]:
         """Events and end of the scenario file, if there is just one."""
@@ -199,16 +234,9 @@ class _Reader:
             content = json.loads(files[0].read_text(encoding="utf-8-sig"))
             defaults = content.get("defaults", {})
             events = [{**defaults, **event} for event in content.get("events", [])]
-        except (OSError, ValueError, AttributeError, TypeError) as error:
+        except (OSError, ValueError, AttributeError, TypeError, RecursionError) as error:
             raise InputError(f"'{files[0]}' cannot be read as an OSP scenario: {error}") from None
         if events:
             self.notes.append(f"with the events of '{files[0].name}'")
         found = {"events": events, "description": content.get("description", "")}
         return found | ({"stop": content["end"]} if "end" in content else {})
-
-
-def _inside(element: Element) -> Iterator[Element]:
-    """All that is inside an element, at any depth."""
-    found = element.iter()
-    next(found)
-    return found

@@ -1,26 +1,20 @@
 """SSP 1.0 archives as scenarios: components, connections, parameter sets, steps and the end."""
 
 import re
-import zipfile
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from ..archive import check_archive
+from ..archive import Archive
 from ..errors import InputError, nearest
-from ..fmu import Model
+from ..fmu import Model, Variable
+from ..units import SAME, Conversion, conversion
+from .bindings import NAMES, Bindings, Given, file_inside, is_unit_kept, linear
 from .portable import file_stems
-from .reading import Imported, Unpacked, file_of, need, number, parse, start_value
+from .reading import Imported, Unpacked, need, number, parse, variable
 from .ssp import OSP_ANNOTATION, SPACES, STRUCTURE
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
-SET_TYPE = "application/x-ssp-parameter-set"
-MAPPINGS = "http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
-NAMES = {**SPACES, "ssm": MAPPINGS}
-# An FMU of a gigabyte is one that somebody means to fill a disk with.
-LARGEST = 2**30
-
-Values = dict[str, Any]
 
 
 def read_ssp(path: Path) -> Imported:
@@ -29,45 +23,41 @@ def read_ssp(path: Path) -> Imported:
     Raises:
         InputError: no SSP 1.0 archive, or it has something that this master cannot do.
     """
-    check_archive(path)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return _Reader(path, archive).read()
-    except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
-        raise InputError(f"'{path}' cannot be read as an SSP archive: {error}") from None
+    return _Reader(Archive(path)).read()
 
 
 class _Reader:
     """One pass over an archive."""
 
-    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
-        self.path = path
+    def __init__(self, archive: Archive) -> None:
+        self.path = archive.path
         self.archive = archive
         self.unpacked = Unpacked()
         self.notes: list[str] = []
-        self.values: dict[str, Values] = {}
+        self.bindings = Bindings(archive, self.notes)
+        self.values: dict[str, dict[str, Any]] = {}
         self.models: dict[str, Model] = {}
 
     def read(self) -> Imported:
-        root = parse(self.file(STRUCTURE), f"'{self.path}'", "SystemStructureDescription", SPACES["ssd"])
+        text = self.archive.read(STRUCTURE)
+        root = parse(text, self.path, "SystemStructureDescription", SPACES["ssd"])
         if root.get("version") not in ("1.0", "1.0.1"):
             raise InputError(f"'{self.path}' is of SSP {root.get('version')}; this reader knows 1.0")
         system = root.find("ssd:System", NAMES)
         if system is None:
             raise InputError(f"'{self.path}' has no system")
         fmus = self.components(system)
-        for binding in system.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
-            for name, value in self.binding(binding, "the system").items():
-                instance, _, parameter = name.partition(".")
-                if instance not in fmus:
-                    raise InputError(
-                        f"'{self.path}': a parameter of the system, '{name}', belongs to no component"
-                        f"{nearest(instance, fmus)}"
-                    )
-                self.values[instance][parameter] = value
+        for name, given in self.bindings.read(system, f"'{self.path}': the system").items():
+            instance, _, parameter = name.partition(".")
+            if instance not in fmus:
+                raise InputError(
+                    f"'{self.path}': a parameter of the system, '{name}', belongs to no component"
+                    f"{nearest(instance, fmus)}"
+                )
+            self.set(instance, parameter, given)
         for name, entry in fmus.items():
             entry["parameters"] = self.values[name]
-        connections, transformations = self.connections(system, fmus)
+        connections, transformations = self.connections(system)
         content = {
             "name": re.sub(r"[/\\\x00]", "_", need(root, "name", f"'{self.path}'")) or "system",
             "description": system.get("description", ""),
@@ -79,14 +69,6 @@ class _Reader:
         }
         self.notes.append("all FMUs step at once (jacobi), as in other tools")
         return Imported(content, self.unpacked.path, self.notes, self.unpacked)
-
-    def file(self, name: str) -> bytes:
-        """What a file of the archive holds."""
-        if name not in self.archive.namelist():
-            raise InputError(f"'{self.path}' has no '{name}'{nearest(name, self.archive.namelist())}")
-        if self.archive.getinfo(name).file_size > LARGEST:
-            raise InputError(f"'{self.path}': '{name}' is larger than {LARGEST // 2**30} GiB")
-        return self.archive.read(name)
 
     def components(self, system: Element) -> dict[str, dict[str, Any]]:
         """Entries of ``fmus``; their FMUs are written to the scratch folder."""
@@ -110,106 +92,71 @@ class _Reader:
                 raise InputError(f"{where}: type '{element.get('type')}' is not supported")
             if element.get("implementation", "any") not in ("any", "CoSimulation"):
                 raise InputError(f"{where}: this master runs co-simulation only")
-            source = str(PurePosixPath(file_of(need(element, "source", where), where)))
-            (self.unpacked.path / f"{stem}.fmu").write_bytes(self.file(source))
+            self.models[name] = self.unpack(need(element, "source", where), f"{stem}.fmu", where)
             fmus[name] = {"path": f"./{stem}.fmu"}
             hint = element.find(f".//ssc:Annotation[@type='{OSP_ANNOTATION}']/osp:StepSizeHint", NAMES)
             if hint is not None:
                 fmus[name]["step"] = number(hint.get("value"), f"{where}: StepSizeHint")
-            self.models[name] = Model(self.unpacked.path / f"{stem}.fmu")
             self.values[name] = {}
-            for binding in element.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
-                self.values[name] |= self.binding(binding, where, name)
+            for parameter, given in self.bindings.read(element, where).items():
+                self.set(name, parameter, given)
         return fmus
 
-    def binding(self, binding: Element, where: str, component: str = "") -> Values:
-        """Parameter -> value of one binding, of a component or of the system."""
-        if binding.get("type", SET_TYPE) != SET_TYPE or binding.get("sourceBase", "SSD") != "SSD":
-            raise InputError(f"{where}: this kind of parameter binding is not supported")
-        source = binding.get("source")
-        if source is not None:
-            file = str(PurePosixPath(file_of(source, where)))
-            root = parse(self.file(file), f"'{file}'", "ParameterSet", SPACES["ssv"])
-        else:
-            root = binding.find("ssd:ParameterValues/ssv:ParameterSet", NAMES)
-            if root is None:
-                raise InputError(f"{where}: a parameter binding without values")
-        prefix = binding.get("prefix", "")
-        values: Values = {}
-        for entry in root.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
-            name = prefix + need(entry, "name", where)
-            typed = next(iter(entry), None)
-            if typed is None:
-                raise InputError(f"{where}: the parameter '{name}' has no value")
-            values[name] = start_value(typed, f"{where}: {name}")
-            self.check_unit(typed.get("unit"), f"{component}.{name}" if component else name, where)
-        mapping = binding.find("ssd:ParameterMapping", NAMES)
-        return values if mapping is None else self.mapped(mapping, values, where)
+    def unpack(self, source: str, file: str, where: str) -> Model:
+        """The FMU that a component names, from now on a file of the scratch folder."""
+        inside = file_inside(source, where)
+        path = self.unpacked.path / file
+        path.write_bytes(self.archive.read(inside))
+        try:
+            return Model(path)
+        except InputError as error:
+            # The user knows the archive, not the scratch folder.
+            raise InputError(str(error).replace(str(path), f"{self.path}/{inside}")) from None
 
-    def check_unit(self, unit: str | None, name: str, where: str) -> None:
-        """A value may not claim another unit than the FMU's."""
-        component, _, parameter = name.partition(".")
-        if unit is None or component not in self.models:
-            return
-        variable = self.models[component].variables.get(parameter)
-        if variable is not None and variable.unit is not None and variable.unit.name != unit:
+    def set(self, instance: str, parameter: str, given: Given) -> None:
+        """Take a start value; it may not claim another unit than the FMU's."""
+        known = self.models[instance].variables.get(parameter)
+        unit = known.unit if known is not None else None
+        if unit is not None and given.unit not in (None, unit.name):
             raise InputError(
-                f"{where}: {name} is in '{unit}', but the FMU's unit is '{variable.unit.name}'"
+                f"{given.where}: {instance}.{parameter} is in '{given.unit}', but the FMU's unit is "
+                f"'{unit.name}'"
             )
+        self.values[instance][parameter] = given.value
 
-    def mapped(self, mapping: Element, values: Values, where: str) -> Values:
-        """Values under the names, and in the scale, that a mapping gives them."""
-        source = mapping.get("source")
-        root = mapping.find("ssm:ParameterMapping", NAMES)
-        if source is not None:
-            file = str(PurePosixPath(file_of(source, where)))
-            root = parse(self.file(file), f"'{file}'", "ParameterMapping", MAPPINGS)
-        found: Values = {}
-        for entry in () if root is None else root.iterfind("ssm:MappingEntry", NAMES):
-            name, target = need(entry, "source", where), need(entry, "target", where)
-            if name not in values:
-                continue
-            found[target] = values[name]
-            for transformation in entry:
-                factor, offset = self.linear(transformation, f"{where}: mapping of '{name}'")
-                found[target] = factor * values[name] + offset
-        return found
-
-    def linear(self, element: Element, where: str) -> tuple[float, float]:
-        """Factor and offset of a transformation."""
-        if element.tag != f"{{{SPACES['ssc']}}}LinearTransformation":
-            kind = element.tag.rpartition("}")[2]
-            raise InputError(f"{where}: {kind} is not supported")
-        factor, offset = element.get("factor", "1"), element.get("offset", "0")
-        return number(factor, f"{where}: factor"), number(offset, f"{where}: offset")
-
-    def connections(
-        self, system: Element, fmus: dict[str, Any]
-    ) -> tuple[list[list[str]], dict[str, dict[str, float]]]:
-        """Connections, and the transformation at each input that has one."""
+    def connections(self, system: Element) -> tuple[list[list[str]], dict[str, dict[str, float]]]:
+        """Connections, and what becomes of values at inputs where it is not the units alone that say."""
         found: list[list[str]] = []
         transformations: dict[str, dict[str, float]] = {}
         for wire in system.iterfind("ssd:Connections/ssd:Connection", NAMES):
             where = f"'{self.path}': a connection"
             start, end = wire.get("startElement"), wire.get("endElement")
-            output = f"{start}.{need(wire, 'startConnector', where)}"
-            target = f"{end}.{need(wire, 'endConnector', where)}"
+            names = need(wire, "startConnector", where), need(wire, "endConnector", where)
             if start is None or end is None:
-                face = (output if start is None else target).partition(".")[2]
+                face = names[0] if start is None else names[1]
                 self.notes.append(f"'{face}' of the whole system is connected to nothing here")
                 continue
-            for element in (start, end):
-                if element not in fmus:
-                    raise InputError(f"{where}: no component '{element}'{nearest(element, fmus)}")
+            output, target = f"{start}.{names[0]}", f"{end}.{names[1]}"
             where = f"'{self.path}': {output} -> {target}"
-            if wire.get("suppressUnitConversion") in ("true", "1"):
-                raise InputError(f"{where}: suppressUnitConversion is not supported")
+            a = variable(self.models, start, names[0], where)
+            b = variable(self.models, end, names[1], where)
             found.append([output, target])
-            for child in wire:
-                if child.tag.startswith(f"{{{SPACES['ssc']}}}"):
-                    factor, offset = self.linear(child, where)
-                    transformations[target] = {"factor": factor, "offset": offset}
+            how = linear(wire, where)
+            if how is not None or (is_unit_kept(wire) and b.type == "Real"):
+                first = SAME if is_unit_kept(wire) else self.conversion(a, b, where)
+                then = how or SAME
+                transformations[target] = {
+                    "factor": then.factor * first.factor,
+                    "offset": then.factor * first.offset + then.offset,
+                }
         return found, transformations
+
+    def conversion(self, a: Variable, b: Variable, where: str) -> Conversion:
+        """The conversion of units that comes before a transformation."""
+        how = conversion(a.unit, b.unit, where)
+        if how is None:
+            self.notes.append(f"{where}: the units cannot be compared; only the transformation acts")
+        return how or SAME
 
     def experiment(self, root: Element, system: Element) -> dict[str, float]:
         """Step and end."""

@@ -1,18 +1,25 @@
 """Systems of other tools as the content of a scenario, and what their readers share."""
 
-import math
 import shutil
 import tempfile
 import weakref
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from ..errors import InputError
+from ..archive import check_xml, integer, real
+from ..errors import InputError, nearest
+
+if TYPE_CHECKING:
+    from ..fmu import Model, Variable
+
+# No system has longer paths.
+LONGEST = 4096
 
 
 class Unpacked:
@@ -59,29 +66,38 @@ def read_system(path: Path) -> Imported:
     return read_ssp(path) if path.suffix == ".ssp" else read_osp(path)
 
 
-class _Builder(ElementTree.TreeBuilder):
-    """Refuses document types, with which a short file can become a long one."""
-
-    def doctype(self, *_: Any) -> None:
-        raise ValueError("it has a document type, which is refused")
-
-
-def parse(text: bytes, where: str, tag: str, namespace: str = "") -> Element:
+def parse(text: bytes, path: Path | str, tag: str, namespace: str = "") -> Element:
     """The root of a document, which must be of this kind.
 
     Args:
         text: the document.
-        where: what messages call it.
+        path: where it comes from.
         tag: of the root.
         namespace: of the root; any if empty.
+
+    Raises:
+        InputError: it has a DOCTYPE, is not XML, or of another kind.
+    """
+    check_xml(text, path, tag)
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as {tag}: {error}") from None
+    if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
+        raise InputError(f"'{path}' is no {tag} that this reader knows, but '{root.tag}'")
+    return root
+
+
+def read_file(path: Path) -> bytes:
+    """What a file holds.
+
+    Raises:
+        InputError: it cannot be read.
     """
     try:
-        root = ElementTree.fromstring(text, ElementTree.XMLParser(target=_Builder()))
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise InputError(f"{where} cannot be read: {error}") from None
-    if local(root) != tag or (namespace and root.tag != f"{{{namespace}}}{tag}"):
-        raise InputError(f"{where} is no {tag} that this reader knows, but '{root.tag}'")
-    return root
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"'{path}' cannot be read: {error.strerror}") from None
 
 
 def need(element: Element, name: str, where: str) -> str:
@@ -94,11 +110,10 @@ def need(element: Element, name: str, where: str) -> str:
 
 def number(text: str | None, where: str) -> float:
     """A finite number."""
-    with suppress(ValueError):
-        value = float(text or "")
-        if math.isfinite(value):
-            return value
-    raise InputError(f"{where} = '{text}' is not a number")
+    value = real(text or "")
+    if value is None:
+        raise InputError(f"{where} = '{text}' is not a number")
+    return value
 
 
 def start_value(element: Element, where: str) -> bool | int | float | str:
@@ -114,10 +129,25 @@ def start_value(element: Element, where: str) -> bool | int | float | str:
     if kind == "Real":
         return number(text, where)
     if kind == "Integer":
-        with suppress(ValueError):
-            return int(text)
-        raise InputError(f"{where} = '{text}' is not a whole number")
+        value = integer(text)
+        if value is None:
+            raise InputError(f"{where} = '{text[:100]}' is not a whole number")
+        return value
     raise InputError(f"{where}: values of type {kind} are not supported")
+
+
+def variable(models: Mapping[str, "Model"], instance: str, name: str, where: str) -> "Variable":
+    """The variable that one end of a connection means; * is a wildcard in scenarios only.
+
+    Raises:
+        InputError: no such instance, or it has no such variable.
+    """
+    if instance not in models:
+        raise InputError(f"{where}: there is no '{instance}'{nearest(instance, models)}")
+    known = models[instance].variables
+    if name not in known or "*" in name:
+        raise InputError(f"{where}: '{instance}' has no variable '{name}'{nearest(name, known)}")
+    return known[name]
 
 
 def local(element: Element) -> str:
@@ -127,7 +157,9 @@ def local(element: Element) -> str:
 
 def file_of(source: str, where: str) -> str:
     """The path that a URI means: relative, or absolute with the scheme ``file``."""
-    parts = urlsplit(source)
-    if parts.scheme not in ("", "file") or parts.netloc or parts.query or parts.fragment:
-        raise InputError(f"{where}: '{source}' is not a file; only files are supported")
-    return unquote(parts.path)
+    with suppress(ValueError):
+        parts = urlsplit(source)
+        is_plain = not (parts.netloc or parts.query or parts.fragment) and len(source) <= LONGEST
+        if parts.scheme in ("", "file") and is_plain:
+            return unquote(parts.path)
+    raise InputError(f"{where}: '{source[:100]}' is not a file; only files are supported")

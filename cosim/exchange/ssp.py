@@ -63,7 +63,7 @@ def _structure(system: System, parts: Sequence[Part]) -> Element:
     if system.connections:
         wires = SubElement(whole, "ssd:Connections")
         for c in system.connections:
-            SubElement(
+            wire = SubElement(
                 wires,
                 "ssd:Connection",
                 startElement=c.source.instance,
@@ -71,6 +71,9 @@ def _structure(system: System, parts: Sequence[Part]) -> Element:
                 endElement=c.target.instance,
                 endConnector=c.target.variable.name,
             )
+            if c.target.name in scenario.transformations:
+                # Nothing is converted, though the units may say otherwise.
+                wire.set("suppressUnitConversion", "true")
     if units:
         listed = SubElement(root, "ssd:Units")
         for name, attributes in units.items():
