@@ -77,21 +77,15 @@ def _examine_all(
     ):
         task = bar.add_task("checking", total=len(fmus) * len(chosen))
 
-        def after_each_rule() -> None:
-            bar.advance(task)
-            if stopped.is_set():
-                raise KeyboardInterrupt
+        def check(fmu: Fmu) -> Outcomes:
+            run, done = not options.no_run, lambda: bar.advance(task)
+            return examine(fmu, chosen, options.timeout, run, done, stopped)
 
-        running = [
-            pool.submit(examine, fmu, chosen, options.timeout, not options.no_run, after_each_rule)
-            for fmu in fmus
-        ]
         try:
-            return [future.result() for future in running]
-        except KeyboardInterrupt:
+            return list(pool.map(check, fmus))
+        finally:
             stopped.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+            pool.shutdown(cancel_futures=True)
 
 
 def _positive(text: str) -> float:

@@ -77,6 +77,11 @@ class Fmu:
         return f"binaries/{here}/{self.description.cs.get('modelIdentifier', '')}{suffix(here)}"
 
     def unpack(self, folder: Path) -> None:
-        """Unpack into a folder; zipfile drops what would leave it, and writes links as plain files."""
+        """Unpack into a folder all but the binaries of other platforms; zipfile drops what would leave
+        it, and writes links as plain files.
+        """
+        here = f"binaries/{platform()}/"
+        names = [member.filename for member in self.members]
+        wanted = [n for n in names if n.startswith(here) or not n.startswith("binaries/")]
         with zipfile.ZipFile(self.path) as archive:
-            archive.extractall(folder)
+            archive.extractall(folder, wanted)
