@@ -13,10 +13,12 @@ import pytest
 from conftest import COMPONENTS, GAIN, ROOT
 
 from fmus.build import _sources
+from fmus.check import source
 from fmus.check.examine import examine
-from fmus.check.fmu import BadFileError, Fmu
+from fmus.check.fmu import Fmu
 from fmus.check.registry import RULES, in_order
 from fmus.check.report import listing
+from fmus.check.source import BadFileError
 from fmus.declare import discover
 
 READING = [rule.name for rule in in_order() if not rule.runs]
@@ -282,7 +284,10 @@ def test_command_tells_findings_with_their_clause(tmp_path):
     assert "experiment (FMI 2.0.4, 2.2.5)" in done.stdout
     assert "lag: it stops at 0 s" in done.stdout
     assert "1 finding in 1 FMU" in done.stdout
-    told = json.loads(run_check(path, "--no-run", "--json").stdout)
+    # A file that is no FMU does not take the results of the others away, wherever options stand.
+    done = run_check(path, "--no-run", "--json", __file__)
+    assert (done.returncode, done.stderr.count("error: ")) == (2, 1)
+    told = json.loads(done.stdout)
     assert told["findings"] == 1
     assert told["fmus"][0]["checks"]["experiment"]["found"] == ["it stops at 0 s, but starts at 0 s"]
     assert told["fmus"][0]["checks"]["life"]["skipped"]
@@ -317,11 +322,27 @@ def test_command_refuses_with_one_line(arguments, message):
         (("<?xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><?xml"), "defines entities"),
         (("</fmiModelDescription>", ""), "is not XML"),
         (("CoSimulation", "ModelExchange"), "not for co-simulation"),
+        (('"UTF-8"', '"klingon"'), "unknown encoding"),
+        (('"UTF-8"', '"gbk"'), "multi-byte encodings"),
+        (('<Tool name="here"/>', "<a>" * 100_000 + "</a>" * 100_000), "nests more than 100"),
     ],
 )
 def test_what_is_no_fmu_for_this_is_refused(edit, message, tmp_path):
     with pytest.raises(BadFileError, match=message):
         Fmu(lag.pack(tmp_path, [edit], compiled=False))
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [({"MOST_ENTRIES": 2}, "holds 3 files, more than 2"), ({"MOST_BYTES": 1000}, "archive bomb"),
+     ({"SMALL": 1000, "MOST_RATIO": 0.5}, "archive bomb")],
+)  # fmt: skip
+def test_archive_that_becomes_too_large_is_refused(limit, message, tmp_path, monkeypatch):
+    path = lag.pack(tmp_path, compiled=False)
+    for name, value in limit.items():
+        monkeypatch.setattr(source, name, value)
+    with pytest.raises(BadFileError, match=message):
+        Fmu(path)
 
 
 def test_absent_tool_is_told(tmp_path, monkeypatch):
