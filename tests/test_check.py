@@ -161,6 +161,7 @@ def test_variable_without_a_type_is_told_and_not_run(tmp_path):
 
 
 STEP = "s->y += h"
+PENDING = ("(s->u - s->y);\n    return 0;", "(s->u - s->y);\n    return 5;")
 # Rule, edits of the source, edits of the description, what the rule says.
 MISBEHAVING = [
     ("exports", [("fmi2CancelStep", "cancel")], [], "fmi2CancelStep is not exported"),
@@ -168,6 +169,7 @@ MISBEHAVING = [
     ("life", [("return NULL", "return NULL; return NULL"), ('"{lag}"', '"{gal}"')], [], "fmi2Instantiate returned"),
     ("life", [("fmi2Terminate(void *c) {", "fmi2Terminate(void *c) { raise(SIGSEGV);")], [], "fmi2Terminate: the process ended by SIGSEGV"),
     ("life", [(STEP, "return 3; s->y += h")], [], "fmi2DoStep returned error"),
+    ("life", [PENDING], [], "fmi2DoStep returned pending"),
     ("life", [(STEP, 'm->callbacks->logger(0, "", 1, "gossip", "hm"); s->y += h')], [], "category 'gossip'"),
     ("free", [("alive--;", "if (!m->s.running) abort(); alive--;")], [], "fmi2FreeInstance: the process ended by SIGABRT"),
     ("logging", [("const char *const k[]) { return 0; }", "const char *const k[]) { return 3; }")], [], "fmi2SetDebugLogging returned error"),
@@ -194,6 +196,27 @@ MISBEHAVING = [
 def test_each_trial_fires_on_an_fmu_that_breaks_it(rule, c, xml, text, tmp_path):
     said = found(lag.pack(tmp_path, xml, c), rule)
     assert any(text in line for line in said[rule]), said
+
+
+ABLE = "canHandleVariable"
+# Rule, edits of the source, edits of the description, why the rule says nothing (it passes without).
+ALLOWED = [
+    ("life", [PENDING, ("int *v) { return 2; }\nint fmi2GetReal", "int *v) { static int n; *v = n++ % 3 ? 5 : 0; return 0; }\nint fmi2GetReal")],
+             [(ABLE, 'canRunAsynchronuously="true" ' + ABLE)], ""),
+    ("read-back", [("vr[k] == 2) m", "vr[k] == 2 && v[k] > 0.0) m")], [(T, '<Real unit="s" start="0.001"/>')], ""),
+    ("read-back", [("m->s.T = v[k]", "return 2")], [], "fmi2SetReal returned discard"),
+    ("step-size", [(STEP, "if (h > 0.015) return 2; s->y += h")], [], "fmi2DoStep returned discard"),
+    ("life", [(', "{lag}")', ', "the tool")')], [(ABLE, 'needsExecutionTool="true" ' + ABLE)], "needsExecutionTool is declared"),
+]  # fmt: skip
+
+
+@compiled
+@pytest.mark.parametrize(("rule", "c", "xml", "why"), ALLOWED)
+def test_what_the_standard_allows_is_no_finding(rule, c, xml, why, tmp_path):
+    outcome = examine(Fmu(lag.pack(tmp_path, xml, c)), [RULES[rule]], 30.0)[rule]
+    assert outcome.found == []
+    assert why in outcome.skipped
+    assert bool(why) == bool(outcome.skipped)
 
 
 def test_every_rule_has_a_broken_fmu():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .api import DISCARD, Instance, Library, StatusError
+from .api import Instance, Library, StatusError
 from .description import Description, Variable, flag, number, whole
 from .registry import NotApplicableError
 
@@ -43,9 +43,15 @@ class Bench:
             raise NotApplicableError("canBeInstantiatedOnlyOncePerProcess is declared")
         resources = (self.folder / "resources").as_uri()
         guid = self.description.root.get("guid", "")
-        made = Instance(self.library, f"instance_{len(self.instances)}", guid, resources)
-        self.instances.append(made)
-        return made
+        name = f"instance_{len(self.instances)}"
+        asynchronous = self.description.has("canRunAsynchronuously")  # the standard's spelling
+        try:
+            self.instances.append(Instance(self.library, name, guid, resources, asynchronous))
+        except StatusError as refused:
+            if self.description.has("needsExecutionTool"):
+                raise NotApplicableError(f"needsExecutionTool is declared, and {refused}") from None
+            raise
+        return self.instances[-1]
 
     def initialising(self) -> Instance:
         """A new instance in initialisation mode."""
@@ -61,15 +67,8 @@ class Bench:
         return made
 
     def advance(self, instance: Instance, k: int) -> None:
-        """The communication step number ``k``; an FMU may discard it, and then nothing can be
-        compared.
-        """
-        try:
-            instance.step(self.start + k * self.step, self.step)
-        except StatusError as refused:
-            if refused.status == DISCARD:
-                raise NotApplicableError(str(refused)) from None
-            raise
+        """The communication step number ``k``."""
+        instance.step(self.start + k * self.step, self.step)
 
     def play(self, instance: Instance, steps: int, seed: int, first: int = 0) -> list[Row]:
         """Outputs after each of some steps with inputs that depend on seed and number of the step.
@@ -103,14 +102,14 @@ def start_value(v: Variable) -> Any:
 
 
 def near(v: Variable, share: float) -> float:
-    """A value of a Real variable near its start and inside its limits.
+    """A value of a Real variable near its start, of the same sign, and inside its limits.
 
     Args:
         v: the variable.
-        share: how far away, as a share (-1 to 1) of a tenth of its size.
+        share: how far away, as a share (-1 to 1) of a tenth of its start, or its nominal for zero.
     """
     start = start_value(v) or 0.0
-    size = max(abs(start), abs(number(v.all.get("nominal")) or 1.0))
+    size = abs(start) or abs(number(v.all.get("nominal")) or 1.0)
     low, high = v.limits
     value = start + 0.1 * share * size
     if not low <= value <= high:

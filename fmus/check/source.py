@@ -1,4 +1,4 @@
-"""Reading an archive and XML that nobody vouches for: refused before they fill the memory or the disk."""
+"""Reading archives and XML that nobody vouches for: refused before they fill the memory or the disk."""
 
 import codecs
 import lzma
