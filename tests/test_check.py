@@ -6,6 +6,7 @@ import stat
 import subprocess
 import sys
 import zipfile
+from xml.etree import ElementTree
 
 import ccode
 import lag
@@ -14,6 +15,8 @@ from conftest import COMPONENTS, GAIN, ROOT
 
 from fmus.build import _sources
 from fmus.check import source
+from fmus.check.bench import other
+from fmus.check.description import Description
 from fmus.check.examine import examine
 from fmus.check.fmu import Fmu
 from fmus.check.registry import RULES, in_order
@@ -32,11 +35,10 @@ def found(path, *names, timeout=30.0):
     return {name: outcome.found for name, outcome in outcomes.items() if outcome.found}
 
 
-def link():
-    member = zipfile.ZipInfo("resources/link")
-    member.create_system = 3
-    member.external_attr = (stat.S_IFLNK | 0o777) << 16
-    return member
+def member(name, mode=0o644, compressed=zipfile.ZIP_STORED):
+    info = zipfile.ZipInfo(name)
+    info.create_system, info.external_attr, info.compress_type = 3, mode << 16, compressed
+    return info
 
 
 U = '<ScalarVariable name="in.u[1]" valueReference="0" causality="input"><Real declaredType="Speed" start="0"/></ScalarVariable>'
@@ -48,6 +50,7 @@ TIME = '<ScalarVariable name="{}" valueReference="{}" causality="independent"><R
 
 # Rule, edits of the description, what the rule says.
 BROKEN = [
+    ("encoding", [('"UTF-8"', '"ISO-8859-1"')], "is in ISO-8859-1"),
     ("header", [('guid="{lag}"', 'guid=""')], "guid is missing"),
     ("header", [("2024-05-06T07:08:09Z", "6 May 2024")], "'6 May 2024'"),
     ("capabilities", [('modelIdentifier="lag"', 'modelIdentifier="1 lag"')], "no name that C"),
@@ -89,6 +92,7 @@ BROKEN = [
     ("limits", [('min="0.01"', 'min="2"')], "outside of 2"),
     ("limits", [('min="0.01"', 'min="2" max="0"')], "min 2, max 0"),
     ("limits", [('nominal="1"', 'nominal="0"')], "nominal is '0'"),
+    ("limits", [('declaredType="Mode" start="1"', 'declaredType="Mode" start="3"')], "start 3 is no item"),
     ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "can be set"),
     ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "has a start"),
     ("aliases", [("</ModelVariables>", CONSTANT.format(1) + CONSTANT.format(2) + "</ModelVariables>")], "start diff"),
@@ -136,7 +140,9 @@ def test_a_description_without_a_fault_passes(tmp_path):
 @pytest.mark.parametrize(
     ("member", "text"),
     [("../evil", "leaves the folder"), ("/etc/evil", "leaves the folder"), ("a\\b", "backslash"),
-     (link(), "is a link"), ("sources/lag.c", "there 2 times")],
+     ("C:/evil", "leaves the folder"),
+     (member("resources/link", stat.S_IFLNK | 0o777), "is a link"),
+     (member("resources/x", compressed=zipfile.ZIP_BZIP2), "compressed by method 12"), ("sources/lag.c", "there 2 times")],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path):
@@ -161,6 +167,7 @@ def test_variable_without_a_type_is_told_and_not_run(tmp_path):
 
 
 STEP = "s->y += h"
+TUNABLE = ('"parameter" variability="fixed"', '"parameter" variability="tunable"')
 PENDING = ("(s->u - s->y);\n    return 0;", "(s->u - s->y);\n    return 5;")
 # Rule, edits of the source, edits of the description, what the rule says.
 MISBEHAVING = [
@@ -179,6 +186,11 @@ MISBEHAVING = [
     ("range-of-values", [], [('max="50"', 'min="20" max="50"')], "direct is 0, outside of 20 to 50"),
     ("reset", [("begin(c); return 0;", "Lag *m = c; m->s.running = 0; m->s.hidden += 1; return 0;"),
                (STEP, "s->y += s->hidden + h")], [], "differs: y from step 1"),
+    ("range-of-values", [(STEP, "s->y += 0.0 / 0.0 * h")], [], "y is nan, which is not finite, at step 1"),
+    ("range-of-values", [("v[0] = 1;", "v[0] = 3;")], [('variability="constant"', 'causality="output" variability="discrete"')], "mode is 3, which is no item"),
+    ("reset", [("begin(c);", "double T = ((Lag *)c)->s.T; begin(c); ((Lag *)c)->s.T = T;")], [TUNABLE], "after fmi2Reset T is 1.1, not 1.0"),
+    ("state", [("((Lag *)c)->s = *(State *)s", "double u = ((Lag *)c)->s.u; ((Lag *)c)->s = *(State *)s; ((Lag *)c)->s.u = u")], [], "in.u[1] is 0.1, not"),
+    ("instances", [("m->s.T = v[k]", "shared = v[k]"), ("double all", "if (shared) s.T = shared; double all")], [TUNABLE], "T is 1.1, not 1.0"),
     ("state", [(STEP, "shared += 1.0; s->y += shared + h")], [], "after fmi2SetFMUstate the run differs"),
     ("serialised-state", [("memcpy(b, s, n)", "memset(b, 0, n)")], [], "the same instance"),
     ("serialised-state", [(STEP, "if (!s->hidden) s->hidden = alive; s->y += s->hidden * h"),
@@ -208,6 +220,27 @@ ALLOWED = [
     ("step-size", [(STEP, "if (h > 0.015) return 2; s->y += h")], [], "fmi2DoStep returned discard"),
     ("life", [(', "{lag}")', ', "the tool")')], [(ABLE, 'needsExecutionTool="true" ' + ABLE)], "needsExecutionTool is declared"),
 ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("xml", "values"),
+    [('<Real start="0.001"/>', [0.001]), ('<Real start="-2" max="0"/>', [-2.0]), ("<Real min='0' max='0.05'/>", [0.0]),
+     ('<Integer start="3" max="3"/>', [3, 2]), ('<Boolean start="1"/>', [0, 1]),
+     ('<Enumeration declaredType="E" start="7"/>', [2, 7, 9])],
+)  # fmt: skip
+def test_another_value_is_one_the_variable_may_have(xml, values):
+    text = (
+        '<m><TypeDefinitions><SimpleType name="E"><Enumeration><Item name="a" value="7"/>'
+        '<Item name="b" value="2"/></Enumeration></SimpleType></TypeDefinitions>'
+        f"<ModelVariables><ScalarVariable>{xml}</ScalarVariable></ModelVariables></m>"
+    )
+    (v,) = Description(ElementTree.fromstring(text)).variables
+    for value in values:
+        changed = other(v, value)
+        assert changed != value
+        assert v.limits[0] <= changed <= v.limits[1]
+        assert changed in (v.items or [changed])
+        assert changed * value >= 0.0
 
 
 @compiled

@@ -17,6 +17,13 @@ def twice(names: Iterable[str | None]) -> list[str]:
     return sorted({str(name) for name in names if names.count(name) > 1})
 
 
+@rule("2.2")
+def encoding(fmu: Fmu) -> Iterator[str]:
+    """The description is encoded in UTF-8."""
+    if fmu.encoding.upper() != "UTF-8":
+        yield f"modelDescription.xml is in {fmu.encoding}"
+
+
 @rule("2.2.1")
 def header(fmu: Fmu) -> Iterator[str]:
     """guid and modelName are there, and the date of generation reads YYYY-MM-DDThh:mm:ssZ."""
