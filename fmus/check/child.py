@@ -38,7 +38,10 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
         except StatusError as refused:
             found.append(str(refused))
         except OSError as error:
-            found.append(f"the library cannot be loaded: {error}")
+            told = f"the library cannot be loaded: {error}"
+            if description.has("needsExecutionTool"):
+                return {"skipped": f"needsExecutionTool is declared, and {told}"}
+            found.append(told)
         except Exception as error:
             found.append(f"the check itself fails, please report it: {error!r}")
         return {"found": found}

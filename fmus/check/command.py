@@ -127,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
         "           python -m fmus.check mine.fmu other.fmu\n"
         "           python -m fmus.check vessel --json\n"
         "           python -m fmus.check mine.fmu --no-run\n"
-        "exit codes: 0 no findings, 1 findings, 2 bad input, 130 interrupted\n"
+        "exit codes: 0 no findings, 1 findings, 2 bad input (the rest is checked), 130 interrupted\n"
         "An FMU is a program, and checking it runs it: --no-run only reads it.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
