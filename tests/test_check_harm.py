@@ -71,8 +71,9 @@ def test_nothing_outlives_a_trial(number, tmp_path):
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     child = wait_for(pid)
-    if number:
+    for _ in range(3 if number else 0):  # an impatient user
         process.send_signal(number)
+        time.sleep(0.01)
     _, said = process.communicate(timeout=20.0)
     assert (process.returncode, said.strip()) == ((130, "interrupted") if number else (0, ""))
     assert not is_alive(child)

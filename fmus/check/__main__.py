@@ -2,13 +2,24 @@
 
 import signal
 import sys
+from typing import NoReturn
 
 from .command import BAD_INPUT, main
 
+SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+
+
+def _interrupt(*_: object) -> NoReturn:
+    """Once only: a second Ctrl-C must not keep the first from ending the trials."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 if __name__ == "__main__":
-    for name in ("SIGTERM", "SIGHUP"):  # as Ctrl-C, so that nothing is left behind
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
+    for number in SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:  # as for nohup
+            signal.signal(number, _interrupt)
     try:
         sys.exit(main())
     except KeyboardInterrupt:
