@@ -53,6 +53,9 @@ class _Callbacks(ctypes.Structure):
     )
 
 
+_KEPT: list[_Callbacks] = []  # a thread of an FMU may call back as long as the process lives
+
+
 class StatusError(Exception):
     """A call returned more than a warning, and not what it may discard."""
 
@@ -119,22 +122,17 @@ class Instance:
         self.asynchronous = asynchronous
         self.messages: list[tuple[int, str, str]] = []
         libc = ctypes.CDLL("msvcrt") if sys.platform == "win32" else ctypes.CDLL(None)
-        self._callbacks = _Callbacks(  # kept, since the FMU calls back as long as it lives
+        callbacks = _Callbacks(
             _Logger(self._listen),
             ctypes.cast(libc.calloc, c_void_p),
             ctypes.cast(libc.free, c_void_p),
             None,
             None,
         )
+        _KEPT.append(callbacks)
         instantiate = library.function("fmi2Instantiate", c_void_p)
         component = instantiate(
-            name.encode(),
-            CO_SIMULATION,
-            guid.encode(),
-            resources.encode(),
-            byref(self._callbacks),
-            0,
-            1,
+            name.encode(), CO_SIMULATION, guid.encode(), resources.encode(), byref(callbacks), 0, 1
         )
         if not component:
             raise StatusError("fmi2Instantiate", ERROR, self._said() or "no instance")
