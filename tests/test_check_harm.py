@@ -44,10 +44,10 @@ def test_fmu_that_removes_files_spoils_no_other_trial(habit, number, tmp_path):
 def wait_for(path):
     """The number that another process writes to a file."""
     deadline = time.monotonic() + 20.0
-    while not (path.exists() and path.read_text()):
+    while not (text := path.read_text() if path.exists() else ""):
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    return int(path.read_text())
+    return int(text)
 
 
 def is_alive(pid):
@@ -63,7 +63,10 @@ def is_alive(pid):
 def test_nothing_outlives_a_trial(number, tmp_path):
     pid, place = tmp_path / "pid", tmp_path / "place"
     place.mkdir()
-    forks = f'int p = fork(); if (!p) for (;;) pause(); FILE *f = fopen("{pid}", "w"); fprintf(f, "%d", p); fclose(f); '
+    forks = (
+        "static int p; if (!p) { if (!(p = fork())) for (;;) pause(); "
+        f'FILE *f = fopen("{pid}", "w"); fprintf(f, "%d", p); fclose(f); }} '
+    )
     path = pack(tmp_path, forks + ("for (;;) pause(); " if number else ""))
     process = subprocess.Popen(
         [sys.executable, "-m", "fmus.check", path, "--only", "step-dependencies"],
