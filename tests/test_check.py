@@ -6,6 +6,7 @@ import stat
 import subprocess
 import sys
 import zipfile
+from xml.etree import ElementTree
 
 import ccode
 import lag
@@ -13,10 +14,14 @@ import pytest
 from conftest import COMPONENTS, GAIN, ROOT
 
 from fmus.build import _sources
+from fmus.check import source
+from fmus.check.bench import other
+from fmus.check.description import Description
 from fmus.check.examine import examine
-from fmus.check.fmu import BadFileError, Fmu
+from fmus.check.fmu import Fmu
 from fmus.check.registry import RULES, in_order
 from fmus.check.report import listing
+from fmus.check.source import BadFileError
 from fmus.declare import discover
 
 READING = [rule.name for rule in in_order() if not rule.runs]
@@ -30,11 +35,10 @@ def found(path, *names, timeout=30.0):
     return {name: outcome.found for name, outcome in outcomes.items() if outcome.found}
 
 
-def link():
-    member = zipfile.ZipInfo("resources/link")
-    member.create_system = 3
-    member.external_attr = (stat.S_IFLNK | 0o777) << 16
-    return member
+def member(name, mode=0o644, compressed=zipfile.ZIP_STORED):
+    info = zipfile.ZipInfo(name)
+    info.create_system, info.external_attr, info.compress_type = 3, mode << 16, compressed
+    return info
 
 
 U = '<ScalarVariable name="in.u[1]" valueReference="0" causality="input"><Real declaredType="Speed" start="0"/></ScalarVariable>'
@@ -46,6 +50,7 @@ TIME = '<ScalarVariable name="{}" valueReference="{}" causality="independent"><R
 
 # Rule, edits of the description, what the rule says.
 BROKEN = [
+    ("encoding", [('"UTF-8"', '"ISO-8859-1"')], "is in ISO-8859-1"),
     ("header", [('guid="{lag}"', 'guid=""')], "guid is missing"),
     ("header", [("2024-05-06T07:08:09Z", "6 May 2024")], "'6 May 2024'"),
     ("capabilities", [('modelIdentifier="lag"', 'modelIdentifier="1 lag"')], "no name that C"),
@@ -87,6 +92,7 @@ BROKEN = [
     ("limits", [('min="0.01"', 'min="2"')], "outside of 2"),
     ("limits", [('min="0.01"', 'min="2" max="0"')], "min 2, max 0"),
     ("limits", [('nominal="1"', 'nominal="0"')], "nominal is '0'"),
+    ("limits", [('declaredType="Mode" start="1"', 'declaredType="Mode" start="3"')], "start 3 is no item"),
     ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "can be set"),
     ("aliases", [("</ModelVariables>", SECOND.format('start="0"') + "</ModelVariables>")], "has a start"),
     ("aliases", [("</ModelVariables>", CONSTANT.format(1) + CONSTANT.format(2) + "</ModelVariables>")], "start diff"),
@@ -134,7 +140,9 @@ def test_a_description_without_a_fault_passes(tmp_path):
 @pytest.mark.parametrize(
     ("member", "text"),
     [("../evil", "leaves the folder"), ("/etc/evil", "leaves the folder"), ("a\\b", "backslash"),
-     (link(), "is a link"), ("sources/lag.c", "there 2 times")],
+     ("C:/evil", "leaves the folder"),
+     (member("resources/link", stat.S_IFLNK | 0o777), "is a link"),
+     (member("resources/x", compressed=zipfile.ZIP_BZIP2), "compressed by method 12"), ("sources/lag.c", "there 2 times")],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_archive_that_reaches_outside_is_told_and_not_run(member, text, tmp_path):
@@ -159,6 +167,8 @@ def test_variable_without_a_type_is_told_and_not_run(tmp_path):
 
 
 STEP = "s->y += h"
+TUNABLE = ('"parameter" variability="fixed"', '"parameter" variability="tunable"')
+PENDING = ("(s->u - s->y);\n    return 0;", "(s->u - s->y);\n    return 5;")
 # Rule, edits of the source, edits of the description, what the rule says.
 MISBEHAVING = [
     ("exports", [("fmi2CancelStep", "cancel")], [], "fmi2CancelStep is not exported"),
@@ -166,6 +176,7 @@ MISBEHAVING = [
     ("life", [("return NULL", "return NULL; return NULL"), ('"{lag}"', '"{gal}"')], [], "fmi2Instantiate returned"),
     ("life", [("fmi2Terminate(void *c) {", "fmi2Terminate(void *c) { raise(SIGSEGV);")], [], "fmi2Terminate: the process ended by SIGSEGV"),
     ("life", [(STEP, "return 3; s->y += h")], [], "fmi2DoStep returned error"),
+    ("life", [PENDING], [], "fmi2DoStep returned pending"),
     ("life", [(STEP, 'm->callbacks->logger(0, "", 1, "gossip", "hm"); s->y += h')], [], "category 'gossip'"),
     ("free", [("alive--;", "if (!m->s.running) abort(); alive--;")], [], "fmi2FreeInstance: the process ended by SIGABRT"),
     ("logging", [("const char *const k[]) { return 0; }", "const char *const k[]) { return 3; }")], [], "fmi2SetDebugLogging returned error"),
@@ -175,6 +186,11 @@ MISBEHAVING = [
     ("range-of-values", [], [('max="50"', 'min="20" max="50"')], "direct is 0, outside of 20 to 50"),
     ("reset", [("begin(c); return 0;", "Lag *m = c; m->s.running = 0; m->s.hidden += 1; return 0;"),
                (STEP, "s->y += s->hidden + h")], [], "differs: y from step 1"),
+    ("range-of-values", [(STEP, "s->y += 0.0 / 0.0 * h")], [], "y is nan, which is not finite, at step 1"),
+    ("range-of-values", [("v[0] = 1;", "v[0] = 3;")], [('variability="constant"', 'causality="output" variability="discrete"')], "mode is 3, which is no item"),
+    ("reset", [("begin(c);", "double T = ((Lag *)c)->s.T; begin(c); ((Lag *)c)->s.T = T;")], [TUNABLE], "after fmi2Reset T is 1.1, not 1.0"),
+    ("state", [("((Lag *)c)->s = *(State *)s", "double u = ((Lag *)c)->s.u; ((Lag *)c)->s = *(State *)s; ((Lag *)c)->s.u = u")], [], "in.u[1] is 0.1, not"),
+    ("instances", [("m->s.T = v[k]", "shared = v[k]"), ("double all", "if (shared) s.T = shared; double all")], [TUNABLE], "T is 1.1, not 1.0"),
     ("state", [(STEP, "shared += 1.0; s->y += shared + h")], [], "after fmi2SetFMUstate the run differs"),
     ("serialised-state", [("memcpy(b, s, n)", "memset(b, 0, n)")], [], "the same instance"),
     ("serialised-state", [(STEP, "if (!s->hidden) s->hidden = alive; s->y += s->hidden * h"),
@@ -194,6 +210,48 @@ def test_each_trial_fires_on_an_fmu_that_breaks_it(rule, c, xml, text, tmp_path)
     assert any(text in line for line in said[rule]), said
 
 
+ABLE = "canHandleVariable"
+# Rule, edits of the source, edits of the description, why the rule says nothing (it passes without).
+ALLOWED = [
+    ("life", [PENDING, ("int *v) { return 2; }\nint fmi2GetReal", "int *v) { static int n; *v = n++ % 3 ? 5 : 0; return 0; }\nint fmi2GetReal")],
+             [(ABLE, 'canRunAsynchronuously="true" ' + ABLE)], ""),
+    ("read-back", [("vr[k] == 2) m", "vr[k] == 2 && v[k] > 0.0) m")], [(T, '<Real unit="s" start="0.001"/>')], ""),
+    ("read-back", [("m->s.T = v[k]", "return 2")], [], "fmi2SetReal returned discard"),
+    ("step-size", [(STEP, "if (h > 0.015) return 2; s->y += h")], [], "fmi2DoStep returned discard"),
+    ("life", [(', "{lag}")', ', "the tool")')], [(ABLE, 'needsExecutionTool="true" ' + ABLE)], "needsExecutionTool is declared"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("xml", "values"),
+    [('<Real start="0.001"/>', [0.001]), ('<Real start="-2" max="0"/>', [-2.0]), ("<Real min='0' max='0.05'/>", [0.0]),
+     ('<Integer start="3" max="3"/>', [3, 2]), ('<Boolean start="1"/>', [0, 1]),
+     ('<Enumeration declaredType="E" start="7"/>', [2, 7, 9])],
+)  # fmt: skip
+def test_another_value_is_one_the_variable_may_have(xml, values):
+    text = (
+        '<m><TypeDefinitions><SimpleType name="E"><Enumeration><Item name="a" value="7"/>'
+        '<Item name="b" value="2"/></Enumeration></SimpleType></TypeDefinitions>'
+        f"<ModelVariables><ScalarVariable>{xml}</ScalarVariable></ModelVariables></m>"
+    )
+    (v,) = Description(ElementTree.fromstring(text)).variables
+    for value in values:
+        changed = other(v, value)
+        assert changed != value
+        assert v.limits[0] <= changed <= v.limits[1]
+        assert changed in (v.items or [changed])
+        assert changed * value >= 0.0
+
+
+@compiled
+@pytest.mark.parametrize(("rule", "c", "xml", "why"), ALLOWED)
+def test_what_the_standard_allows_is_no_finding(rule, c, xml, why, tmp_path):
+    outcome = examine(Fmu(lag.pack(tmp_path, xml, c)), [RULES[rule]], 30.0)[rule]
+    assert outcome.found == []
+    assert why in outcome.skipped
+    assert bool(why) == bool(outcome.skipped)
+
+
 def test_every_rule_has_a_broken_fmu():
     covered = {case[0] for case in [*BROKEN, *MISBEHAVING]} | {"archive", "binaries"}
     assert covered == set(RULES)
@@ -201,7 +259,7 @@ def test_every_rule_has_a_broken_fmu():
 
 @compiled
 def test_an_fmu_in_c_without_a_fault_passes(tmp_path):
-    assert found(lag.pack(tmp_path)) == {}
+    assert found(lag.pack(tmp_path), *RUNNING) == {}
 
 
 @compiled
@@ -215,7 +273,8 @@ def test_hanging_fmu_is_a_finding(tmp_path):
 def test_single_instance_per_process_is_respected(tmp_path):
     once = [("canGetAnd", 'canBeInstantiatedOnlyOncePerProcess="true" canGetAnd')]
     path = lag.pack(tmp_path, once, [("alive++;", "if (alive++) abort();"), ("alive--;", "")])
-    outcomes = examine(Fmu(path), [RULES[name] for name in RUNNING])
+    names = ("life", "step-dependencies", "reset", "state", "serialised-state", "instances", "free")
+    outcomes = examine(Fmu(path), [RULES[name] for name in names])
     assert {name: o.found for name, o in outcomes.items() if o.found} == {}
     assert "OnlyOncePerProcess" in outcomes["instances"].skipped
 
@@ -277,12 +336,16 @@ def run_check(*arguments, **options):
 
 def test_command_tells_findings_with_their_clause(tmp_path):
     path = lag.pack(tmp_path, [('stopTime="1"', 'stopTime="0"')], compiled=False)
-    done = run_check(path, "--no-run")
+    only = ("--no-run", "--only", "experiment", "--only", "life")
+    done = run_check(path, *only)
     assert done.returncode == 1
     assert "experiment (FMI 2.0.4, 2.2.5)" in done.stdout
     assert "lag: it stops at 0 s" in done.stdout
     assert "1 finding in 1 FMU" in done.stdout
-    told = json.loads(run_check(path, "--no-run", "--json").stdout)
+    # A file that is no FMU does not take the results of the others away, wherever options stand.
+    done = run_check(path, *only, "--json", __file__)
+    assert (done.returncode, done.stderr.count("error: ")) == (2, 1)
+    told = json.loads(done.stdout)
     assert told["findings"] == 1
     assert told["fmus"][0]["checks"]["experiment"]["found"] == ["it stops at 0 s, but starts at 0 s"]
     assert told["fmus"][0]["checks"]["life"]["skipped"]
@@ -317,11 +380,27 @@ def test_command_refuses_with_one_line(arguments, message):
         (("<?xml", "<!DOCTYPE a [<!ENTITY b 'c'>]><?xml"), "defines entities"),
         (("</fmiModelDescription>", ""), "is not XML"),
         (("CoSimulation", "ModelExchange"), "not for co-simulation"),
+        (('"UTF-8"', '"klingon"'), "unknown encoding"),
+        (('"UTF-8"', '"gbk"'), "multi-byte encodings"),
+        (('<Tool name="here"/>', "<a>" * 100_000 + "</a>" * 100_000), "nests more than 100"),
     ],
 )
 def test_what_is_no_fmu_for_this_is_refused(edit, message, tmp_path):
     with pytest.raises(BadFileError, match=message):
         Fmu(lag.pack(tmp_path, [edit], compiled=False))
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [({"MOST_ENTRIES": 2}, "holds 3 files, more than 2"), ({"MOST_BYTES": 1000}, "archive bomb"),
+     ({"SMALL": 1000, "MOST_RATIO": 0.5}, "archive bomb")],
+)  # fmt: skip
+def test_archive_that_becomes_too_large_is_refused(limit, message, tmp_path, monkeypatch):
+    path = lag.pack(tmp_path, compiled=False)
+    for name, value in limit.items():
+        monkeypatch.setattr(source, name, value)
+    with pytest.raises(BadFileError, match=message):
+        Fmu(path)
 
 
 def test_absent_tool_is_told(tmp_path, monkeypatch):

@@ -10,15 +10,20 @@ import sys
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 from .description import Variable
+from .registry import NotApplicableError
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 CO_SIMULATION = 1
+DO_STEP_STATUS = 0  # what fmi2GetStatus is asked for
 
 _SETTING = ("Real", "Integer", "Boolean", "String")
+# What may be discarded (2.1.3, 4.2.2): a value that the FMU cannot take, a step that it cannot do.
+_DISCARDING = ("fmi2DoStep", *(f"fmi2Set{kind}" for kind in _SETTING))
 _STATE = ("Get", "Set", "Free", "Serialize", "DeSerialize")
 # All that 2.1 and 4.2 define; an FMU that lacks an ability still exports its functions.
 FUNCTIONS = (
@@ -48,8 +53,11 @@ class _Callbacks(ctypes.Structure):
     )
 
 
+_KEPT: list[_Callbacks] = []  # a thread of an FMU may call back as long as the process lives
+
+
 class StatusError(Exception):
-    """A call returned more than a warning."""
+    """A call returned more than a warning, and not what it may discard."""
 
     def __init__(self, function: str, status: int, said: str) -> None:
         self.status = status
@@ -94,35 +102,37 @@ _C_TYPES = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_ch
 
 
 class Instance:
-    """An instance; a method is an FMI function, and raises :class:`StatusError` on more than a warning.
+    """An instance; a method is an FMI function.
+
+    It raises :class:`StatusError` on more than a warning, but NotApplicableError where the FMU may
+    discard what it is asked for: nothing can be said then.
 
     Args:
         library: what to instantiate.
         name: of the instance.
         guid: of the description.
         resources: URI of the folder of resources.
+        asynchronous: whether a step may go on after fmi2DoStep has returned.
     """
 
-    def __init__(self, library: Library, name: str, guid: str, resources: str) -> None:
+    def __init__(
+        self, library: Library, name: str, guid: str, resources: str, asynchronous: bool = False
+    ) -> None:
         self.library = library
+        self.asynchronous = asynchronous
         self.messages: list[tuple[int, str, str]] = []
         libc = ctypes.CDLL("msvcrt") if sys.platform == "win32" else ctypes.CDLL(None)
-        self._callbacks = _Callbacks(  # kept, since the FMU calls back as long as it lives
+        callbacks = _Callbacks(
             _Logger(self._listen),
             ctypes.cast(libc.calloc, c_void_p),
             ctypes.cast(libc.free, c_void_p),
             None,
             None,
         )
+        _KEPT.append(callbacks)
         instantiate = library.function("fmi2Instantiate", c_void_p)
         component = instantiate(
-            name.encode(),
-            CO_SIMULATION,
-            guid.encode(),
-            resources.encode(),
-            byref(self._callbacks),
-            0,
-            1,
+            name.encode(), CO_SIMULATION, guid.encode(), resources.encode(), byref(callbacks), 0, 1
         )
         if not component:
             raise StatusError("fmi2Instantiate", ERROR, self._said() or "no instance")
@@ -138,9 +148,14 @@ class Instance:
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function of this instance; returns ok or warning."""
-        status = self.library.function(name)(self.component, *arguments)
+        return self._judge(name, self.library.function(name)(self.component, *arguments))
+
+    def _judge(self, name: str, status: int) -> int:
         if status > WARNING:
-            raise StatusError(name, status, self._said())
+            refused = StatusError(name, status, self._said())
+            if status == DISCARD and name in _DISCARDING:
+                raise NotApplicableError(str(refused))
+            raise refused
         return status
 
     def set_up(self, start: float) -> None:
@@ -153,7 +168,14 @@ class Instance:
         self.call("fmi2ExitInitializationMode")
 
     def step(self, time: float, size: float) -> None:
-        self.call("fmi2DoStep", c_double(time), c_double(size), 0)
+        do_step = self.library.function("fmi2DoStep")
+        status = do_step(self.component, c_double(time), c_double(size), 0)
+        while status == PENDING and self.asynchronous:
+            sleep(0.001)
+            told = c_int()
+            self.call("fmi2GetStatus", DO_STEP_STATUS, byref(told))
+            status = told.value
+        self._judge("fmi2DoStep", status)
 
     def terminate(self) -> None:
         self.call("fmi2Terminate")

@@ -2,11 +2,11 @@
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from .api import DISCARD, Instance, Library, StatusError
+from .api import ERROR, Instance, Library, StatusError
 from .description import Description, Variable, flag, number, whole
 from .registry import NotApplicableError
 
@@ -43,9 +43,15 @@ class Bench:
             raise NotApplicableError("canBeInstantiatedOnlyOncePerProcess is declared")
         resources = (self.folder / "resources").as_uri()
         guid = self.description.root.get("guid", "")
-        made = Instance(self.library, f"instance_{len(self.instances)}", guid, resources)
-        self.instances.append(made)
-        return made
+        name = f"instance_{len(self.instances)}"
+        asynchronous = self.description.has("canRunAsynchronuously")  # the standard's spelling
+        try:
+            self.instances.append(Instance(self.library, name, guid, resources, asynchronous))
+        except StatusError as refused:
+            if self.description.has("needsExecutionTool"):
+                raise NotApplicableError(f"needsExecutionTool is declared, and {refused}") from None
+            raise
+        return self.instances[-1]
 
     def initialising(self) -> Instance:
         """A new instance in initialisation mode."""
@@ -61,15 +67,26 @@ class Bench:
         return made
 
     def advance(self, instance: Instance, k: int) -> None:
-        """The communication step number ``k``; an FMU may discard it, and then nothing can be
-        compared.
+        """The communication step number ``k``."""
+        instance.step(self.start + k * self.step, self.step)
+
+    def given(self) -> list[Variable]:
+        """What a master gives to the FMU: inputs and parameters."""
+        return [v for v in self.description.variables if v.causality in ("input", "parameter")]
+
+    def disturb(self, instance: Instance) -> None:
+        """Change what may change between steps, inputs and tunable parameters; not to be stepped with,
+        since no FMU must be able to do with just any values.
         """
-        try:
-            instance.step(self.start + k * self.step, self.step)
-        except StatusError as refused:
-            if refused.status == DISCARD:
-                raise NotApplicableError(str(refused)) from None
-            raise
+        loose = [v for v in self.given() if v.variability != "fixed"]
+        for v, value in zip(loose, instance.get(loose), strict=True):
+            try:
+                instance.set({v: other(v, value)})
+            except NotApplicableError:
+                continue
+            except StatusError as refused:
+                if refused.status != ERROR:
+                    raise
 
     def play(self, instance: Instance, steps: int, seed: int, first: int = 0) -> list[Row]:
         """Outputs after each of some steps with inputs that depend on seed and number of the step.
@@ -103,14 +120,14 @@ def start_value(v: Variable) -> Any:
 
 
 def near(v: Variable, share: float) -> float:
-    """A value of a Real variable near its start and inside its limits.
+    """A value of a Real variable near its start, of the same sign, and inside its limits.
 
     Args:
         v: the variable.
-        share: how far away, as a share (-1 to 1) of a tenth of its size.
+        share: how far away, as a share (-1 to 1) of a tenth of its start, or its nominal for zero.
     """
     start = start_value(v) or 0.0
-    size = max(abs(start), abs(number(v.all.get("nominal")) or 1.0))
+    size = abs(start) or abs(number(v.all.get("nominal")) or 1.0)
     low, high = v.limits
     value = start + 0.1 * share * size
     if not low <= value <= high:
@@ -118,11 +135,32 @@ def near(v: Variable, share: float) -> float:
     return min(max(value, low), high)
 
 
+def other(v: Variable, value: Any) -> Any:
+    """A value of a variable that is not the one it has, if there is one; a String stays."""
+    if v.type == "Real":
+        changed = near(v, 1.0)
+        return near(v, -0.5) if same(changed, value) else changed
+    if v.type == "Boolean":
+        return 1 - value
+    if v.items:
+        return next((item for item in v.items if item != value), value)
+    if v.type == "Integer":
+        return value + 1 if value < v.limits[1] else value - 1
+    return value
+
+
 def same(a: Any, b: Any) -> bool:
     """Whether two values are equal but for rounding."""
     if not isinstance(a, float):
         return a == b
     return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12) or (math.isnan(a) and math.isnan(b))
+
+
+def unlike(names: Sequence[Variable], meant: Row, found: Row) -> Iterator[str]:
+    """One text for each variable that is not what it is meant to be."""
+    for v, a, b in zip(names, meant, found, strict=True):
+        if not same(a, b):
+            yield f"{v.name} is {b!r}, not {a!r}"
 
 
 def differing(names: Sequence[Variable], rows: Sequence[Row], others: Sequence[Row]) -> str:

@@ -1,6 +1,6 @@
 """Run one trial on one unpacked FMU: ``python -m fmus.check.child RULE FOLDER LIBRARY REPORT NOTE``.
 
-Started by ``examine``, in a process of its own, since an FMU may crash, hang, or be good for only one
+Started by ``trial``, in a process of its own, since an FMU may crash, hang, or be good for only one
 instance. What was found goes to the file REPORT, the name of the function under way to the file NOTE.
 """
 
@@ -38,7 +38,10 @@ def _run(rule: str, folder: Path, library: str, note: Path) -> dict[str, object]
         except StatusError as refused:
             found.append(str(refused))
         except OSError as error:
-            found.append(f"the library cannot be loaded: {error}")
+            told = f"the library cannot be loaded: {error}"
+            if description.has("needsExecutionTool"):
+                return {"skipped": f"needsExecutionTool is declared, and {told}"}
+            found.append(told)
         except Exception as error:
             found.append(f"the check itself fails, please report it: {error!r}")
         return {"found": found}

@@ -14,43 +14,58 @@ from pathlib import Path
 from ..build import BuildError, build
 from ..declare import DeclarationError
 from .examine import examine
-from .fmu import BadFileError, Fmu
+from .fmu import Fmu
 from .registry import RULES, Rule, in_order
 from .report import Outcomes, as_json, listing, show
+from .source import BadFileError
 
 CLEAN, FINDINGS, BAD_INPUT = 0, 1, 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns 0 without findings, 1 with, 2 for bad input."""
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_intermixed_args(arguments)
     if options.list:
         print(listing(), end="")
         return CLEAN
     try:
-        fmus = [Fmu(path) for path in _paths(options.files)]
         chosen = _chosen(options.only)
-    except (BadFileError, BuildError, DeclarationError, OSError) as error:
-        print("error:", " ".join(str(error).split()), file=sys.stderr)
-        return BAD_INPUT
+    except BadFileError as error:
+        return _refuse(error)
+    fmus, code = _open(options.files)
+    if not fmus:
+        return code
     outcomes = _examine_all(fmus, chosen, options)
     if options.json:
         print(json.dumps(as_json(fmus, chosen, outcomes), indent=1))
     else:
         with suppress(BrokenPipeError):
             show(fmus, chosen, outcomes)
-    return FINDINGS if any(o.found for of in outcomes for o in of.values()) else CLEAN
+    found = any(o.found for of in outcomes for o in of.values())
+    return code or (FINDINGS if found else CLEAN)
 
 
-def _paths(files: Sequence[str]) -> list[Path]:
-    """FMU files; a bare name is one of ours, and nothing means all of ours."""
-    if not files:
-        return build([])
-    return [Path(f) if Path(f).exists() or not _is_name(f) else build([f])[0] for f in files]
+def _refuse(error: Exception) -> int:
+    print("error:", " ".join(str(error).split()), file=sys.stderr)
+    return BAD_INPUT
 
 
-def _is_name(text: str) -> bool:
-    return Path(text).name == text and not Path(text).suffix
+def _open(names: Sequence[str]) -> tuple[list[Fmu], int]:
+    """FMUs that can be checked, all of ours without names, and BAD_INPUT if there are others."""
+    fmus: list[Fmu] = []
+    code = CLEAN
+    for name in names or [None]:
+        try:
+            fmus += map(Fmu, build([]) if name is None else [_path(name)])
+        except (BadFileError, BuildError, DeclarationError, OSError) as error:
+            code = _refuse(error)
+    return fmus, code
+
+
+def _path(name: str) -> Path:
+    """An FMU file; a bare name is one of ours."""
+    path = Path(name)
+    return path if path.exists() or path.name != name or path.suffix else build([name])[0]
 
 
 def _chosen(names: Sequence[str]) -> list[Rule]:
@@ -77,21 +92,15 @@ def _examine_all(
     ):
         task = bar.add_task("checking", total=len(fmus) * len(chosen))
 
-        def after_each_rule() -> None:
-            bar.advance(task)
-            if stopped.is_set():
-                raise KeyboardInterrupt
+        def check(fmu: Fmu) -> Outcomes:
+            run, done = not options.no_run, lambda: bar.advance(task)
+            return examine(fmu, chosen, options.timeout, run, done, stopped)
 
-        running = [
-            pool.submit(examine, fmu, chosen, options.timeout, not options.no_run, after_each_rule)
-            for fmu in fmus
-        ]
         try:
-            return [future.result() for future in running]
-        except KeyboardInterrupt:
+            return list(pool.map(check, fmus))
+        finally:
             stopped.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+            pool.shutdown(cancel_futures=True)
 
 
 def _positive(text: str) -> float:
@@ -118,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
         "           python -m fmus.check mine.fmu other.fmu\n"
         "           python -m fmus.check vessel --json\n"
         "           python -m fmus.check mine.fmu --no-run\n"
-        "exit codes: 0 no findings, 1 findings, 2 bad input, 130 interrupted\n"
+        "exit codes: 0 no findings, 1 findings, 2 bad input (the rest is checked), 130 interrupted\n"
         "An FMU is a program, and checking it runs it: --no-run only reads it.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

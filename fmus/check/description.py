@@ -58,6 +58,7 @@ class Variable:
         given: attributes of the ScalarVariable element.
         own: attributes of its Real, Integer, ... element.
         all: the same, completed by the declared type.
+        items: values of the declared Enumeration.
     """
 
     index: int
@@ -70,6 +71,7 @@ class Variable:
     given: dict[str, str]
     own: dict[str, str]
     all: dict[str, str]
+    items: frozenset[int]
 
     @property
     def start(self) -> str | None:
@@ -126,8 +128,9 @@ class Description:
     def variables(self) -> list[Variable]:
         """All variables in order."""
         declared = {t.get("name"): t[0].attrib for t in self.types if len(t)}
+        items = {t.get("name"): _items(t) for t in self.types}
         return [
-            _variable(k, element, declared)
+            _variable(k, element, declared, items)
             for k, element in enumerate(self.root.iterfind("ModelVariables/ScalarVariable"), 1)
         ]
 
@@ -182,7 +185,17 @@ def _indices(text: str | None) -> list[int | None] | None:
     return None if text is None else [whole(word) for word in text.split()]
 
 
-def _variable(index: int, element: Element, declared: dict[str | None, dict[str, str]]) -> Variable:
+def _items(declared: Element) -> frozenset[int]:
+    values = [whole(item.get("value")) for item in declared.iterfind("Enumeration/Item")]
+    return frozenset(value for value in values if value is not None)
+
+
+def _variable(
+    index: int,
+    element: Element,
+    declared: dict[str | None, dict[str, str]],
+    items: dict[str | None, frozenset[int]],
+) -> Variable:
     kinds = [child for child in element if child.tag in TYPES]
     own = dict(kinds[0].attrib) if kinds else {}
     causality = element.get("causality", "local")
@@ -199,4 +212,5 @@ def _variable(index: int, element: Element, declared: dict[str | None, dict[str,
         dict(element.attrib),
         own,
         {**declared.get(own.get("declaredType"), {}), **own},
+        items.get(own.get("declaredType"), frozenset()),
     )

@@ -1,4 +1,4 @@
-"""What a rule is, and the table of all rules.
+"""What a rule is, what it finds, and the table of all rules.
 
 A rule is a generator function that yields one line of text for each violation. Its name is that of the
 function, its first paragraph tells what it demands; the clause is one of FMI 2.0.4.
@@ -15,7 +15,7 @@ function, its first paragraph tells what it demands; the clause is one of FMI 2.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -46,6 +46,21 @@ class Rule:
     group: str
     check: Callable[[Any], Iterable[str]]
     runs: bool
+
+
+@dataclass
+class Outcome:
+    """What one rule found on one FMU.
+
+    Attributes:
+        found: violations, one line each.
+        skipped: why the rule says nothing (more); empty if it was checked.
+        missing: whether that is because a tool is not installed.
+    """
+
+    found: list[str] = field(default_factory=list)
+    skipped: str = ""
+    missing: bool = False
 
 
 RULES: dict[str, Rule] = {}

@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from .examine import Outcome
 from .fmu import Fmu
-from .registry import Rule, in_order
+from .registry import Outcome, Rule, in_order
 
 MOST_LINES = 8  # of one rule on one FMU in the terminal; JSON tells all
 

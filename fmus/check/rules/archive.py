@@ -3,7 +3,8 @@
 import stat
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import PurePosixPath
+from pathlib import PurePosixPath, PureWindowsPath
+from zipfile import ZIP_DEFLATED, ZIP_STORED
 
 from ..fmu import Fmu, suffix
 from ..registry import rule
@@ -11,19 +12,21 @@ from ..registry import rule
 
 @rule("2.3")
 def archive(fmu: Fmu) -> Iterator[str]:
-    """Every path in the archive is relative, stays inside, occurs once, is no link and has forward
-    slashes.
+    """Every path in the archive is relative, stays inside, occurs once, is no link, has forward slashes,
+    and is stored or compressed with deflate.
     """
     for member in fmu.members:
         # ZipInfo.filename has been tidied already; what was written is in orig_filename.
         name = member.orig_filename
-        path = PurePosixPath(name)
+        path = PureWindowsPath(name)  # which knows drives, too
         if "\\" in name:
             yield f"'{name}' has a backslash"
-        if path.is_absolute() or ".." in path.parts or ":" in path.parts[:1]:
+        if path.anchor or ".." in path.parts:
             yield f"'{name}' leaves the folder that it is unpacked to"
         if stat.S_ISLNK(member.external_attr >> 16):
             yield f"'{name}' is a link"
+        if member.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+            yield f"'{name}' is compressed by method {member.compress_type}, not by deflate"
     for name, times in Counter(member.filename for member in fmu.members).items():
         if times > 1:
             yield f"'{name}' is there {times} times"

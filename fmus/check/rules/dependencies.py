@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from ..api import StatusError
-from ..bench import Bench, near, same, start_value
+from ..bench import Bench, near, other, same, start_value
 from ..description import Unknown, Variable
 from ..registry import NotApplicableError, trial
 
@@ -51,7 +51,7 @@ def output_dependencies(bench: Bench) -> Iterator[str]:
             continue
         (usual,) = one.get([v])
         before = one.get(outputs)
-        one.set({v: _other(v, usual)})
+        one.set({v: other(v, usual)})
         yield from _undeclared(told, v, _moved(outputs, before, one.get(outputs)), "without a step")
         one.set({v: usual})
 
@@ -87,7 +87,7 @@ def _after(
     bench.play(one, 3, seed=0)
     if changed is not None:
         (usual,) = one.get([changed])
-        one.set({changed: _other(changed, usual)})
+        one.set({changed: other(changed, usual)})
     try:
         one.step(bench.start + 3 * bench.step, share * bench.step)
     except StatusError as refused:
@@ -95,12 +95,6 @@ def _after(
     found = one.get(outputs)
     one.free()
     return found
-
-
-def _other(v: Variable, value: float) -> float:
-    """A value of an input that is not the one it has."""
-    changed = near(v, 1.0)
-    return near(v, -0.5) if same(changed, value) else changed
 
 
 def _moved(names: Sequence[Variable], before: Sequence[float], after: Sequence[float]) -> set[str]:

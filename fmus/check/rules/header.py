@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from ..description import number, whole
@@ -13,8 +14,14 @@ _DATE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z")
 
 def twice(names: Iterable[str | None]) -> list[str]:
     """What occurs more than once, sorted."""
-    names = list(names)
-    return sorted({str(name) for name in names if names.count(name) > 1})
+    return sorted(str(name) for name, times in Counter(names).items() if times > 1)
+
+
+@rule("2.2")
+def encoding(fmu: Fmu) -> Iterator[str]:
+    """The description is encoded in UTF-8."""
+    if fmu.encoding.upper() != "UTF-8":
+        yield f"modelDescription.xml is in {fmu.encoding}"
 
 
 @rule("2.2.1")

@@ -23,8 +23,9 @@ def exports(bench: Bench) -> Iterator[str]:
 @trial("2.1.5, 2.1.6, 4.2.4")
 def life(bench: Bench) -> Iterator[str]:
     """Instantiate with the guid of the description, initialise, step, terminate, free: no error, no
-    crash.
+    crash, and its files are left for the next instance.
     """
+    files = [path for path in bench.folder.rglob("*") if path.is_file()]
     one = bench.ready()
     everything = [v for v in bench.description.variables if v.type]
     one.get(everything)
@@ -35,6 +36,9 @@ def life(bench: Bench) -> Iterator[str]:
     one.terminate()
     one.get(everything)
     one.free()
+    removed = [path.relative_to(bench.folder).as_posix() for path in files if not path.exists()]
+    if removed:
+        yield f"it removed {len(removed)} of its own files, such as '{min(removed)}'"
 
 
 def _undeclared(bench: Bench, one: Instance) -> Iterator[str]:

@@ -1,8 +1,10 @@
 """What an instance remembers, and that nobody else's doings change it (2.1.5, 2.1.6, 2.1.8)."""
 
 from collections.abc import Iterator
+from ctypes import c_void_p
 
-from ..bench import Bench, differing
+from ..api import Instance
+from ..bench import Bench, Row, differing, unlike
 from ..registry import trial
 
 STEPS = 20
@@ -10,33 +12,36 @@ STEPS = 20
 
 @trial("2.1.6")
 def reset(bench: Bench) -> Iterator[str]:
-    """After fmi2Reset the FMU runs again as it did when it was new."""
-    one = bench.ready()
+    """After fmi2Reset the FMU has its start values again, and runs as it did when it was new."""
+    given = bench.given()
+    one = bench.initialising()
+    new = one.get(given)
+    one.exit()
     first = bench.play(one, STEPS, seed=0)
+    bench.disturb(one)
     one.reset()
     one.set_up(bench.start)
     one.enter()
+    yield from (f"after fmi2Reset {text}" for text in unlike(given, new, one.get(given)))
     one.exit()
-    again = bench.play(one, STEPS, seed=0)
-    where = differing(bench.description.outputs(), first, again)
+    where = differing(bench.description.outputs(), first, bench.play(one, STEPS, seed=0))
     if where:
         yield f"another run after fmi2Reset differs: {where}"
 
 
 @trial("2.1.8")
 def state(bench: Bench) -> Iterator[str]:
-    """A state got with fmi2GetFMUstate and set again, even more than once, continues as it did."""
+    """A state got with fmi2GetFMUstate and set again, even more than once, has the same values and
+    continues as it did.
+    """
     bench.needs("canGetAndSetFMUstate")
-    one = bench.ready()
-    bench.play(one, STEPS, seed=0)
+    one, before = _on_the_way(bench)
     kept = one.state()
     first = bench.play(one, STEPS, seed=1, first=STEPS)
     for _ in range(2):
-        one.restore(kept)
-        again = bench.play(one, STEPS, seed=1, first=STEPS)
-        where = differing(bench.description.outputs(), first, again)
-        if where:
-            yield f"after fmi2SetFMUstate the run differs: {where}"
+        wrong = list(_amiss(bench, one, kept, before, first))
+        yield from (f"after fmi2SetFMUstate {text}" for text in wrong)
+        if wrong:
             break
     one.release(kept)
 
@@ -45,8 +50,7 @@ def state(bench: Bench) -> Iterator[str]:
 def serialised_state(bench: Bench) -> Iterator[str]:
     """A serialised state continues as it did, in the same instance and in a new one."""
     bench.needs("canSerializeFMUstate")
-    one = bench.ready()
-    bench.play(one, STEPS, seed=0)
+    one, before = _on_the_way(bench)
     kept = one.state()
     data = one.serialize(kept)
     one.release(kept)
@@ -56,12 +60,36 @@ def serialised_state(bench: Bench) -> Iterator[str]:
         fellows.append(("a new", bench.ready()))
     for which, fellow in fellows:
         read = fellow.deserialize(data)
-        fellow.restore(read)
+        wrong = _amiss(bench, fellow, read, before, first)
+        yield from (f"with the deserialised state in {which} instance {text}" for text in wrong)
         fellow.release(read)
-        again = bench.play(fellow, STEPS, seed=1, first=STEPS)
-        where = differing(bench.description.outputs(), first, again)
-        if where:
-            yield f"in {which} instance the deserialised state runs otherwise: {where}"
+
+
+def _on_the_way(bench: Bench) -> tuple[Instance, Row]:
+    """An instance after some steps, and what a master sees of it."""
+    one = bench.ready()
+    bench.play(one, STEPS, seed=0)
+    return one, one.get([*bench.given(), *bench.description.outputs()])
+
+
+def _amiss(bench: Bench, one: Instance, kept: c_void_p, before: Row, first: list[Row]) -> Iterator[str]:
+    """What differs, at once and in a run, when a state is set.
+
+    Args:
+        bench: the FMU.
+        one: whose state is set, after everything in it was changed.
+        kept: the state.
+        before: what a master saw at that state.
+        first: the run from there.
+    """
+    outputs = bench.description.outputs()
+    bench.disturb(one)
+    one.restore(kept)
+    shown = [*bench.given(), *outputs]
+    yield from unlike(shown, before, one.get(shown))
+    where = differing(outputs, first, bench.play(one, STEPS, seed=1, first=STEPS))
+    if where:
+        yield f"the run differs: {where}"
 
 
 @trial("2.1.5, 4.3.1")
@@ -69,12 +97,18 @@ def instances(bench: Bench) -> Iterator[str]:
     """Two instances do not disturb each other, unless canBeInstantiatedOnlyOncePerProcess is
     declared.
     """
-    alone = bench.play(bench.ready(), STEPS, seed=0)
+    given = bench.given()
+    lonely = bench.ready()
+    alone = bench.play(lonely, STEPS + 1, seed=0)
+    meant = lonely.get(given)
     one, other = bench.ready(), bench.ready()
     rows = []
     for k in range(STEPS):
         rows += bench.play(one, 1, seed=0, first=k)
         bench.play(other, 1, seed=1, first=k)
+    bench.disturb(other)
+    rows += bench.play(one, 1, seed=0, first=STEPS)
+    yield from (f"beside another instance {text}" for text in unlike(given, meant, one.get(given)))
     where = differing(bench.description.outputs(), alone, rows)
     if where:
         yield f"beside another instance the run differs: {where}"

@@ -1,6 +1,6 @@
 """The model structure (2.2.8)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..description import Description, Unknown, Variable
 from ..fmu import Fmu
@@ -16,6 +16,12 @@ def _listed(description: Description, element: str) -> list[str]:
     return [v.name for v in found if v is not None]
 
 
+def _without(names: Sequence[str], others: Sequence[str]) -> list[str]:
+    """Those that are not among the others, in order."""
+    known = set(others)
+    return [name for name in names if name not in known]
+
+
 @rule("2.2.8")
 def outputs(fmu: Fmu) -> Iterator[str]:
     """Outputs lists every variable with causality output and nothing else; without outputs it is left
@@ -24,12 +30,8 @@ def outputs(fmu: Fmu) -> Iterator[str]:
     description = fmu.description
     unknowns = description.unknowns("Outputs")
     listed, meant = _listed(description, "Outputs"), [v.name for v in description.outputs()]
-    for name in meant:
-        if name not in listed:
-            yield f"{name} is an output, but not listed"
-    for name in listed:
-        if name not in meant:
-            yield f"{name} is listed, but no output"
+    yield from (f"{name} is an output, but not listed" for name in _without(meant, listed))
+    yield from (f"{name} is listed, but no output" for name in _without(listed, meant))
     if unknowns is not None and not unknowns:
         yield "Outputs is there, but empty"
 
@@ -43,14 +45,12 @@ def state_derivatives(fmu: Fmu) -> Iterator[str]:
     unknowns = description.unknowns("Derivatives")
     listed = _listed(description, "Derivatives")
     meant = [v.name for v in description.variables if "derivative" in v.own]
-    for name in listed:
-        if name not in meant:
-            yield f"{name} is listed, but has no attribute derivative"
+    for name in _without(listed, meant):
+        yield f"{name} is listed, but has no attribute derivative"
     exchange = description.root.find("ModelExchange") is not None
     if exchange or description.has("providesDirectionalDerivative"):
-        for name in meant:
-            if name not in listed:
-                yield f"{name} is a derivative, but not listed"
+        for name in _without(meant, listed):
+            yield f"{name} is a derivative, but not listed"
     if unknowns is not None and not unknowns:
         yield "Derivatives is there, but empty"
 
@@ -71,10 +71,11 @@ def initial_unknowns(fmu: Fmu) -> Iterator[str]:
     meant |= {v.index for v in unsettled}
     unknowns = description.unknowns("InitialUnknowns")
     listed = [u.index for u in unknowns or []]
+    missing, surplus = meant.difference(listed), set(listed) - meant
     for v in description.variables:
-        if v.index in meant and v.index not in listed:
+        if v.index in missing:
             yield f"{v.name} is missing"
-        if v.index in listed and v.index not in meant:
+        if v.index in surplus:
             yield f"{v.name} does not belong there"
     known = [k for k in listed if k is not None]
     if known != sorted(known):

@@ -1,8 +1,8 @@
 """Getting and setting values (2.1.7)."""
 
+import math
 from collections.abc import Iterator
 
-from ..api import Instance
 from ..bench import Bench, near, same, start_value
 from ..description import Variable
 from ..registry import trial
@@ -42,21 +42,24 @@ def read_back(bench: Bench) -> Iterator[str]:
 
 @trial("2.2.7")
 def range_of_values(bench: Bench) -> Iterator[str]:
-    """Outputs keep to their min and max, as initialised and after each step."""
+    """Outputs are finite, items where they are Enumerations, and keep to their min and max, as
+    initialised and after each step.
+    """
     outputs = [v for v in bench.description.outputs() if v.type in ("Real", "Integer", "Enumeration")]
     one = bench.ready()
-    told: set[str] = set()
     for k in range(20):
-        for text in _outside(one, outputs):
-            name = text.split(" ", 1)[0]
-            if name not in told:
-                told.add(name)
-                yield f"{text} at step {k}"
+        for v, value in zip(list(outputs), one.get(outputs), strict=True):
+            if wrong := _wrong(v, value):
+                outputs.remove(v)
+                yield f"{v.name} is {value:g}, {wrong}, at step {k}"
         bench.advance(one, k)
 
 
-def _outside(one: Instance, outputs: list[Variable]) -> Iterator[str]:
-    for v, value in zip(outputs, one.get(outputs), strict=True):
-        low, high = v.limits
-        if value < low or value > high:
-            yield f"{v.name} is {value:g}, outside of {low:g} to {high:g},"
+def _wrong(v: Variable, value: float) -> str:
+    """What is wrong with a value of a variable; empty if nothing is."""
+    low, high = v.limits
+    if not math.isfinite(value):
+        return "which is not finite"
+    if v.items and value not in v.items:
+        return "which is no item of its Enumeration"
+    return "" if low <= value <= high else f"outside of {low:g} to {high:g}"

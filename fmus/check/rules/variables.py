@@ -80,7 +80,7 @@ def _of_type(v: Variable) -> bool:
 
 @rule("2.2.7")
 def limits(fmu: Fmu) -> Iterator[str]:
-    """min is not above max, start lies between them, nominal is positive and finite."""
+    """min is not above max, start lies between them or is an item, nominal is positive and finite."""
     for v in fmu.description.variables:
         low, high = v.limits
         if low > high or math.isnan(low) or math.isnan(high):
@@ -92,6 +92,8 @@ def limits(fmu: Fmu) -> Iterator[str]:
             and not low <= value <= high
         ):
             yield f"{v.name}: start {value:g} is outside of {low:g} to {high:g}"
+        if v.items and value is not None and value not in v.items:
+            yield f"{v.name}: start {value:g} is no item of its Enumeration"
         nominal = number(v.all.get("nominal", "1"))
         if nominal is None or not 0.0 < nominal < math.inf:
             yield f"{v.name}: nominal is '{v.all['nominal']}'"
