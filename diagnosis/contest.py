@@ -16,11 +16,10 @@ from .refining import MOMENT, Point, Problem, Refined, Start, doubts, polished, 
 from .table import Doubt, Table, noise, table
 
 CONTENDERS = 8
+# Share of a force that must be its own for data to tell its cause from another, or from those found.
 SEPARATION = 0.05
 WEIGHINGS = 4
 CHANGED = 1.5
-# A candidate of whose force less than this is new beside what was found only pulls that to and fro.
-NEW = 1e-3
 # A free shape that can do what a plain effect does is not listed as another explanation of it.
 FREE_SHAPE = 5
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
@@ -69,7 +68,7 @@ def weighed(
     """Judge candidates with an error counted in units of sigma (3,) [N, N, N m]."""
     wide = table(base, p.blocks, found, doubt, sigma)
     free = len(doubt.moved) - len(NOMINAL)
-    new = [k for k in range(len(found)) if novelty(wide, k, free) > NEW]
+    new = [k for k in range(len(found)) if novelty(wide, k, free) >= SEPARATION]
     order = in_order([judge(wide, k, len(found[k].shapes)) for k in new])
     return Step(base, doubt, wide, found, order, judge(wide, -1, 1))
 

@@ -5,7 +5,7 @@ import pytest
 from measured import sail
 
 from diagnosis import clean, smooth
-from diagnosis.contest import NEW, candidates, novelty
+from diagnosis.contest import SEPARATION, candidates, novelty
 from diagnosis.model import Model
 from diagnosis.refining import Point, Problem
 from diagnosis.selection import learn
@@ -113,7 +113,10 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     curve = dict(zip(names, 0.1 * np.linspace(-1.0, 1.0, len(names)) ** 3, strict=True))
     at = Point(Model(), curve, stiff=np.zeros((len(names), len(names))))
     step = candidates(Problem([w], w.block, None, 0.1), at, {effect.id})
-    new = {c.effect.id: novelty(step.wide, k, len(names)) > NEW for k, c in enumerate(step.candidates)}
+    new = {
+        c.effect.id: novelty(step.wide, k, len(names)) >= SEPARATION
+        for k, c in enumerate(step.candidates)
+    }
     assert not new["loss_surge"]
     assert new["loss_yaw"]
     assert new["X_u"]
