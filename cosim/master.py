@@ -21,7 +21,8 @@ from .faults import EARLY, Effect, Values
 from .fmu import Instance, Variable
 from .isolation import TIMEOUT, IsolatedInstance
 from .scenario import Event
-from .system import Connection, Signal, System
+from .system import System
+from .wiring import Connection, Signal
 
 
 @dataclass

@@ -11,7 +11,8 @@ from pathlib import Path, PurePath
 from ..errors import InputError
 from ..fmu import Model, Variable
 from ..scenario import Value
-from ..system import Connection, System
+from ..system import System
+from ..wiring import Connection
 from . import xml
 
 # What XML 1.0 has no place for, not even as a reference (section 2.2).

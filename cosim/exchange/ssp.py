@@ -7,7 +7,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..fmu import Model
-from ..system import Signal, System
+from ..system import System
+from ..wiring import Signal
 from . import xml
 from .portable import Part
 
