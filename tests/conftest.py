@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import textwrap
 import zipfile
 from pathlib import Path
@@ -22,6 +23,12 @@ ACCEPTED = (
     "root may write",
 )
 COMPONENTS = {component.name: component for _, component in discover()}
+
+
+def pytest_configure():
+    """A shell that starts the tests in the background makes them, and what they start, deaf to Ctrl-C."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)
