@@ -129,7 +129,7 @@ class IsolatedInstance:
                 raise GarbledError
         except EOFError:
             self._give_up()
-        except (GarbledError, ValueError):
+        except (GarbledError, ValueError, TypeError):
             self._give_up(is_garbled=True)
         self._waiting_since = None
         what, self._talking, self._asked = self._asked, False, ""
