@@ -78,6 +78,8 @@ def redoing(instance: Instance, h: float) -> Callable[[float], None]:
 
 def _awaited(instance: Instance, status: int) -> int:
     """What became of a step that the FMU may still be doing, after fmi2DoStep has returned."""
+    if status != PENDING:
+        return status
     component, found = ctypes.c_void_p(instance.component), ctypes.c_int(status)
     ask = instance.function("fmi2GetStatus")
     while found.value == PENDING and ask(component, DO_STEP_STATUS, ctypes.byref(found)) < DISCARD:

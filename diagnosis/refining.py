@@ -215,8 +215,8 @@ def moment(p: Problem, at: Point, doubt: Doubt, begin: Start) -> Refined:
         return refine(p, at, doubt, replace(begin, values={MOMENT: max(time, MOMENT_STEPS[-1])}))
 
     all_tried = [tried(begin.values[MOMENT])]
-    apart = moments_apart(p.data)
-    for size in (*([apart / 5.0] if apart / 5.0 > MOMENT_STEPS[0] else []), *MOMENT_STEPS):
+    coarse = moments_apart(p.data) / 5.0
+    for size in (coarse, *MOMENT_STEPS) if coarse > MOMENT_STEPS[0] else MOMENT_STEPS:
         middle = best(all_tried).point.values[MOMENT]
         all_tried += [tried(middle + k * size) for k in range(-5, 6)]
     found = best(all_tried)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,7 +43,7 @@ class Fold:
     def name(self) -> str:
         return self.evidence.name
 
-    @property
+    @cached_property
     def content(self) -> Diagnosis:
         """As in ``diagnosis.json``."""
         return outcome.diagnosis(self.found, None, [])

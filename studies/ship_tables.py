@@ -40,10 +40,11 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
         "is among those learned from."
     )
     rows, results = [], {}
-    for f in folds:
+    every = [(f, falls(f)) for f in folds]
+    for f, of in every:
         blind, e = at_full_power(f.evidence.integrals), f.evidence
         results[f.name] = {"kind": kind(f), "axes": {}}
-        for k, (axis, x) in enumerate(zip(AXES, falls(f), strict=True)):
+        for k, (axis, x) in enumerate(zip(AXES, of, strict=True)):
             before, after = float(e.before.omega_rms[k]), float(e.after.omega_rms[k])
             target = wanted(axis, kind(f))
             said = "–" if target is None else f"{target:g}×: {'' if x.out >= target else 'not '}reached"
@@ -59,20 +60,17 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
             }
     header = ["run left out", "axis", "before", "after", "fall", "target", "learned from it"]
     report.table(header, rows)
-    least = min(x.most for f in folds for x in falls(f))
+    least = min(x.most for _, of in every for x in of)
     report.text(f"Noise of the measurement is not what is left: it would allow {least:.0f}× or more.")
     worse = [
-        f"{axis} of {f.name}"
-        for f in folds
-        for axis, x in zip(AXES, falls(f), strict=True)
-        if x.out < 1.0
+        f"{axis} of {f.name}" for f, of in every for axis, x in zip(AXES, of, strict=True) if x.out < 1.0
     ]
     if worse:
         report.text(f"The learned model is worse than the nominal one in {', '.join(worse)}.")
     missed = [
         f"{f.name}, {axis} ({x.out:.2f}× of {target:g}×): {reason(x, target)}."
-        for f in folds
-        for axis, x in zip(AXES, falls(f), strict=True)
+        for f, of in every
+        for axis, x in zip(AXES, of, strict=True)
         if (target := wanted(axis, kind(f))) is not None and x.out < target
     ]
     if missed:

@@ -56,22 +56,23 @@ def make_plan(work: Path, steps: int) -> Plan:
         archive.write(work / "default_workers.ssd", "SystemStructure.ssd")
         for path in fmus.values():
             archive.write(path, f"resources/{path.name}")
-    _export_container(content, work / "system.fmu")
+    plan["no_container"] = _export_container(content, work / "system.fmu")
     (work / "0_workers.ssd").write_text(_ssd(plan, 'numWorkerThreads="0"'))
     (work / "LogConfig.xml").write_text(_log_config(plan))
     (work / "plan.json").write_text(json.dumps(plan))
     return plan
 
 
-def _export_container(content: dict[str, Any], path: Path) -> None:
-    """The whole system as one FMU, with values exchanged once a step; no file without the exporter."""
+def _export_container(content: dict[str, Any], path: Path) -> str:
+    """The whole system as one FMU, with values exchanged once a step; returns why there is none."""
     system = prepare(cosim.load_scenario(content | {"algorithm": "jacobi", "faults": []}))
     try:
         export_fmu(system, path)
-    except cosim.InputError:
-        path.unlink(missing_ok=True)
+    except cosim.InputError as error:
+        return str(error)
     finally:
         system.close()
+    return ""
 
 
 def _ssd(plan: Plan, workers: str) -> str:
