@@ -72,11 +72,17 @@ def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndar
         TooFewError: in some stretch.
     """
     weights = gate(p, local, huber(p, local))
+    p, smoothness = tuned(p, weights)
+    return p, smoothness, gate(p, smoothness, weights)
+
+
+def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """A problem with an even penalty, its penalty adapted to the jerk; and the likeliest smoothness."""
     smoothness = likeliest(p, weights)
     for _ in range(ADAPTIONS):
         p = adapted(p, smoothness, weights)
         smoothness = likeliest(p, weights)
-    return p, smoothness, gate(p, smoothness, weights)
+    return p, smoothness
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:

@@ -63,7 +63,7 @@ GRIDS: dict[str, tuple[str, tuple[float, ...], tuple[str, ...]]] = {
     ),
     "lag": ("lag", (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 2.0), ()),
     "delay": ("delay", (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5), ()),
-    "clock_offset": ("clock_offset", (-0.5, -0.3, -0.2, -0.1, -0.05), ()),
+    "clock_offset": ("clock_offset", (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5), ()),
 }
 # kg, kg, kg, kg m2: heavier by about half of what moves along each axis.
 HEAVY = {"mass": 7.0, "added_mass_X": 8.0, "added_mass_Y": 12.0, "added_mass_N": 1.4}

@@ -1,9 +1,9 @@
 """Pose, velocity and acceleration of a measured run without any model of the ship.
 
-Each channel is taken for a process driven by white jerk and measured with white noise. The noise is
-estimated from third differences, the jerk's spectral density by likelihood, its course over time from
-the jerk that is found; a sample further than five standard deviations from where all the others say it
-should be is a spike.
+Each channel is taken for a process driven by the commands (:mod:`.push`) and by white jerk, and measured
+with white noise. The noise is estimated from third differences, the jerk's spectral density by
+likelihood, its course over time from the jerk that is found; a sample further than five standard
+deviations from where all the others say it should be is a spike.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,8 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 
 from .cleaning import Counts, Track, noise
-from .fitting import Problem, TooFewError, solve, trusted
+from .fitting import Problem, TooFewError, solve, trusted, tuned
+from .push import Push, gains, push
 from .spline import Knots, basis, inverse_band, knots, penalty, variance
 
 BREAK = 3.0  # s; over a longer gap nothing is said
@@ -35,7 +36,7 @@ class Smoothed:
         nu: body-fixed velocity over ground [m/s, m/s, rad/s].
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
         noise: (3,), standard deviation of the measurement [m, m, rad].
-        jerk: (3,), mean spectral density of the jerk [m2/s5, m2/s5, rad2/s5].
+        jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
     """
 
     track: Track
@@ -67,8 +68,13 @@ class Smoothed:
         return self.track.counts(int(self.spikes.sum()))
 
 
-def smooth(track: Track) -> Smoothed:
+def smooth(track: Track, driven: bool = True) -> Smoothed:
     """Smooth a run.
+
+    Args:
+        track: the run.
+        driven: whether what jerks with the commands is known for that, see :mod:`.push`. Without, the
+            spline follows whatever is quick, and noise with it.
 
     Raises:
         InputError: no stretch of it is dense enough.
@@ -76,12 +82,12 @@ def smooth(track: Track) -> Smoothed:
     rows = np.flatnonzero(track.valid)
     while True:
         try:
-            return _smooth(track, rows)
+            return _smooth(track, rows, driven)
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
 
 
-def _smooth(track: Track, rows: np.ndarray) -> Smoothed:
+def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     """Smooth a run by some of its rows."""
     time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
     grid = knots(*stretches(time[rows], track), max(SPACING, track.period))
@@ -94,14 +100,23 @@ def _smooth(track: Track, rows: np.ndarray) -> Smoothed:
     local = np.full(3, 64.0 * (track.period / grid.spacing) ** 5)  # follows a few samples
     problem, smoothness, weights = trusted(problem, local)
     fit = solve(problem, smoothness, weights)
+    pushed = Push.none(time.size)
+    if driven:
+        psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
+        G = gains(problem, fit, weights, track, psi)
+        pushed = push(track, psi, track.run.tau_cmd @ G.T)
+        problem = problem._replace(z=z - pushed.eta[dense], stiff=even)
+        problem, smoothness = tuned(problem, weights)
+        fit = solve(problem, smoothness, weights)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
     spikes[rows] = False
     spikes[dense] = weights == 0.0
     found = []
-    for derivative in range(3):
+    for derivative, known in enumerate(pushed):
         b = basis(grid, time[inside], derivative)
-        found += [spread(b(fit.coefficients), inside), spread(np.sqrt(variance(b, inverse)), inside)]
+        found += [spread(b(fit.coefficients) + known[inside], inside)]
+        found += [spread(np.sqrt(variance(b, inverse)), inside)]
     eta, eta_std, eta_dot, eta_dot_std, eta_ddot, eta_ddot_std = found
     eta += origin
     u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])

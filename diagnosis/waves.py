@@ -64,7 +64,7 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
         rng: for the bootstrap.
     """
     left, noise = [], []
-    for run in runs:
+    for run in (smooth(smoothed.track, driven=False) for smoothed in runs):
         error = model_error(run, model)
         left += stretches(error, run.time)
         noise += stretches(model_error(resmoothed(run, rng), model) - error, run.time)
@@ -96,7 +96,7 @@ def resmoothed(run: Smoothed, rng: np.random.Generator) -> Smoothed:
     track = run.track
     pose = run.eta + run.noise * rng.standard_normal(run.eta.shape)
     used = run.used[:, None]
-    return smooth(replace(track, pose=np.where(used, pose, track.pose)))
+    return smooth(replace(track, pose=np.where(used, pose, track.pose)), driven=False)
 
 
 def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -86,7 +86,8 @@ def bundle(typename: str, base: type[Any] | None = None, **groups: Any) -> type[
     return made
 
 
-def variables(cls: type[Any]) -> list[Variable]:
+@cache
+def variables(cls: type[Any]) -> tuple[Variable, ...]:
     """The scalars of a declared NamedTuple class, nested ones included, in order.
 
     Raises:
@@ -115,7 +116,7 @@ def variables(cls: type[Any]) -> list[Variable]:
                 FIXED in meta[2:],
             )
         )
-    return found
+    return tuple(found)
 
 
 def _nested(cls: type[Any], name: str, hint: Any) -> type[Any] | None:

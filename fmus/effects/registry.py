@@ -208,7 +208,7 @@ def _parameters(name: str, kind: Kind, function: Callable[..., Any]) -> tuple[Va
             "_field_defaults": {a.name: a.default for a in arguments if a.default is not a.empty},
         },
     )
-    return tuple(variables(group))
+    return variables(group)
 
 
 def effects(*kinds: Kind) -> list[Effect]:
