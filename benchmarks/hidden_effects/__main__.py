@@ -110,12 +110,18 @@ def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list
     effects = options.effects or (QUICK if options.quick else SINGLE)
     noises = options.noise or (["n4"] if options.quick else list(NOISE))
     wrong = [False] * options.exact + [True] * options.wrong or [False] + [True] * (not options.quick)
-    return effects, noises, wrong, range(options.seeds)
+    return effects, noises, wrong, range(options.first, options.first + options.seeds)
 
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 100:
         raise argparse.ArgumentTypeError(f"needs a whole number from 1 to 100, not '{text}'")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal() or not int(text) < 100:
+        raise argparse.ArgumentTypeError(f"needs a whole number from 0 to 99, not '{text}'")
     return int(text)
 
 
@@ -139,7 +145,10 @@ def _parser() -> argparse.ArgumentParser:
         "--exact", action="store_true", help="exact coefficients (both, if neither is given)"
     )
     parser.add_argument("--wrong", action="store_true", help="coefficients up to 10 %% wrong")
-    parser.add_argument("--seeds", type=_count, default=1, metavar="N", help="seeds 0 to N-1 (1)")
+    parser.add_argument("--seeds", type=_count, default=1, metavar="N", help="how many seeds (1)")
+    parser.add_argument(
+        "--first", type=_seed, default=0, metavar="K", help="the first seed, below 100 (0)"
+    )
     parser.add_argument(
         "--jobs", type=_count, default=os.cpu_count(), metavar="N", help="processes (one for each core)"
     )

@@ -9,6 +9,8 @@ from typing import Any
 
 from cosim import InputError
 
+from .runs import NOISE, POSITION
+
 BETWEEN = "; "
 
 
@@ -72,6 +74,11 @@ class Row:
     def possible(self) -> float:
         """How many times smaller it is with the true model."""
         return self.before_mm / self.truth_mm
+
+    @property
+    def limit(self) -> float:
+        """How many times smaller it would be with the true model from the true state: noise is left."""
+        return self.before_mm / (1e3 * NOISE[self.noise] * POSITION * 2**0.5)
 
 
 NAMES = [f.name for f in fields(Row)]
