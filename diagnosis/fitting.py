@@ -72,17 +72,26 @@ def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndar
         TooFewError: in some stretch.
     """
     weights = gate(p, local, huber(p, local))
-    p, smoothness = tuned(p, weights)
+    p, smoothness, _ = tuned(p, weights)
     return p, smoothness, gate(p, smoothness, weights)
 
 
-def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
-    """A problem with an even penalty, its penalty adapted to the jerk; and the likeliest smoothness."""
-    smoothness = likeliest(p, weights)
+def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray, float]:
+    """How smooth the spline most likely is.
+
+    Args:
+        p: problem with an even penalty.
+        weights: (n,), of the samples.
+
+    Returns:
+        The problem with its penalty adapted to the jerk; the likeliest smoothness (3,); minus twice the
+        log likelihood of the even problem, but for what is the same for any measurements.
+    """
+    smoothness, cost = likeliest(p, weights)
     for _ in range(ADAPTIONS):
         p = adapted(p, smoothness, weights)
-        smoothness = likeliest(p, weights)
-    return p, smoothness
+        smoothness, _ = likeliest(p, weights)
+    return p, smoothness, cost
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
@@ -133,13 +142,14 @@ def gate(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return weights
 
 
-def likeliest(p: Problem, weights: np.ndarray) -> np.ndarray:
-    """The smoothness (3,) of each channel with the largest likelihood."""
-    return np.array([_likeliest(p, weights, channel) for channel in range(3)])
+def likeliest(p: Problem, weights: np.ndarray) -> tuple[np.ndarray, float]:
+    """The smoothness (3,) of each channel with the largest likelihood, and minus twice its logarithm."""
+    smoothness, costs = zip(*(_likeliest(p, weights, channel) for channel in range(3)), strict=True)
+    return np.array(smoothness), float(sum(costs))
 
 
-def _likeliest(p: Problem, weights: np.ndarray, channel: int) -> float:
-    """The smoothness of one channel with the largest likelihood."""
+def _likeliest(p: Problem, weights: np.ndarray, channel: int) -> tuple[float, float]:
+    """The smoothness of one channel with the largest likelihood, and minus twice its logarithm."""
     band = gram(p.b, weights, p.grid.size)
     z = p.z[:, channel : channel + 1]
     right = p.b.matrix.T @ (weights[:, None] * z)
@@ -155,7 +165,7 @@ def _likeliest(p: Problem, weights: np.ndarray, channel: int) -> float:
         return 2.0 * float(np.log(factor[0]).sum()) - p.grid.rank * np.log(s) + off
 
     found: Any = minimize_scalar(cost, bounds=(-8.0, 8.0), method="bounded", options={"xatol": 0.02})
-    return 10.0 ** float(found.x)
+    return 10.0 ** float(found.x), float(found.fun)
 
 
 def adapted(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Problem:

@@ -15,9 +15,14 @@ from scipy.signal import lfilter
 from fmus.frames import rotate_to_earth
 
 from .cleaning import Track
-from .fitting import Fit, Problem
+from .fitting import Fit, Problem, likeliest, solve, tuned
 
 FORGOTTEN = 30.0  # s; slower than that a push is no different from any smooth motion
+DELAYS = np.arange(0.0, 1.01, 0.1)  # s, that are tried
+ROUNDS = 3  # of gains and smoothness in turn
+PRICE = (
+    20.0  # twice the number of gains and delay: what they must take from minus twice the log likelihood
+)
 LEAST = 1e-9  # share of what the best known combination of gains tells; below, one is left at zero
 
 
@@ -32,6 +37,49 @@ class Push(NamedTuple):
     def none(cls, n: int) -> "Push":
         """What no command does, for n samples."""
         return cls(*np.zeros((3, n, 3)))
+
+
+def followed(
+    even: Problem, smoothness: np.ndarray, fit: Fit, weights: np.ndarray, track: Track, psi: np.ndarray
+) -> tuple[np.ndarray, Fit, Push]:
+    """A smooth spline beside what the commands do, if that is likelier than a spline alone.
+
+    Args:
+        even: the pose, with an even penalty.
+        smoothness, fit: (3,), of a spline that knows of no commands, and the spline.
+        weights: (n,), of the samples.
+        track, psi: see :func:`push`.
+
+    Returns:
+        Smoothness (3,) and spline of what the commands do not do, and what they do.
+    """
+    pushed, likely = Push.none(track.run.time.size), likeliest(even, weights)[1] - PRICE
+    late = delay(even, fit, weights, track, psi)
+    for _ in range(ROUNDS):
+        G, _ = gains(even, fit, weights, track, psi, late)
+        more = push(track, psi, commands(track, late) @ G.T)
+        adapted, smoother, cost = tuned(even._replace(z=even.z - more.eta[even.rows]), weights)
+        if cost >= likely:
+            break
+        smoothness, fit, pushed, likely = smoother, solve(adapted, smoother, weights), more, cost
+    return smoothness, fit, pushed
+
+
+def commands(track: Track, late: float) -> np.ndarray:
+    """(n, 3), tau as it was asked for ``late`` [s] before each sample."""
+    time = track.run.time
+    row = np.searchsorted(time, time - late + 1e-6 * track.period, side="right") - 1
+    return track.run.tau_cmd[np.maximum(row, 0)]
+
+
+def delay(even: Problem, fit: Fit, weights: np.ndarray, track: Track, psi: np.ndarray) -> float:
+    """After how long [s] commands act, as far as the pose tells; arguments as of :func:`followed`."""
+    told = np.array([gains(even, fit, weights, track, psi, late)[1] for late in DELAYS])
+    best = int(np.argmax(told))
+    if best in (0, len(DELAYS) - 1):
+        return float(DELAYS[best])
+    bend, slope, _ = np.polyfit([-1.0, 0.0, 1.0], told[best - 1 : best + 2], 2)
+    return float(DELAYS[best] - 0.5 * slope / bend * (DELAYS[1] - DELAYS[0]))
 
 
 def push(track: Track, psi: np.ndarray, acceleration: np.ndarray) -> Push:
@@ -62,15 +110,18 @@ def _recalled(x: np.ndarray, kept: float) -> np.ndarray:
     return np.asarray(lfilter([0.0, 1.0], [1.0, -kept], x, axis=0))
 
 
-def gains(problem: Problem, fit: Fit, weights: np.ndarray, track: Track, psi: np.ndarray) -> np.ndarray:
-    """Body-fixed acceleration for a unit of each command, (3, 3).
+def gains(
+    problem: Problem, fit: Fit, weights: np.ndarray, track: Track, psi: np.ndarray, late: float
+) -> tuple[np.ndarray, float]:
+    """Body-fixed acceleration for a unit of each command, (3, 3), and how much of the rest it takes.
 
     Args:
-        problem, fit: the pose, and the smooth spline through it.
+        problem, fit: the pose, and a smooth spline.
         weights: (n,), of the samples.
         track, psi: see :func:`push`.
+        late: after how long commands act [s].
     """
-    tau = track.run.tau_cmd
+    tau = commands(track, late)
     columns = np.empty((9, len(problem.rows), 3))
     for k, (axis, command) in enumerate(np.ndindex(3, 3)):
         along = np.zeros_like(tau)
@@ -86,4 +137,4 @@ def gains(problem: Problem, fit: Fit, weights: np.ndarray, track: Track, psi: np
         wanted += problem.z[:, c] @ rough
     size = np.sqrt(np.maximum(np.diag(told), 1e-300))
     found = np.linalg.lstsq(told / np.outer(size, size), wanted / size, rcond=LEAST)[0] / size
-    return found.reshape(3, 3)
+    return found.reshape(3, 3), float(wanted @ found)

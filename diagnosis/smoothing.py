@@ -14,8 +14,8 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 
 from .cleaning import Counts, Track, noise
-from .fitting import Problem, TooFewError, solve, trusted, tuned
-from .push import Push, gains, push
+from .fitting import Problem, TooFewError, solve, trusted
+from .push import Push, followed
 from .spline import Knots, basis, inverse_band, knots, penalty, variance
 
 BREAK = 3.0  # s; over a longer gap nothing is said
@@ -95,19 +95,14 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     dense = rows[inside[rows]]
     z = track.pose[dense] - origin
     sigma = np.maximum(noise(z), LEAST_NOISE)
-    even = np.array(3 * [penalty(grid, np.ones(int(grid.intervals.sum())))])
-    problem = Problem(dense, z, basis(grid, time[dense]), grid, even, sigma)
+    stiff = np.array(3 * [penalty(grid, np.ones(int(grid.intervals.sum())))])
+    even = Problem(dense, z, basis(grid, time[dense]), grid, stiff, sigma)
     local = np.full(3, 64.0 * (track.period / grid.spacing) ** 5)  # follows a few samples
-    problem, smoothness, weights = trusted(problem, local)
-    fit = solve(problem, smoothness, weights)
-    pushed = Push.none(time.size)
+    adapted, smoothness, weights = trusted(even, local)
+    fit, pushed = solve(adapted, smoothness, weights), Push.none(time.size)
     if driven:
         psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
-        G = gains(problem, fit, weights, track, psi)
-        pushed = push(track, psi, track.run.tau_cmd @ G.T)
-        problem = problem._replace(z=z - pushed.eta[dense], stiff=even)
-        problem, smoothness = tuned(problem, weights)
-        fit = solve(problem, smoothness, weights)
+        smoothness, fit, pushed = followed(even, smoothness, fit, weights, track, psi)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
     spikes[rows] = False

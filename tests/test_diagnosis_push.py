@@ -1,0 +1,85 @@
+"""What the commands do to the pose: known motions, gains found again, and no harm where nothing is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from measured import NOISE, sail
+
+from diagnosis import Run, clean, smooth
+from diagnosis.push import FORGOTTEN, push
+
+RUN, NU = sail(60.0)
+N = RUN.time.size
+INNER = slice(100, -100)
+
+
+def rms(x):
+    return np.sqrt(np.mean(np.square(x), axis=0))
+
+
+def test_constant_force_moves_a_critically_damped_mass():
+    track = clean(RUN)
+    t, T = RUN.time, FORGOTTEN
+    pushed = push(track, np.zeros(N), np.tile([1.0, -2.0, 0.5], (N, 1)))
+    expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
+    np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
+
+
+def test_pose_velocity_and_acceleration_belong_together():
+    time = 100.0 + np.arange(N) * 0.02
+    force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
+    pushed = push(clean(replace(RUN, time=time)), 0.4 * np.sin(0.2 * time), force)
+    for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
+        between = np.diff(value, axis=0) / 0.02
+        np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
+        assert np.abs(between.mean(axis=0) - rate.mean(axis=0)).max() < 1e-3
+
+
+def test_heading_turns_the_push():
+    force = np.random.default_rng(0).standard_normal((N, 3))
+    track = clean(RUN)
+    ahead, aside = push(track, np.zeros(N), force), push(track, np.full(N, 0.5 * np.pi), force)
+    for a, b in zip(ahead, aside, strict=True):
+        np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
+
+
+def driven(seed, gains, jumps=1.0):
+    """A run, and its true velocity in NED, that nothing but jumping commands drives at zero heading."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(N) * 0.02
+    tau = jumps * np.repeat(rng.standard_normal((N // 20, 3)), 20, axis=0)
+    a = tau @ np.array(gains).T
+    eta_dot = np.cumsum(np.vstack([np.zeros((1, 3)), a[:-1] * 0.02]), axis=0)
+    eta = np.cumsum(np.vstack([np.zeros((1, 3)), eta_dot[:-1] * 0.02 + 0.5 * a[:-1] * 0.02**2]), axis=0)
+    return Run("driven", time, eta + NOISE * rng.standard_normal((N, 3)), tau), eta_dot
+
+
+def test_motion_by_commands_alone_is_found_again_down_to_a_tenth_of_the_error():
+    gains = [[0.05, 0.0, 0.0], [0.0, 0.04, 0.01], [0.0, -0.002, 0.02]]
+    run, eta_dot = driven(3, gains)
+    knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+    better = rms((blind.eta_dot - eta_dot)[INNER]) / rms((knowing.eta_dot - eta_dot)[INNER])
+    assert (better > 4.0).all()
+
+
+def test_commands_that_do_nothing_do_no_harm():
+    tau = np.random.default_rng(1).standard_normal((N, 3))
+    for commands in (0.0 * tau, 0.0 * tau + 0.3, tau):
+        run = replace(RUN, tau_cmd=commands)
+        knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+        assert (rms((knowing.nu - NU)[INNER]) < 1.1 * rms((blind.nu - NU)[INNER])).all()
+
+
+def test_commands_that_are_the_same_are_no_trouble():
+    run, eta_dot = driven(4, 0.02 * np.eye(3))
+    same = replace(run, tau_cmd=run.tau_cmd[:, [0, 0, 2]])
+    found = smooth(clean(same))
+    assert np.isfinite(found.nu).all()
+    assert rms((found.eta_dot - eta_dot)[INNER])[0] < 2e-3
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_unit_of_the_commands_does_not_matter(unit):
+    scaled = replace(RUN, tau_cmd=unit * RUN.tau_cmd)
+    np.testing.assert_allclose(smooth(clean(scaled)).nu, smooth(clean(RUN)).nu, atol=1e-4)
