@@ -6,10 +6,11 @@ commands, plus one that is smooth. The gains come from least squares between com
 of a ship enters.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_solve_banded
+from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from fmus.frames import rotate_to_earth
@@ -18,7 +19,8 @@ from .cleaning import Track
 from .fitting import Fit, Problem, likeliest, solve, tuned
 
 FORGOTTEN = 30.0  # s; slower than that a push is no different from any smooth motion
-DELAYS = np.arange(0.0, 1.01, 0.1)  # s, that are tried
+DELAYS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # s, that are tried first
+SURE = 0.01  # s, of a delay
 ROUNDS = 3  # of gains and smoothness in turn
 PRICE = (
     20.0  # twice the number of gains and delay: what they must take from minus twice the log likelihood
@@ -74,12 +76,14 @@ def commands(track: Track, late: float) -> np.ndarray:
 
 def delay(even: Problem, fit: Fit, weights: np.ndarray, track: Track, psi: np.ndarray) -> float:
     """After how long [s] commands act, as far as the pose tells; arguments as of :func:`followed`."""
-    told = np.array([gains(even, fit, weights, track, psi, late)[1] for late in DELAYS])
-    best = int(np.argmax(told))
-    if best in (0, len(DELAYS) - 1):
-        return float(DELAYS[best])
-    bend, slope, _ = np.polyfit([-1.0, 0.0, 1.0], told[best - 1 : best + 2], 2)
-    return float(DELAYS[best] - 0.5 * slope / bend * (DELAYS[1] - DELAYS[0]))
+
+    def left(late: float) -> float:
+        return -gains(even, fit, weights, track, psi, late)[1]
+
+    best = float(min(DELAYS, key=left))
+    around = max(best - DELAYS[1], 0.0), best + DELAYS[1]
+    found: Any = minimize_scalar(left, bounds=around, method="bounded", options={"xatol": SURE})
+    return min(best, float(found.x), key=left)
 
 
 def push(track: Track, psi: np.ndarray, acceleration: np.ndarray) -> Push:
