@@ -72,26 +72,17 @@ def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndar
         TooFewError: in some stretch.
     """
     weights = gate(p, local, huber(p, local))
-    p, smoothness, _ = tuned(p, weights)
+    p, smoothness = tuned(p, weights)
     return p, smoothness, gate(p, smoothness, weights)
 
 
-def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray, float]:
-    """How smooth the spline most likely is.
-
-    Args:
-        p: problem with an even penalty.
-        weights: (n,), of the samples.
-
-    Returns:
-        The problem with its penalty adapted to the jerk; the likeliest smoothness (3,); minus twice the
-        log likelihood of the even problem, but for what is the same for any measurements.
-    """
-    smoothness, cost = likeliest(p, weights)
+def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """A problem with an even penalty, its penalty adapted to the jerk; and the likeliest smoothness."""
+    smoothness, _ = likeliest(p, weights)
     for _ in range(ADAPTIONS):
         p = adapted(p, smoothness, weights)
         smoothness, _ = likeliest(p, weights)
-    return p, smoothness, cost
+    return p, smoothness
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:

@@ -15,7 +15,7 @@ from fmus.frames import rotate_to_body
 
 from .cleaning import Counts, Track, noise
 from .fitting import Problem, TooFewError, solve, trusted
-from .push import Push, followed
+from .push import Course, Push, followed
 from .spline import Knots, basis, inverse_band, knots, penalty, variance
 
 BREAK = 3.0  # s; over a longer gap nothing is said
@@ -37,6 +37,7 @@ class Smoothed:
         eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
         noise: (3,), standard deviation of the measurement [m, m, rad].
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
+        late: after how long the commands act [s], as far as the pose tells; NaN where it does not.
     """
 
     track: Track
@@ -51,6 +52,7 @@ class Smoothed:
     nu_std: np.ndarray
     noise: np.ndarray
     jerk: np.ndarray
+    late: float
 
     @property
     def time(self) -> np.ndarray:
@@ -102,13 +104,13 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     fit, pushed = solve(adapted, smoothness, weights), Push.none(time.size)
     if driven:
         psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
-        smoothness, fit, pushed = followed(even, smoothness, fit, weights, track, psi)
+        smoothness, fit, pushed = followed(even, smoothness, fit, weights, Course(track, psi))
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
     spikes[rows] = False
     spikes[dense] = weights == 0.0
     found = []
-    for derivative, known in enumerate(pushed):
+    for derivative, known in enumerate(pushed[:3]):
         b = basis(grid, time[inside], derivative)
         found += [spread(b(fit.coefficients) + known[inside], inside)]
         found += [spread(np.sqrt(variance(b, inverse)), inside)]
@@ -128,6 +130,7 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
         _body_std(eta, u, v, eta_std, eta_dot_std),
         sigma,
         sigma**2 / (smoothness * grid.spacing**5),
+        pushed.late,
     )
 
 

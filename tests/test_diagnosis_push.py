@@ -7,7 +7,7 @@ import pytest
 from measured import DATA, NOISE, needs_data, sail
 
 from diagnosis import Run, clean, read, smooth
-from diagnosis.push import FORGOTTEN, delay, push
+from diagnosis.push import FORGOTTEN, Course
 
 RUN, NU = sail(60.0)
 N = RUN.time.size
@@ -19,9 +19,9 @@ def rms(x):
 
 
 def test_constant_force_moves_a_critically_damped_mass():
-    track = clean(RUN)
+    run = replace(RUN, tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
     t, T = RUN.time, FORGOTTEN
-    pushed = push(track, np.zeros(N), np.tile([1.0, -2.0, 0.5], (N, 1)))
+    pushed = Course(clean(run), np.zeros(N)).push(np.eye(3), 0.0)
     expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
     np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
 
@@ -29,7 +29,8 @@ def test_constant_force_moves_a_critically_damped_mass():
 def test_pose_velocity_and_acceleration_belong_together():
     time = 100.0 + np.arange(N) * 0.02
     force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
-    pushed = push(clean(replace(RUN, time=time)), 0.4 * np.sin(0.2 * time), force)
+    run = replace(RUN, time=time, tau_cmd=force)
+    pushed = Course(clean(run), 0.4 * np.sin(0.2 * time)).push(np.eye(3), 0.0)
     for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
         between = np.diff(value, axis=0) / 0.02
         np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
@@ -37,11 +38,16 @@ def test_pose_velocity_and_acceleration_belong_together():
 
 
 def test_heading_turns_the_push():
-    force = np.random.default_rng(0).standard_normal((N, 3))
-    track = clean(RUN)
-    ahead, aside = push(track, np.zeros(N), force), push(track, np.full(N, 0.5 * np.pi), force)
-    for a, b in zip(ahead, aside, strict=True):
+    track = clean(replace(RUN, tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
+    ahead, aside = (Course(track, np.full(N, psi)).push(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi))
+    for a, b in zip(ahead[:3], aside[:3], strict=True):
         np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
+
+
+def test_late_commands_push_late():
+    track = clean(RUN)
+    now, late = (Course(track, np.zeros(N)).push(np.eye(3), by) for by in (0.0, 0.5))
+    np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 
 
 def driven(seed, gains, late=0.0):
@@ -61,6 +67,7 @@ def test_motion_by_commands_alone_is_found_again(late):
     knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
     better = rms((blind.eta_dot - eta_dot)[INNER]) / rms((knowing.eta_dot - eta_dot)[INNER])
     assert (better[:2] > 4.0).all()
+    assert smooth(clean(run)).late == pytest.approx(late, abs=0.02)
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])
@@ -73,13 +80,10 @@ def test_commands_that_do_nothing_do_no_harm(seed):
 
 
 @needs_data
-def test_every_run_of_the_real_ship_says_how_late_its_thrusters_are(monkeypatch):
-    found = []
-    monkeypatch.setattr("diagnosis.push.delay", lambda *a: found.append(delay(*a)) or found[-1])
-    for path in sorted((DATA / "cse1").glob("*.mat")):
-        smooth(clean(read(path)))
-    assert len(found) == 4
-    assert 0.35 <= min(found) <= max(found) <= 0.45
+def test_every_run_of_the_real_ship_says_how_late_its_thrusters_are():
+    late = [smooth(clean(read(path))).late for path in sorted((DATA / "cse1").glob("*.mat"))]
+    assert len(late) == 4
+    assert 0.35 <= min(late) <= max(late) <= 0.45
 
 
 def test_commands_that_are_the_same_are_no_trouble():
