@@ -89,7 +89,7 @@ def _data(evidence: Sequence[Evidence]) -> results.Data:
                 run=e.name,
                 held_out=e.held_out,
                 seconds=seconds,
-                notes=list(track.notes),
+                notes=list(e.smoothed.notes),
                 **e.smoothed.counts._asdict(),
             )
         )

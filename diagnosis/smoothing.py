@@ -21,6 +21,7 @@ from .spline import Knots, basis, inverse_band, knots, penalty, variance
 BREAK = 3.0  # s; over a longer gap nothing is said
 SPACING = 0.05  # s between knots, or a sampling period if that is longer
 FEWEST = 20  # samples in a stretch
+NOTICED = 0.1  # s; a delay that is worth a word
 # Below this a measurement means nothing, and the kinks of a stepwise force would be spikes [m, m, rad].
 LEAST_NOISE = 2e-5
 
@@ -63,6 +64,14 @@ class Smoothed:
     def used(self) -> np.ndarray:
         """(n,), samples that count: new, no spike, in a stretch that could be smoothed."""
         return self.track.valid & ~self.spikes & np.isfinite(self.eta[:, 0])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found in the data, a line each."""
+        if not self.late >= NOTICED:
+            return self.track.notes
+        late = f"commands act {self.late:.2f} s after they are given, as the pose tells without a model"
+        return (*self.track.notes, late)
 
     @property
     def counts(self) -> Counts:

@@ -118,7 +118,15 @@ def write_expected(report: Report, folds: Sequence[Fold]) -> None:
     rows = expectations([f.content for f in folds])
     header = ["expected", *(f"without {f.name}" for f in folds)]
     report.table(header, [[row.expected, *row.came] for row in rows], words=True)
+    late = {f.name: f.evidence.smoothed.late for f in folds}
+    told = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in late.items() if isfinite(seconds))
+    if told:
+        report.text(
+            f"The pose alone tells, without any model of the ship, how late its commands act: {told}. "
+            "The model's delay is learned along with all else, and other effects take a part of it."
+        )
     report.result("expected", rows)
+    report.result("late", late)
 
 
 def write_findings(report: Report, name: str, d: Diagnosis) -> None:

@@ -21,12 +21,13 @@ from studies.command import progress
 from .cost import Cost, measure
 from .draw import SINGLE
 from .report import write
-from .results import Results
+from .results import Results, Row
 from .runs import NOISE, build
 from .trial import Cell, trial
 
 OUT = Path("docs") / "benchmarks" / "hidden_effects"
 NONES, PAIRS = 5, 4  # cells without an effect and with two, for each of the others and a seed
+CELLS = 10  # that a process takes
 QUICK = ("X_u", "N_r", "loss_yaw", "bow_failure", "current", "delay")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -57,16 +58,26 @@ def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
         os.environ[name] = "1"  # inherited: the processes are as many as the cores
     with TemporaryDirectory() as folder, progress(len(todo), "cells") as advance:
         build(Path(folder))
-        # Forking a process that has loaded FMUs would copy their threads' locks.
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"))
-        try:
-            futures: list[Future] = [pool.submit(trial, cell, Path(folder), peers) for cell in todo]
-            for future in as_completed(futures):
-                results.add(future.result())
+        for k in range(0, len(todo), CELLS * jobs):
+            for row in answers(todo[k : k + CELLS * jobs], Path(folder), jobs, peers):
+                results.add(row)
                 advance()
-        finally:
-            with suppress(KeyboardInterrupt):
-                pool.shutdown(cancel_futures=True)
+
+
+def answers(some: Sequence[Cell], fmus: Path, jobs: int, peers: bool) -> Iterator[Row]:
+    """What became of some cells, as they come, by new processes.
+
+    A Python FMU stays in its process for good: after many runs each further one would be slower.
+    """
+    # Forking a process that has loaded FMUs would copy their threads' locks.
+    pool = ProcessPoolExecutor(jobs, get_context("spawn"))
+    try:
+        futures: list[Future] = [pool.submit(trial, cell, fmus, peers) for cell in some]
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        with suppress(KeyboardInterrupt):
+            pool.shutdown(cancel_futures=True)
 
 
 def cost() -> Cost:

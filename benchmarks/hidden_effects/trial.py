@@ -1,5 +1,6 @@
 """One cell of the benchmark: hide something, let the diagnosis look for it, score its answer."""
 
+import pickle
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim import whole
 from diagnosis import Run, clean, smooth
 from diagnosis.evidence import Evidence, examine
 from diagnosis.model import Model
@@ -58,8 +60,13 @@ class Cell:
 
 @cache
 def pilot(seed: int, fmus: Path) -> list[Motion]:
-    """The courses to learn from, run by a ship that lacks nothing."""
-    return [motion(sail(c, Hidden(), 1.0, k, fmus), {}) for k, c in enumerate(courses(seed)[:-1])]
+    """The courses to learn from, run by a ship that lacks nothing; kept beside the FMUs."""
+    kept = fmus / f"pilot{seed}.pkl"
+    if not kept.is_file():
+        runs = [motion(sail(c, Hidden(), 1.0, k, fmus), {}) for k, c in enumerate(courses(seed)[:-1])]
+        with whole(kept) as part:
+            part.write_bytes(pickle.dumps(runs))
+    return pickle.loads(kept.read_bytes())
 
 
 def draws(cell: Cell, fmus: Path) -> Iterator[list[Draw]]:
