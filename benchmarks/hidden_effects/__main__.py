@@ -36,16 +36,15 @@ def cells(
     effects: Sequence[str], noises: Sequence[str], wrong: Sequence[bool], seeds: Sequence[int]
 ) -> Iterator[Cell]:
     """The cells of a benchmark; with more effects than one also those with none and with two."""
+    ways, several = list(product(noises, wrong)), len(effects) > 1
     for seed in seeds:
         rng = np.random.default_rng([seed, 4])
-        hidden: list[tuple[str, ...]] = [(e,) for e in effects]
-        for _ in range(PAIRS if len(effects) > 1 else 0):
-            hidden.append(tuple(rng.choice(effects, 2, replace=False).tolist()))
+        pairs = [rng.choice(effects, 2, replace=False).tolist() for _ in range(PAIRS)] if several else []
         # The courses are those of the seed; all else is drawn anew.
-        nones = [seed + 100 * k for k in range(NONES)] if len(effects) > 1 else []
-        for noise, off in product(noises, wrong):
-            yield from (Cell(h, noise, off, seed) for h in dict.fromkeys(hidden))
-            yield from (Cell((), noise, off, each) for each in nones)
+        nones = [seed + 100 * k for k in range(NONES)] if several else []
+        yield from (Cell((e,), *way, seed) for way in ways for e in effects)
+        yield from (Cell((), *way, each) for way in ways for each in nones)
+        yield from (Cell(tuple(pair), *way, seed) for way in ways for pair in pairs)
 
 
 def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
