@@ -39,12 +39,13 @@ def cells(
     ways, several = list(product(noises, wrong)), len(effects) > 1
     for seed in seeds:
         rng = np.random.default_rng([seed, 4])
-        pairs = [rng.choice(effects, 2, replace=False).tolist() for _ in range(PAIRS)] if several else []
+        drawn = [rng.choice(effects, 2, replace=False).tolist() for _ in range(PAIRS * several)]
+        pairs = dict.fromkeys(tuple(pair) for pair in drawn)
         # The courses are those of the seed; all else is drawn anew.
-        nones = [seed + 100 * k for k in range(NONES)] if several else []
+        nones = [seed + 100 * k for k in range(NONES * several)]
         yield from (Cell((e,), *way, seed) for way in ways for e in effects)
         yield from (Cell((), *way, each) for way in ways for each in nones)
-        yield from (Cell(tuple(pair), *way, seed) for way in ways for pair in pairs)
+        yield from (Cell(pair, *way, seed) for way in ways for pair in pairs)
 
 
 def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
