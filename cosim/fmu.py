@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -202,6 +203,12 @@ class Model:
             self._folder = None
 
 
+# The modules with the classes of Python FMUs. Their library (pythonfmu 0.7.0) never lets go of a class,
+# but of its module's dictionary, once more often than it took it: were the module freed, the class
+# would point to nothing, and some garbage collection would end the process.
+_kept: list[ModuleType] = []
+
+
 class Instance:
     """A running FMU.
 
@@ -278,6 +285,7 @@ class Instance:
         )
         self._fmu.component = component
         if own:
+            _kept.extend(sys.modules[name] for name in own & sys.modules.keys())
             self.model.forget_modules()
         sys.modules.update(others)
         if not component:

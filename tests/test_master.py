@@ -1,7 +1,9 @@
 """The step loop: same numbers as plain Python, no spurious delay, faults, events, rates, failures."""
 
+import gc
 import json
 import math
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -356,6 +358,17 @@ def test_bytes_do_not_depend_on_when_blocks_are_written(tmp_path):
     assert len(texts) == 1
     log = cosim.read_log(tmp_path)
     assert np.array_equal(np.column_stack(list(log.values())), rows, equal_nan=True)
+
+
+def test_module_of_a_python_fmu_outlives_it(plain_fmu, tmp_path):
+    # Its class does, as the library never lets go of it; without the module it would point to freed memory.
+    fmu = plain_fmu("Survivor", "self.x = 0.0\nself.register_variable(Real('x'))")
+    content = {"step": 0.1, "stop": 0.3, "fmus": {"a": {"path": str(fmu)}}, "connections": []}
+    run(content, tmp_path / "out")
+    gc.collect()
+    there = [o for o in gc.get_objects() if isinstance(o, ModuleType) and o.__name__ == "Survivor"]
+    # Making the FMU imports a module of that name as well.
+    assert any("resources" in str(module.__file__) for module in there)
 
 
 def test_two_python_fmus_of_one_module_name_run_their_own_code(plain_fmu, tmp_path):
