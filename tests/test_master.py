@@ -362,8 +362,9 @@ def test_bytes_do_not_depend_on_when_blocks_are_written(tmp_path):
 
 def test_module_of_a_python_fmu_outlives_it(plain_fmu, tmp_path):
     # Its class does, as the library never lets go of it; without the module it would point to freed memory.
-    fmu = plain_fmu("Survivor", "self.x = 0.0\nself.register_variable(Real('x'))")
-    content = {"step": 0.1, "stop": 0.3, "fmus": {"a": {"path": str(fmu)}}, "connections": []}
+    fmu = plain_fmu("Survivor", GAIN)
+    fmus = {"a": {"path": str(fmu)}}
+    content = {"name": "one", "step": 0.1, "stop": 0.3, "fmus": fmus, "connections": []}
     run(content, tmp_path / "out")
     gc.collect()
     there = [o for o in gc.get_objects() if isinstance(o, ModuleType) and o.__name__ == "Survivor"]
