@@ -137,7 +137,8 @@ def learn(
     suspects = suspected(prior, shift[len(names) :], std[len(names) :]) if prior > 0.0 else []
     last = at.model(prior) if at.values else start
     advance("waves")
-    swell = waves([w.smoothed for w in data], last, rng)
+    likeliest = replace(at, moved=shift[len(names) :]).model(prior)
+    swell = waves([w.smoothed for w in data], likeliest, rng)
     if swell is not None:
         findings.insert(0, of_waves(swell, start))
         ranking = [Ranked(WAVES, 0.0, swell.share), *ranking]
