@@ -2,7 +2,7 @@
 
 import re
 
-from ..declare import Range, Variable, rebuild, variables, width
+from ..declare import Range, Variable, packer, variables, width
 from ..hull import Damping, Triple, damping_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
@@ -20,7 +20,7 @@ def change(k: int, ship: Ship, delta: Number) -> Triple:
     """Force [N, N, N m] of an addition to the k-th coefficient of :class:`~fmus.hull.Damping`."""
     only = [0.0] * _COUNT
     only[k] = delta
-    return damping_force(ship.u, ship.v, ship.r, rebuild(Damping(), only))
+    return damping_force(ship.u, ship.v, ship.r, packer(Damping)(only))
 
 
 def _add_change(k: int, coefficient: Variable) -> None:
