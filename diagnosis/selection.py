@@ -107,17 +107,36 @@ def learn(
     """
     rng = np.random.default_rng(seed)
     start = model or Model()
+    learned, likeliest = search(data, prior, start, advance, rng)
+    advance("waves")
+    for w in data:  # the windows of a long run need room
+        w.memory.clear()
+    swell = waves([w.smoothed for w in data], likeliest, rng)
+    if swell is None:
+        return learned
+    ranking = [Ranked(WAVES, 0.0, swell.share), *learned.ranking]
+    return replace(learned, findings=[of_waves(swell, start), *learned.findings], ranking=ranking)
+
+
+def search(
+    data: Sequence[Integrals],
+    prior: float,
+    start: Model,
+    advance: Callable[[str], None],
+    rng: np.random.Generator,
+) -> tuple[Learned, Model]:
+    """All effects but waves, and the likeliest model with them; arguments as of :func:`learn`."""
     blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(data)])
     p, at = Problem(data, blocks, None, prior), Point(start)
     advance("every effect as a candidate")
-    step = first = candidates(p, at, set())
-    contest: Contest | None = None
+    step = candidates(p, at, set())
+    lacking = step.base
     ranking: list[Ranked] = []
     findings: list[Finding] = []
     while len(findings) < MOST:
         advance(f"effect {len(findings) + 1}: the best candidates where they fit best")
         p, step, contest = settle(p, at, step)
-        total = float(np.sum((first.base * p.weight) ** 2))
+        total = float(np.sum((lacking * p.weight) ** 2))
         ranking = ranking or ranked(step, contest)
         if not accepted(step.nothing, contest.judged[0], total):
             break
@@ -126,6 +145,7 @@ def learn(
         at = contest.winner
         findings[-1] = replace(findings[-1], model=at.model(prior))
         advance(f"effect {len(findings) + 1}: every effect as a candidate")
+        del step, contest  # of a long run there is no room for two
         step = candidates(p, at, {f.id for f in findings})
     shift, std = posterior(p, at, step)
     names = at.fitted
@@ -136,13 +156,8 @@ def learn(
         findings[k] = replace(f, values=values, ci95=dict(f.ci95) | mine)
     suspects = suspected(prior, shift[len(names) :], std[len(names) :]) if prior > 0.0 else []
     last = at.model(prior) if at.values else start
-    advance("waves")
     likeliest = replace(at, moved=shift[len(names) :]).model(prior)
-    swell = waves([w.smoothed for w in data], likeliest, rng)
-    if swell is not None:
-        findings.insert(0, of_waves(swell, start))
-        ranking = [Ranked(WAVES, 0.0, swell.share), *ranking]
-    return Learned(findings, ranking, last, suspects, np.asarray(p.sigma))
+    return Learned(findings, ranking, last, suspects, np.asarray(p.sigma)), likeliest
 
 
 def ranked(step: Step, contest: Contest) -> list[Ranked]:

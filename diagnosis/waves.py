@@ -16,6 +16,7 @@ from scipy.signal import spectrogram
 from fmus.frames import rotate_to_body
 from fmus.hull import mass_matrix
 
+from .cleaning import Track
 from .model import Model, acceleration, by_mass, thrust
 from .smoothing import Smoothed, smooth
 
@@ -64,10 +65,13 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
         rng: for the bootstrap.
     """
     left, noise = [], []
-    for run in (smooth(smoothed.track, driven=False) for smoothed in runs):
+    for smoothed in runs:
+        run = smooth(smoothed.track, driven=False)
         error = model_error(run, model)
         left += stretches(error, run.time)
-        noise += stretches(model_error(resmoothed(run, rng), model) - error, run.time)
+        other = redrawn(run, rng)
+        del run  # of a long run there is not room for two
+        noise += stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time)
     if not left or not noise:
         return None
     frequency, segments = segments_of(left)
@@ -91,12 +95,10 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
     )
 
 
-def resmoothed(run: Smoothed, rng: np.random.Generator) -> Smoothed:
-    """The run as it was smoothed, with other noise of the same strength: what the noise alone makes."""
-    track = run.track
+def redrawn(run: Smoothed, rng: np.random.Generator) -> Track:
+    """The run as it was smoothed, with other noise of the same strength."""
     pose = run.eta + run.noise * rng.standard_normal(run.eta.shape)
-    used = run.used[:, None]
-    return smooth(replace(track, pose=np.where(used, pose, track.pose)), driven=False)
+    return replace(run.track, pose=np.where(run.used[:, None], pose, run.track.pose))
 
 
 def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

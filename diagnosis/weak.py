@@ -105,16 +105,17 @@ def integrals(smoothed: Smoothed) -> Integrals:
     )
     middles, first, last = middles[kept], first[kept], last[kept]
     rows = np.repeat(np.arange(middles.size), last - first)
-    columns = np.concatenate([rows[:0], *map(np.arange, first, last)])
+    columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
     half = WIDTH / 2
     s = np.clip((t[columns] - middles[rows]) / half, -1.0, 1.0)
     after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
     gap = np.gradient(t)[columns]
+    starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
     shape = (middles.size, t.size)
     block = max(BLOCK, float(t[-1] - t[0]) / BLOCKS)
 
     def matrix(values: np.ndarray) -> csr_matrix:
-        return csr_matrix((values, (rows, columns)), shape=shape)
+        return csr_matrix((values, columns, starts), shape=shape)
 
     return Integrals(
         smoothed,
