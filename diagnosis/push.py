@@ -17,6 +17,7 @@ from scipy.signal import lfilter
 
 from .cleaning import Track
 from .fitting import Fit, Problem, likeliest, solve, tuned
+from .spline import Knots
 
 FORGOTTEN = 30.0  # s; slower than that a push is no different from any smooth motion
 DELAYS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # s, that are tried first
@@ -53,19 +54,25 @@ class Course:
     Attributes:
         track: the run.
         psi: (n,), its heading [rad], NaN where it is not known.
-        even: (m,), times [s], one for each measurement that there should be.
+        grid: knots of the stretches, which know nothing of each other, times counted from the first.
+        even: (m,), times [s], one for each measurement that there should be in a stretch.
+        first: where each stretch but the first begins among them.
         turn: (m,), from body to earth: a rotation in the complex plane, north its real axis.
     """
 
     track: Track
     psi: np.ndarray
+    grid: Knots
     even: np.ndarray = field(init=False)
+    first: np.ndarray = field(init=False)
     turn: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        time, known = self.track.run.time, np.isfinite(self.psi)
-        even = np.arange(time[0], time[-1] + self.track.period, self.track.period)
+        time, h, known = self.track.run.time, self.track.period, np.isfinite(self.psi)
+        parts = [np.arange(a, b + h, h) for a, b in zip(self.grid.start, self.grid.end, strict=True)]
+        even = time[0] + np.concatenate(parts)
         object.__setattr__(self, "even", even)
+        object.__setattr__(self, "first", np.cumsum([part.size for part in parts])[:-1])
         object.__setattr__(self, "turn", np.exp(1j * np.interp(even, time[known], self.psi[known])))
 
     def asked(self, late: float) -> np.ndarray:
@@ -87,9 +94,14 @@ class Course:
         """
         h, T = self.track.period, FORGOTTEN
         kept = np.exp(-h / T)
-        w = _recalled(T * (1.0 - kept) * a, kept)
-        x = _recalled(h * kept * w + T * (T * (1.0 - kept) - h * kept) * a, kept)
+        w = self._recalled(T * (1.0 - kept) * a, kept)
+        x = self._recalled(h * kept * w + T * (T * (1.0 - kept) - h * kept) * a, kept)
         return x, w - x / T
+
+    def _recalled(self, x: np.ndarray, kept: float) -> np.ndarray:
+        """Sum (m, k) of all that was before in a stretch, a share kept from one time to the next."""
+        parts = [lfilter([0.0, 1.0], [1.0, -kept], part, axis=0) for part in np.split(x, self.first)]
+        return np.concatenate(parts)
 
     def push(self, G: np.ndarray, late: float) -> Push:
         """What commands do by gains (3, 3), body-fixed acceleration for a unit of each."""
@@ -104,11 +116,6 @@ class Course:
 def _apart(x: np.ndarray) -> np.ndarray:
     """North, east and heading (n, 3) of the first two as one complex number, and the third (n, 2)."""
     return np.column_stack([np.real(x[:, 0]), np.imag(x[:, 0]), np.real(x[:, 1])])
-
-
-def _recalled(x: np.ndarray, kept: float) -> np.ndarray:
-    """Sum (m, k) of all that was there before each time, a share of it kept from one to the next."""
-    return np.asarray(lfilter([0.0, 1.0], [1.0, -kept], x, axis=0))
 
 
 def followed(

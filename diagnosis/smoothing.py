@@ -113,7 +113,7 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     fit, pushed = solve(adapted, smoothness, weights), Push.none(time.size)
     if driven:
         psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
-        smoothness, fit, pushed = followed(even, smoothness, fit, weights, Course(track, psi))
+        smoothness, fit, pushed = followed(even, smoothness, fit, weights, Course(track, psi, grid))
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
     spikes[rows] = False

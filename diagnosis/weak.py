@@ -18,7 +18,7 @@ from fmus.hull import mass_matrix
 from .measurement import Run
 from .model import Model, acceleration, by_mass, thrust
 from .prediction import true_motion
-from .smoothing import Smoothed
+from .smoothing import BREAK, Smoothed
 
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
@@ -85,11 +85,20 @@ class Integrals:
         return found
 
 
+def places(t: np.ndarray) -> np.ndarray:
+    """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
+    last = np.floor((t[-1] - t[0] - WIDTH + 1e-9) / EVERY)
+    reach = np.ceil(WIDTH / 2 / EVERY)
+    near = np.unique(np.round((t - t[0] - WIDTH / 2) / EVERY))
+    found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
+    return found[(found >= 0.0) & (found <= last)]
+
+
 def integrals(smoothed: Smoothed) -> Integrals:
     """The windows of a run in which at least half of the samples are there and thrusters at work."""
     run = smoothed.track.run
     t = run.time
-    middles = np.arange(t[0] + WIDTH / 2, t[-1] - WIDTH / 2 + 1e-9, EVERY)
+    middles = t[0] + WIDTH / 2 + EVERY * places(t)
     known = np.isfinite(smoothed.nu).all(axis=1)
     fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
     gone = np.cumsum(np.concatenate([[0], ~known]))
@@ -97,8 +106,11 @@ def integrals(smoothed: Smoothed) -> Integrals:
     first = np.searchsorted(t, middles - WIDTH / 2, side="left")
     last = np.searchsorted(t, middles + WIDTH / 2, side="right")
     count = last - first
+    parts = np.cumsum(np.concatenate([[0], np.diff(t) > BREAK]))  # that know nothing of each other
+    whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
-        (count > 3)
+        whole
+        & (count > 3)
         & (gone[last] == gone[first])
         & (2 * (fresh[last] - fresh[first]) >= count)
         & (busy[last] > busy[first])

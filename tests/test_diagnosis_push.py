@@ -8,10 +8,16 @@ from measured import DATA, NOISE, needs_data, sail
 
 from diagnosis import Run, clean, read, smooth
 from diagnosis.push import FORGOTTEN, Course
+from diagnosis.spline import knots
 
 RUN, NU = sail(60.0)
 N = RUN.time.size
 INNER = slice(100, -100)
+
+
+def course(track, psi):
+    span = track.run.time[-1] - track.run.time[0]
+    return Course(track, psi, knots(np.array([0.0]), np.array([span]), 0.05))
 
 
 def rms(x):
@@ -21,7 +27,7 @@ def rms(x):
 def test_constant_force_moves_a_critically_damped_mass():
     run = replace(RUN, tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
     t, T = RUN.time, FORGOTTEN
-    pushed = Course(clean(run), np.zeros(N)).push(np.eye(3), 0.0)
+    pushed = course(clean(run), np.zeros(N)).push(np.eye(3), 0.0)
     expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
     np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
 
@@ -30,7 +36,7 @@ def test_pose_velocity_and_acceleration_belong_together():
     time = 100.0 + np.arange(N) * 0.02
     force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
     run = replace(RUN, time=time, tau_cmd=force)
-    pushed = Course(clean(run), 0.4 * np.sin(0.2 * time)).push(np.eye(3), 0.0)
+    pushed = course(clean(run), 0.4 * np.sin(0.2 * time)).push(np.eye(3), 0.0)
     for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
         between = np.diff(value, axis=0) / 0.02
         np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
@@ -39,14 +45,14 @@ def test_pose_velocity_and_acceleration_belong_together():
 
 def test_heading_turns_the_push():
     track = clean(replace(RUN, tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
-    ahead, aside = (Course(track, np.full(N, psi)).push(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi))
+    ahead, aside = (course(track, np.full(N, psi)).push(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi))
     for a, b in zip(ahead[:3], aside[:3], strict=True):
         np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
 
 
 def test_late_commands_push_late():
     track = clean(RUN)
-    now, late = (Course(track, np.zeros(N)).push(np.eye(3), by) for by in (0.0, 0.5))
+    now, late = (course(track, np.zeros(N)).push(np.eye(3), by) for by in (0.0, 0.5))
     np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
 
 
@@ -98,3 +104,12 @@ def test_commands_that_are_the_same_are_no_trouble():
 def test_unit_of_the_commands_does_not_matter(unit):
     scaled = replace(RUN, tau_cmd=unit * RUN.tau_cmd)
     np.testing.assert_allclose(smooth(clean(scaled)).nu, smooth(clean(RUN)).nu, atol=1e-4)
+
+
+def test_parts_far_apart_are_smoothed_each_by_itself():
+    half = N // 2
+    later = replace(RUN, time=RUN.time + np.where(np.arange(N) < half, 0.0, 100.0))
+    apart, whole = (smooth(clean(run)).nu for run in (later, RUN))
+    assert np.isfinite(apart).all()
+    inner = np.r_[100 : half - 100, half + 100 : N - 100]
+    assert (rms((apart - NU)[inner]) < 1.2 * rms((whole - NU)[inner])).all()
