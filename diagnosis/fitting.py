@@ -18,6 +18,7 @@ LEAST = 6  # samples that must agree in a stretch
 ADAPTIONS = 2
 AROUND = 8.0  # s over which the jerk is averaged
 CALM = 0.2  # of the mean jerk: so much there is at least
+SURE = 0.002  # of a smoothness, in decades: what is less would show in the velocity
 
 
 class TooFewError(Exception):
@@ -72,13 +73,18 @@ def trusted(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndar
         TooFewError: in some stretch.
     """
     weights = gate(p, local, huber(p, local))
-    p, smoothness = tuned(p, weights)
+    p, smoothness = tuned(p, likeliest(p, weights)[0], weights)
     return p, smoothness, gate(p, smoothness, weights)
 
 
-def tuned(p: Problem, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
-    """A problem with an even penalty, its penalty adapted to the jerk; and the likeliest smoothness."""
-    smoothness, _ = likeliest(p, weights)
+def tuned(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """A problem with its penalty adapted to the jerk, and the likeliest smoothness (3,) then.
+
+    Args:
+        p: problem with an even penalty.
+        smoothness: (3,), its likeliest.
+        weights: (n,), of the samples.
+    """
     for _ in range(ADAPTIONS):
         p = adapted(p, smoothness, weights)
         smoothness, _ = likeliest(p, weights)
@@ -155,7 +161,7 @@ def _likeliest(p: Problem, weights: np.ndarray, channel: int) -> tuple[float, fl
         off = float(np.sum(weights[:, None] * (z - p.b(c)) * z)) / p.sigma[channel] ** 2
         return 2.0 * float(np.log(factor[0]).sum()) - p.grid.rank * np.log(s) + off
 
-    found: Any = minimize_scalar(cost, bounds=(-8.0, 8.0), method="bounded", options={"xatol": 0.02})
+    found: Any = minimize_scalar(cost, bounds=(-8.0, 8.0), method="bounded", options={"xatol": SURE})
     return 10.0 ** float(found.x), float(found.fun)
 
 

@@ -7,7 +7,8 @@ commands and pose; no model of a ship enters.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,25 +56,35 @@ class Course:
         track: the run.
         psi: (n,), its heading [rad], NaN where it is not known.
         grid: knots of the stretches, which know nothing of each other, times counted from the first.
-        even: (m,), times [s], one for each measurement that there should be in a stretch.
-        first: where each stretch but the first begins among them.
-        turn: (m,), from body to earth: a rotation in the complex plane, north its real axis.
     """
 
     track: Track
     psi: np.ndarray
     grid: Knots
-    even: np.ndarray = field(init=False)
-    first: np.ndarray = field(init=False)
-    turn: np.ndarray = field(init=False)
 
-    def __post_init__(self) -> None:
-        time, h, known = self.track.run.time, self.track.period, np.isfinite(self.psi)
-        parts = [np.arange(a, b + h, h) for a, b in zip(self.grid.start, self.grid.end, strict=True)]
-        even = time[0] + np.concatenate(parts)
-        object.__setattr__(self, "even", even)
-        object.__setattr__(self, "first", np.cumsum([part.size for part in parts])[:-1])
-        object.__setattr__(self, "turn", np.exp(1j * np.interp(even, time[known], self.psi[known])))
+    @cached_property
+    def parts(self) -> list[np.ndarray]:
+        """Times [s] of each stretch, one for each measurement that there should be."""
+        first, h = self.track.run.time[0], self.track.period
+        return [
+            first + np.arange(a, b + h, h) for a, b in zip(self.grid.start, self.grid.end, strict=True)
+        ]
+
+    @cached_property
+    def even(self) -> np.ndarray:
+        """(m,), times [s] of all stretches."""
+        return np.concatenate(self.parts)
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """Where each stretch but the first begins among them."""
+        return np.cumsum([part.size for part in self.parts])[:-1]
+
+    @cached_property
+    def turn(self) -> np.ndarray:
+        """(m,), from body to earth: a rotation in the complex plane, north its real axis."""
+        known = np.isfinite(self.psi)
+        return np.exp(1j * np.interp(self.even, self.track.run.time[known], self.psi[known]))
 
     def asked(self, late: float) -> np.ndarray:
         """(m, 3), tau that was asked for ``late`` [s] before each even time."""
@@ -133,19 +144,20 @@ def followed(
         Smoothness (3,) and spline of what the commands do not do, and what they do.
     """
     pushed, likely = Push.none(course.psi.size), likeliest(even, weights)[1] - PRICE
-    late, rest = delay(even, fit, weights, course), even
+    late = delay(even, fit, weights, course)
+    rest, smoother = even, smoothness
     for _ in range(ROUNDS):
         more = course.push(gains(even, fit, weights, course, late)[0], late)
         tried = even._replace(z=even.z - more.eta[even.rows])
-        smoother, cost = likeliest(tried, weights)
+        found, cost = likeliest(tried, weights)
         if cost >= likely:
             break
-        rest, pushed, likely = tried, more, cost
-        fit = solve(tried, smoother, weights)
-    if rest is not even:
-        adapted, smoothness = tuned(rest, weights)
-        fit = solve(adapted, smoothness, weights)
-    return smoothness, fit, pushed
+        rest, smoother, pushed, likely = tried, found, more, cost
+        fit = solve(rest, smoother, weights)
+    if rest is even:
+        return smoothness, fit, pushed
+    adapted, smoother = tuned(rest, smoother, weights)
+    return smoother, solve(adapted, smoother, weights), pushed
 
 
 def delay(even: Problem, fit: Fit, weights: np.ndarray, course: Course) -> float:

@@ -143,9 +143,14 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     )
 
 
+def breaks(time: np.ndarray, track: Track) -> np.ndarray:
+    """(n - 1,): which gaps between times (n,) [s] of a run are too long to say anything over them."""
+    return np.diff(time) > max(BREAK, 10.0 * track.period)
+
+
 def stretches(time: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
     """Start and end [s] of the parts of a run between long gaps that have enough samples."""
-    cut = np.flatnonzero(np.diff(time) > max(BREAK, 10.0 * track.period))
+    cut = np.flatnonzero(breaks(time, track))
     first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
     enough = last - first + 1 >= FEWEST
     if not enough.any():

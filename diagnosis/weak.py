@@ -18,7 +18,7 @@ from fmus.hull import mass_matrix
 from .measurement import Run
 from .model import Model, acceleration, by_mass, thrust
 from .prediction import true_motion
-from .smoothing import BREAK, Smoothed
+from .smoothing import Smoothed, breaks
 
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
@@ -106,7 +106,9 @@ def integrals(smoothed: Smoothed) -> Integrals:
     first = np.searchsorted(t, middles - WIDTH / 2, side="left")
     last = np.searchsorted(t, middles + WIDTH / 2, side="right")
     count = last - first
-    parts = np.cumsum(np.concatenate([[0], np.diff(t) > BREAK]))  # that know nothing of each other
+    parts = np.cumsum(
+        np.concatenate([[0], breaks(t, smoothed.track)])
+    )  # that know nothing of each other
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole

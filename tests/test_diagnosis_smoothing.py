@@ -120,7 +120,7 @@ def test_channel_that_rests_is_no_trouble():
     pose = RUN.pose.copy()
     pose[:, 1] = 2.0
     s = smooth(clean(replace(RUN, pose=pose)))
-    assert np.abs(s.eta_dot[:, 1]).max() < 1e-7
+    assert np.abs(s.eta_dot[:, 1]).max() < 5e-8
     assert np.abs(s.nu - SMOOTHED.nu)[INNER, 2].max() < 5e-4
 
 
@@ -132,7 +132,7 @@ def test_same_ship_elsewhere_and_later_gives_the_same_velocity():
     s = smooth(clean(replace(RUN, pose=pose, time=RUN.time + 1e5)))
     assert np.abs(s.nu - SMOOTHED.nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
     moved = smooth(clean(replace(RUN, pose=RUN.pose + np.array([40.0, -7.0, 0.0]))))
-    np.testing.assert_allclose(moved.nu, SMOOTHED.nu, atol=1e-4)  # as sure as the smoothness is found
+    np.testing.assert_allclose(moved.nu, SMOOTHED.nu, atol=2e-5)
 
 
 def test_spikes_are_found_and_nothing_else():

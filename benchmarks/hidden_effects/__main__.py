@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from itertools import product
@@ -124,16 +124,18 @@ def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list
     return effects, noises, wrong, range(options.first, options.first + options.seeds)
 
 
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 100:
-        raise argparse.ArgumentTypeError(f"needs a whole number from 1 to 100, not '{text}'")
-    return int(text)
+def _whole(low: int, high: int) -> Callable[[str], int]:
+    """What turns an argument into a whole number within limits."""
+
+    def number(text: str) -> int:
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"needs a whole number from {low} to {high}, not '{text}'")
+        return int(text)
+
+    return number
 
 
-def _seed(text: str) -> int:
-    if not text.isdecimal() or not int(text) < 100:
-        raise argparse.ArgumentTypeError(f"needs a whole number from 0 to 99, not '{text}'")
-    return int(text)
+_count, _seed = _whole(1, 100), _whole(0, 99)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -255,6 +255,8 @@ class Member(NamedTuple):
             otherwise: what holds without the effect.
             at: the leading arguments of the effect's function.
         """
+        if acts is False:  # as most effects do, most of the time
+            return otherwise
         function = self.effect.function
         assert function is not None
         return when(acts, lambda: function(*at, *values[self.parameters]), lambda: otherwise)

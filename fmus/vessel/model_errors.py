@@ -43,9 +43,6 @@ def forces_of(group: Group, acting: tuple[Any, ...], values: Any, ship: Ship) ->
     """The force of each effect of a group [N, N m], on the axes that it acts on."""
     found: list[Any] = []
     for member, acts in zip(group.members, acting, strict=True):
-        if acts is False:  # most of them, most of the time
-            found += [0.0] * len(member.effect.axis)
-            continue
         force = member.apply(acts, values, NONE, ship)
         found += [force["XYN".index(axis)] for axis in member.effect.axis]
     return found
