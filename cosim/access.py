@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .errors import SimulationError
 
 if TYPE_CHECKING:
-    from .fmu import Instance, Variable
+    from .fmu import Variable
+    from .instance import Instance
 
 WARNING, DISCARD, ERROR, FATAL, PENDING = 1, 2, 3, 4, 5
 INT_LIMIT = 2**31

@@ -29,7 +29,7 @@ START = "its instantiation"
 
 
 class IsolatedInstance:
-    """A running FMU in a process of its own; to the master like :class:`cosim.fmu.Instance`.
+    """A running FMU in a process of its own; to the master like :class:`cosim.instance.Instance`.
 
     Args:
         name: instance name.

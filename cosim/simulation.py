@@ -14,18 +14,17 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from . import log as logs
 from . import metrics, plots
 from .errors import InputError, SimulationError
 from .files import write_json
-from .master import Master, Table, quiet_collector
+from .master import Master
+from .pace import Pace
+from .recorder import BLOCK, Recorder
 from .scenario import Scenario
 from .ssv import read_parameters
 from .system import System, prepare
 
-BLOCK = 256
 # Wall time between two looks at the progress bar, and two writes to the log [s].
 ATTENTION = 0.2
 
@@ -53,111 +52,6 @@ class Result:
     pace: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass
-class Pace:
-    """Keeps simulated time at a multiple of wall time, and counts how often it could not."""
-
-    factor: float
-    step: float
-    interrupted: Callable[[], bool]
-    started: float = field(default_factory=time.perf_counter)
-    steps: int = 0
-    misses: int = 0
-    worst: float = 0.0
-    total: float = 0.0
-    squares: float = 0.0
-
-    def wait(self, t: float) -> None:
-        """Return when it is time for t, or when the user has had enough."""
-        due = self.started + t / self.factor
-        while (left := due - time.perf_counter()) > 0.0 and not self.interrupted():
-            time.sleep(min(left, 0.05))
-        late = time.perf_counter() - due
-        self.steps += 1
-        self.misses += late > self.step / self.factor
-        self.worst = max(self.worst, late)
-        self.total += late
-        self.squares += late * late
-
-    def summary(self) -> dict[str, float]:
-        """Numbers for log.json: how late steps were [s], and how many by more than a step."""
-        mean = self.total / max(1, self.steps)
-        return {
-            "factor": self.factor,
-            "deadline_misses": self.misses,
-            "lateness_max": self.worst,
-            "jitter_rms": math.sqrt(max(0.0, self.squares / max(1, self.steps) - mean * mean)),
-        }
-
-
-class Recorder:
-    """Takes the table after every step: writes the logged part of it in blocks, and keeps what metrics
-    and pictures are made from, whether logged or not."""
-
-    def __init__(self, system: System, master: Master, folder: Path) -> None:
-        self.columns = ["time", *system.logged]
-        self.rows = 0
-        table = master.table
-        self._every = system.scenario.log.every
-        self._writer = logs.LogWriter(folder / logs.CSV, self.columns)
-        self._row = table.row
-        self._taken = np.empty((BLOCK, len(table.row)))
-        self._times: list[float] = []
-        self._steps = 0
-        self._names = [s.name for s in table.signals]
-        self._logged = self._slots(table, system.logged)
-        self._outputs = self._slots(table, master.outputs)
-        self._kept_names = metrics.needed(self._names)
-        self._kept_slots = self._slots(table, self._kept_names)
-        self._kept: list[np.ndarray] = []
-
-    @staticmethod
-    def _slots(table: Table, names: Sequence[str]) -> np.ndarray:
-        return np.array([table.slots[name] for name in names], dtype=np.intp)
-
-    def take(self, t: float) -> bool:
-        """Remember the table as it is at t; returns whether it is time to flush."""
-        count = len(self._times)
-        self._taken[count] = self._row
-        self._times.append(t)
-        return count == BLOCK - 1
-
-    def flush(self) -> None:
-        """Write what has been taken.
-
-        Raises:
-            SimulationError: an output is not finite; the rows up to there are written.
-        """
-        count = len(self._times)
-        wrong = ~np.isfinite(self._taken[:count, self._outputs])
-        message = ""
-        if wrong.any():
-            k = int(np.argmax(wrong.any(axis=1)))
-            name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
-            message = f"{name} is not finite at t = {self._times[k]:g} s"
-            count = k + 1
-        times, taken = np.array(self._times[:count]), self._taken[:count]
-        first = -self._steps % self._every
-        block = np.empty((len(times[first :: self._every]), len(self.columns)))
-        block[:, 0] = times[first :: self._every]
-        block[:, 1:] = taken[first :: self._every, self._logged]
-        self._writer.write(block)
-        self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
-        self.rows += len(block)
-        self._steps += count
-        self._times.clear()
-        if message:
-            raise SimulationError(message)
-
-    def close(self) -> None:
-        self._writer.close()
-
-    def kept(self) -> dict[str, np.ndarray]:
-        """The columns that metrics and pictures are made from, at every step."""
-        table = np.concatenate(self._kept) if self._kept else np.empty((0, 1 + len(self._kept_names)))
-        return {name: table[:, k] for k, name in enumerate(["time", *self._kept_names])}
-
-
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Turns Ctrl-C and a termination request into a flag that the loop reads between steps.
@@ -183,6 +77,24 @@ def interruptible() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def quiet_collector() -> Iterator[None]:
+    """No garbage collection while stepping, but where the caller asks for it.
+
+    What exists now is not looked through again, so that asking is cheap.
+    """
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if was_enabled:
+            gc.enable()
 
 
 def simulate(

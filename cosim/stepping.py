@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from .access import DISCARD, PENDING
 
 if TYPE_CHECKING:
-    from .fmu import Instance
+    from .instance import Instance
 
 DO_STEP_STATUS, LAST_SUCCESSFUL_TIME, TERMINATED = 0, 2, 3  # of fmi2StatusKind
 GLANCE = 1e-4  # s between two questions whether a step is over

@@ -16,7 +16,8 @@ from typing import Any
 from .access import Memory, Port
 from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
 from .errors import InputError, SimulationError
-from .fmu import Instance, Model
+from .fmu import Model
+from .instance import Instance
 
 PR_SET_PDEATHSIG = 1
 

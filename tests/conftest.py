@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmu import Instance, Model
+from cosim.fmu import Model
+from cosim.instance import Instance
 from fmus.build import build
 from fmus.declare import discover
 

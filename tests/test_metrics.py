@@ -7,6 +7,7 @@ import pytest
 
 from cosim import metrics, plots
 from cosim.metrics import MetricsError, compute, main, over_time, tracking
+from cosim.plots import canvas, track
 
 KEYS = [
     "e_pos_rms",
@@ -332,7 +333,7 @@ class TestPlots:
         values = np.sin(time)
         values[[0, 4321, 99999, -1]] = [7.0, 5.0, -5.0, 9.0]
         t, v = plots.thin(time, values)
-        assert t.size <= plots.MAX_POINTS
+        assert t.size <= canvas.MAX_POINTS
         assert np.all(np.diff(t) >= 0.0)
         assert {7.0, 5.0, -5.0, 9.0} <= set(v)
 
@@ -345,16 +346,16 @@ class TestPlots:
             steps = np.hypot(np.diff(path[0]), np.diff(path[1]))
             return np.nansum(steps)
 
-        assert length(plots.once([lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
-        assert length(plots.once([laps, lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
+        assert length(track.once([lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
+        assert length(track.once([laps, lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
 
     def test_a_crossing_stays_whole(self):
         angle = np.linspace(0.1, 2.0 * np.pi + 0.1, 3000)
-        x, _ = plots.once([(np.sin(2.0 * angle), np.sin(angle))], 2.0)
+        x, _ = track.once([(np.sin(2.0 * angle), np.sin(angle))], 2.0)
         assert np.count_nonzero(np.isnan(x[5:-20])) <= 3
 
     def test_hull_points_where_the_ship_heads(self):
         log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
-        (east,) = plots.outlines({**log, "vessel.psi": np.full(2, np.pi / 2.0)}, 1.0)
+        (east,) = track.outlines({**log, "vessel.psi": np.full(2, np.pi / 2.0)}, 1.0)
         assert east[0] == pytest.approx([0.5, 0.0])
         assert east[1, 1] < 0.0  # starboard of a ship to the east is south

@@ -54,7 +54,8 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
 
     import numpy as np
 
-    from cosim.fmu import Instance, Model
+    from cosim.fmu import Model
+    from cosim.instance import Instance
 
     pointer, size = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
     used = {*plan["signals"], *(source for source, _ in plan["connections"])}
