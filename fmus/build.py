@@ -68,16 +68,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             registry.load(file)
         if options.verify:
             _verify(options.names)
-            return 0
-        if options.list:
+        elif options.list:
             _print_list(options.names)
-            return 0
-        if options.parameters is None:
-            built = build(options.names, options.out)
         else:
-            built = build(options.names, options.out, read_starts(options.parameters), _note)
-        for path in built:
-            print(path)
+            starts = None if options.parameters is None else read_starts(options.parameters)
+            for path in build(options.names, options.out, starts, _note):
+                print(path)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (BuildError, DeclarationError, OSError) as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 2

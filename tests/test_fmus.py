@@ -17,6 +17,7 @@ from fmpy.model_description import read_model_description
 from fmpy.validation import validate_fmu
 
 from fmus import build as builder
+from fmus import packing
 from fmus.build import BuildError, build
 from fmus.declare import flatten, packer, width
 
@@ -462,7 +463,8 @@ def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
     copy = tmp_path / "source"
     shutil.copytree(ROOT / "fmus", copy, ignore=shutil.ignore_patterns("__pycache__"))
     (copy / "hull.py").write_text((copy / "hull.py").read_text() + "\n# changed\n")
-    monkeypatch.setattr(builder, "ROOT", copy)
+    for module in (builder, packing):
+        monkeypatch.setattr(module, "ROOT", copy)
     (second,) = build(["vessel"])
     assert second != first
     assert second.read_bytes() != first.read_bytes()
