@@ -52,6 +52,16 @@ def test_size_is_what_was_drawn(effect):
     assert SMALLEST / coarse < d.size < LARGEST * coarse
 
 
+@pytest.mark.parametrize("effect, axis", [("added_mass_X", 0), ("added_mass_Y", 1), ("added_mass_N", 2)])
+def test_heavier_ship_needs_force_in_proportion_to_what_is_added(effect, axis):
+    """Also where the motion is that of a ship without it, from which sizes are drawn."""
+    m = RUNS[0]
+    one, hundred = force(m, {effect: 1.0}), force(m, {effect: 100.0})
+    assert hundred == pytest.approx(100.0 * one, rel=1e-9, abs=1e-9)
+    if axis == 2:  # an added moment of inertia takes no Coriolis force
+        assert one[:, 2] == pytest.approx(-m.nu_dot[:, 2], rel=1e-9)
+
+
 def test_draw_is_that_of_its_seed_and_can_be_made_smaller():
     one, same, less, other = (
         draw("X_u", np.random.default_rng(seed), RUNS, less)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import whole
+from cosim import InputError, whole
 from diagnosis import Run, clean, smooth
 from diagnosis.evidence import Evidence, examine
 from diagnosis.model import Model
@@ -139,7 +139,7 @@ def trial(cell: Cell, fmus: Path, peers: bool) -> Row:
     """Run a cell and score it."""
     try:
         hidden, redrawn, runs = voyages(cell, fmus)
-    except RunawayError as error:
+    except (RunawayError, InputError) as error:
         return Row(*cell.key, note=str(error))
     answer = ask([v.measured for v in runs[:-1]], runs[-1].measured, DOUBT if cell.wrong else 0.0)
     found = [f.id for f in answer.learned.findings]

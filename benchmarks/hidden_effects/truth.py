@@ -143,7 +143,8 @@ def lack(m: Motion, values: Values) -> np.ndarray:
     # A late pose leaves the commands where they are.
     tau = thrust(m, nu, values) if NAMES["thrusters"] & set(values) else thrust(m, nu, {})
     free = vessel.stirred(vessel.State(*eta.T, *nu.T, m.time), Force(*tau.T), body)
-    return (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ MASS.T
+    mass = np.array(mass_matrix(body.hull.inertia))
+    return (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ mass.T
 
 
 def force(m: Motion, values: Values) -> np.ndarray:
