@@ -21,7 +21,8 @@ from .model import Model, acceleration, by_mass, thrust
 from .smoothing import Smoothed, smooth
 
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for
-PEAK = 5.0  # times the spectrum around it
+PEAK = 4.0  # times the spectrum around it
+FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not is not seen, but commanded
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, of the spectrum around
 SEGMENT = 25.0  # s
@@ -64,11 +65,12 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
         model: what it leaves over is looked at.
         rng: for the bootstrap.
     """
-    left, noise = [], []
+    left, noise, white = [], [], []
     for smoothed in runs:
         run = smooth(smoothed.track, driven=False)
         error = model_error(run, model)
         left += stretches(error, run.time)
+        white.append(2.0 * run.noise**2 * run.track.period)
         other = redrawn(run, rng)
         del run  # of a long run there is not room for two
         noise += stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time)
@@ -77,13 +79,14 @@ def waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> W
     frequency, segments = segments_of(left)
     floor = segments_of(noise)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
-    level, found = peak(frequency, power, floor)
+    band = inside(frequency, floor, np.mean(white, axis=0))
+    level, found = peak(frequency, power, floor, band)
     count = segments.shape[-1]
     least = PEAK + FEW / count
     if found.height < least:
         return None
     draws = rng.integers(0, count, (REPLICATES, count))
-    heights = [peak(frequency, segments[..., d].mean(axis=-1), floor)[1].height for d in draws]
+    heights = [peak(frequency, segments[..., d].mean(axis=-1), floor, band)[1].height for d in draws]
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < NEAR * at
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
@@ -108,19 +111,43 @@ def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
 
 
-def peak(frequency: np.ndarray, power: np.ndarray, floor: np.ndarray) -> tuple[np.ndarray, Peak]:
-    """The spectrum around each frequency (m, 3), and the highest peak above it in the waves' band.
+def followed(frequency: np.ndarray, noise: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """Share (m, 3) of a motion that the smoother follows, as a spline of white jerk does.
+
+    Args:
+        frequency: (m,) [Hz].
+        noise: (m, 3), spectrum of the force that noise makes.
+        white: (3,), spectrum of the noise of the measurement [m2/Hz, m2/Hz, rad2/Hz].
+    """
+    level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
+    whole = np.diag(MASS) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
+    low = share < 0.25  # half of a motion is a quarter of its power
+    corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
+    return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
+
+
+def inside(frequency: np.ndarray, noise: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """Where waves are looked for (m, 3); arguments as of :func:`followed`."""
+    band = (frequency >= BAND[0]) & (frequency <= BAND[1])
+    return band[:, None] & (followed(frequency, noise, white) >= FOLLOWED)
+
+
+def peak(
+    frequency: np.ndarray, power: np.ndarray, floor: np.ndarray, band: np.ndarray
+) -> tuple[np.ndarray, Peak]:
+    """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
 
     Args:
         frequency: (m,) [Hz].
         power: (m, 3), spectrum.
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
+        band: (m, 3), where a peak counts.
     """
     width = 2 * int(AROUND / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
-    inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
-    height = np.where(inside[:, None], power / np.maximum(level, 1e-12), 0.0)
+    height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
 

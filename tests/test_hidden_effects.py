@@ -52,7 +52,9 @@ def test_size_is_what_was_drawn(effect):
     assert SMALLEST / coarse < d.size < LARGEST * coarse
 
 
-@pytest.mark.parametrize("effect, axis", [("added_mass_X", 0), ("added_mass_Y", 1), ("added_mass_N", 2)])
+@pytest.mark.parametrize(
+    ("effect", "axis"), [("added_mass_X", 0), ("added_mass_Y", 1), ("added_mass_N", 2)]
+)
 def test_heavier_ship_needs_force_in_proportion_to_what_is_added(effect, axis):
     """Also where the motion is that of a ship without it, from which sizes are drawn."""
     m = RUNS[0]
