@@ -106,9 +106,8 @@ def integrals(smoothed: Smoothed) -> Integrals:
     first = np.searchsorted(t, middles - WIDTH / 2, side="left")
     last = np.searchsorted(t, middles + WIDTH / 2, side="right")
     count = last - first
-    parts = np.cumsum(
-        np.concatenate([[0], breaks(t, smoothed.track)])
-    )  # that know nothing of each other
+    # Stretches know nothing of each other: no window lies in two.
+    parts = np.cumsum(np.concatenate([[0], breaks(t, smoothed.track)]))
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole

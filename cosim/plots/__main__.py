@@ -23,14 +23,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
-        for path in draw(runs, options.out):
-            print(path)
+        drawn = draw(runs, options.out)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return BAD_INPUT
     except OSError as error:
         print(f"error: cannot write to '{options.out}': {error.strerror}", file=sys.stderr)
         return BAD_INPUT
+    for path in drawn:
+        print(path)
     return 0
 
 
