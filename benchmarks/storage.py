@@ -1,7 +1,7 @@
 """What does the memory of concurrent learning cost? ``python -m benchmarks.storage``.
 
-Runs scenarios/ellipse.json with each controller that stores samples, then gives what the controller
-saw to its plain function again and times the storage alone: the gate, the choice of a row, and the sums.
+Runs scenarios/ellipse.json with each controller that stores samples, then gives the controller's
+inputs to its plain function again and times the storage alone: the gate, the choice of a row, the sums.
 All times are processor time.
 """
 
@@ -12,9 +12,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
+from unittest.mock import patch
 
 import cosim
-from fmus.controller import concurrent
+from fmus.controller import concurrent, store
 from fmus.declare import discover, packer, variables
 
 SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
@@ -30,7 +31,7 @@ def run(controller, stop, folder):
     return result, process_time() - started
 
 
-def seen(component, folder):
+def inputs_of(component, folder):
     """The controller's inputs, one row for each step."""
     sources = {"frozen": "observer.frozen"}
     names = [v.name for v in variables(component.inputs)]
@@ -42,24 +43,20 @@ def seen(component, folder):
 def storage_times(component, rows, step):
     """Time [s] that storage takes in each step, and how often the store changed."""
     times, changes = [], 0
-    plain = concurrent.offer
 
     def timed(*args):
         nonlocal changes
         started = process_time()
-        store = plain(*args)
+        after = store.offer(*args)
         times.append(process_time() - started)
-        changes += store is not args[2]
-        return store
+        changes += after is not args[2]
+        return after
 
     pack, params = packer(component.inputs), component.params()
     state = component.init(pack(rows[0]), params)
-    concurrent.offer = timed
-    try:
+    with patch.object(concurrent, "offer", timed):
         for row in rows[1:]:
             state, _ = component.step(state, pack(row), params, step)
-    finally:
-        concurrent.offer = plain
     return times, changes
 
 
@@ -72,11 +69,11 @@ def main():
         with TemporaryDirectory() as folder:
             _, half = run(component.name, 99.0, f"{folder}/warm")
             _, half = run(component.name, 99.0, f"{folder}/half")
-            result, whole = run(component.name, 198.0, f"{folder}/whole")
-            rows = seen(component, result.folder)
+            result, full = run(component.name, 198.0, f"{folder}/full")
+            rows = inputs_of(component, result.folder)
         times, changes = storage_times(component, rows, 0.01)
         # The difference leaves out what happens once: building, loading, metrics.
-        loop = 1e6 * (whole - half) / 9900
+        loop = 1e6 * (full - half) / 9900
         mean = 1e6 * sum(times) / len(times)
         print(
             f"{component.name:28}{loop:8.1f}{mean:9.2f}{100 * mean / loop:7.1f} %"

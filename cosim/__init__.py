@@ -7,52 +7,58 @@ runs a scenario; from Python::
 
     result = cosim.simulate(cosim.load_scenario("scenarios/ellipse.json"), "results/ellipse")
     log = cosim.read_log(result.folder)
+
+The packages below, each using only those before it: ``fmu`` (one FMU), ``formats`` (files of the SSP and
+OSP standards), ``scenario`` (the user's input), ``system`` (a scenario checked against its FMUs),
+``results`` (log, metrics, pictures), ``master`` (the run), ``export`` (systems for other tools).
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from .lazy import lazy_names
 
+TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
+    from .conversion import BASE_UNITS, Unit
     from .errors import InputError, SimulationError
-    from .files import whole
-    from .log import read_log
-    from .scenario import Scenario, load_scenario
-    from .simulation import Result, simulate
-    from .ssv import Parameter, ParameterSet, read_parameters, write_parameters
+    from .files import atomic_write
+    from .formats.ssv import Parameter, ParameterSet, read_parameters, write_parameters
+    from .master.simulation import Result, simulate
+    from .results.log import read_log
+    from .scenario.load import load_scenario
+    from .scenario.schema import Scenario
 
 __all__ = [
+    "BASE_UNITS",
     "InputError",
     "Parameter",
     "ParameterSet",
     "Result",
     "Scenario",
     "SimulationError",
+    "Unit",
+    "atomic_write",
     "load_scenario",
     "read_log",
     "read_parameters",
     "simulate",
-    "whole",
     "write_parameters",
 ]
 
-_HOME = {
-    "InputError": "errors",
-    "SimulationError": "errors",
-    "read_log": "log",
-    "Scenario": "scenario",
-    "load_scenario": "scenario",
-    "Result": "simulation",
-    "simulate": "simulation",
-    "Parameter": "ssv",
-    "ParameterSet": "ssv",
-    "read_parameters": "ssv",
-    "whole": "files",
-    "write_parameters": "ssv",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Import on demand, so that a command pays only for what it uses."""
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "BASE_UNITS": "conversion",
+        "InputError": "errors",
+        "Parameter": "formats.ssv",
+        "ParameterSet": "formats.ssv",
+        "Result": "master.simulation",
+        "Scenario": "scenario.schema",
+        "SimulationError": "errors",
+        "Unit": "conversion",
+        "atomic_write": "files",
+        "load_scenario": "scenario.load",
+        "read_log": "results.log",
+        "read_parameters": "formats.ssv",
+        "simulate": "master.simulation",
+        "write_parameters": "formats.ssv",
+    },
+)

@@ -1,44 +1,83 @@
-"""What every command of this package does around its own work."""
+"""What every command does around its own work: exit codes, signals, broken pipes."""
 
 import os
-import signal
+import re
 import sys
+from collections import namedtuple
 from collections.abc import Callable
 from typing import NoReturn
 
 from rich.console import Console
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 3, 130
+from .interrupts import INTERRUPTED, ignore_interrupts, raise_on_interrupt
+from .process.run_state import STATE
+
+__all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "Output", "complain", "printable", "run_command"]
+
+# Exit codes; 130 is what shells report after Ctrl-C (128 + SIGINT).
+BAD_INPUT, FAILED = 2, 3
+# Longest word and line of a message [characters]; chosen: longer than any path or name in use.
+LONGEST_WORD, LONGEST_LINE = 400, 4000
+
+
+def printable(text: str) -> str:
+    """A message as one line for the terminal.
+
+    Names in files and messages of FMUs may hold control characters, which would move the cursor or
+    change colours, or be very long: these are shown as Python writes them, and cut.
+    """
+    line = " ".join(text.split())
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+    line = re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: _cut(word[0], LONGEST_WORD), line)
+    return _cut(line, LONGEST_LINE)
+
+
+def _cut(text: str, longest: int) -> str:
+    """Both ends of a text that is too long."""
+    half = (longest - 3) // 2
+    return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"
+
+
+def complain(message: object, kind: str = "error: ") -> None:
+    """Say on standard error why the command ends, in one line."""
+    print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
 
 
 class Output(Console):
-    """Standard output; a reader that went away is told to the caller."""
+    """Standard output; raises BrokenPipeError where the reader has closed the pipe."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
 
 
 def run_command(main: Callable[[], int]) -> NoReturn:
-    """Run a command's ``main`` and leave with its exit code, one line where something went wrong.
+    """Run a command's ``main`` and exit with its code; an exception becomes one line on standard error.
 
-    A request to terminate counts as Ctrl-C. A reader that went away (``| head``) is no error.
+    A request to terminate counts as Ctrl-C. A reader that closes the pipe (``| head``) is no error.
     """
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
     code = FAILED
     try:
-        code = main()
-        sys.stdout.flush()
+        raise_on_interrupt()
+        try:
+            code = main()
+            sys.stdout.flush()
+        finally:
+            ignore_interrupts()
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        complain("interrupted", kind="")
         code = INTERRUPTED
+        # CPython ends by the signal itself if KeyboardInterrupt left an exec(), as of a named tuple that
+        # was being made, though it was caught; making another one clears that mark.
+        namedtuple("Cleared", ())
+    except SystemExit as request:  # of argparse, which has said why
+        code = request.code if isinstance(request.code, int) else 0 if request.code is None else FAILED
     except BrokenPipeError:
         code = 0
     except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
+        complain(error)
     except Exception as error:
-        print(f"error: this should not have happened: {error!r}; please report it", file=sys.stderr)
-    # What is left in the buffer of a closed pipe must not raise again while Python ends.
+        complain(f"this should not have happened: {error!r}; please report it")
+    STATE.end(code)
+    # Text left in the buffer of a closed pipe must not raise again while Python exits.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)

@@ -1,11 +1,18 @@
-"""The two ways in which a run can go wrong."""
+"""The two ways in which a run can go wrong, and hints for messages."""
 
 import difflib
 from collections.abc import Iterable
 
+__all__ = ["InputError", "SimulationError", "nearest"]
+
+# Similarity (difflib's ratio, 0 to 1) above which a known name is suggested; chosen: lower ones mislead.
+SIMILAR = 0.5
+# Known names that a hint lists where none is similar; chosen: more do not fit on a line.
+LISTED = 8
+
 
 class InputError(Exception):
-    """What the user gave cannot be used; the message says what, where and what was near. Exit code 2."""
+    """The user's input cannot be used; the message says what, where and what was near. Exit code 2."""
 
 
 class SimulationError(Exception):
@@ -23,10 +30,10 @@ def nearest(name: str, known: Iterable[str]) -> str:
         Text to append to a message; empty if nothing is known.
     """
     known = list(known)
-    near = difflib.get_close_matches(name, known, 1, 0.5)
+    near = difflib.get_close_matches(name, known, 1, SIMILAR)
     if near:
         return f"; did you mean '{near[0]}'?"
     if not known:
         return ""
-    shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
+    shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")
     return f"; there is {shown}" if len(known) == 1 else f"; there are {shown}"

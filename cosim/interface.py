@@ -1,18 +1,22 @@
-"""What the FMUs of a scenario tell each other, as Markdown: ``python -m cosim.interface SCENARIO``.
+"""Inputs and outputs of the FMUs of a scenario, as Markdown: ``python -m cosim.interface SCENARIO``.
 
-All of it is read from the FMUs: an FMU that is to take the place of another one needs these names.
+An FMU that replaces another one needs the same names.
 """
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Iterable, Sequence
 
-from rich.console import Console
-
-from .command import BAD_INPUT, Output, run_command
+from .command import BAD_INPUT, Output, complain, printable, run_command
 from .errors import InputError
-from .fmu import Variable
-from .scenario import load_scenario
-from .system import System, prepare
+from .fmu.fmu_model import Variable
+from .scenario.load import load_scenario
+from .system.preparation import prepare
+from .system.system import System
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,10 +34,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         system = prepare(load_scenario(options.scenario))
     except InputError as error:
-        Console(stderr=True, highlight=False, soft_wrap=True).print(f"error: {error}", markup=False)
+        complain(error)
         return BAD_INPUT
     try:
-        Output(highlight=False, soft_wrap=True).print(interface(system), markup=False, end="")
+        text = "\n".join(map(printable, interface(system).split("\n")))
+        Output(highlight=False, soft_wrap=True).print(text, markup=False, end="")
     finally:
         system.close()
     return 0

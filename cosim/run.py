@@ -1,11 +1,17 @@
 """Run a scenario: ``python -m cosim.run SCENARIO [--out DIR]``."""
 
+if __name__ == "__main__":
+    from cosim.watch.watching import watched
+
+    watched()  # before all other imports, which take a while
+
 import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from functools import partial
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     Progress,
@@ -15,11 +21,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from . import metrics
-from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, run_command
+from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, run_command
 from .errors import InputError
-from .scenario import load_scenario
-from .simulation import Result, simulate
+from .master.simulation import Result, simulate
+from .results.performance import table
+from .scenario.load import load_scenario
 
 EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
 
@@ -31,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def show(text: str) -> None:
         if not options.quiet:
-            console.print(text, markup=False)
+            console.print(printable(text), markup=False)
 
     try:
         scenario = load_scenario(options.scenario, {"step": options.step, "stop": options.stop})
@@ -50,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with bar as shown:
             progress = _no_progress
             if shown is not None:
-                task = shown.add_task(scenario.name, total=scenario.stop)
+                task = shown.add_task(escape(printable(scenario.name)), total=scenario.stop)
                 progress = partial(_advance, shown, task)
             result = simulate(
                 scenario,
@@ -63,32 +69,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 progress=progress,
             )
     except InputError as error:
-        console.print(f"error: {error}", markup=False)
+        complain(error)
         return BAD_INPUT
     with suppress(BrokenPipeError):
-        _report(result, console, options.quiet)
+        _report(result, options.quiet)
     return EXIT_CODES[result.status]
 
 
 def _no_progress(t: float) -> None:
-    """Where there is no terminal."""
+    """No-op progress callback, for output that is no terminal."""
 
 
 def _advance(bar: Progress, task: TaskID, t: float) -> None:
     bar.update(task, completed=t)
 
 
-def _report(result: Result, console: Console, quiet: bool) -> None:
+def _report(result: Result, quiet: bool) -> None:
     if result.status == "failed":
         kept = f"; {result.rows} rows are kept in '{result.folder}'" if result.rows else ""
-        console.print(f"error: {result.message}{kept}", markup=False)
+        complain(f"{result.message}{kept}")
     elif result.status == "interrupted":
-        console.print(f"interrupted: {result.rows} rows are kept in '{result.folder}'", markup=False)
+        complain(f"{result.rows} rows are kept in '{result.folder}'", kind="interrupted: ")
     if quiet:
         return
     output = Output(highlight=False)
     if result.metrics:
-        output.print(metrics.table(result.metrics))
+        output.print(table(result.metrics))
     if result.pace:
         output.print(
             f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} missed deadlines, "
@@ -96,7 +102,7 @@ def _report(result: Result, console: Console, quiet: bool) -> None:
             f"jitter {1e3 * result.pace['jitter_rms']:.2f} ms RMS"
         )
     if result.status == "done":
-        output.print(f"{result.rows} rows in {result.folder}", soft_wrap=True)
+        output.print(printable(f"{result.rows} rows in {result.folder}"), soft_wrap=True)
 
 
 def _positive(text: str) -> float:
@@ -142,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE.ssv",
         action="append",
         default=[],
-        help="SSP parameter set that beats the scenario's values; may be given several times",
+        help="SSP parameter set whose values override the scenario's; may be given several times",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")

@@ -1,77 +1,116 @@
-"""Holds a ship model against measurements; what it lacks is to be learned from them.
+"""Compares a ship model with measurements, and learns from them what it lacks.
 
-A measured run goes through three steps, each model-free, before a model sees it::
+A measured run goes through three steps, each model-free, before it is compared with a model::
 
     import diagnosis
 
     track = diagnosis.clean(diagnosis.read("run.csv"))  # what is missing, frozen, out of order
     smoothed = diagnosis.smooth(track)  # pose, velocity, acceleration, and how sure they are
-    windows = diagnosis.Windows([smoothed])
+    windows = diagnosis.Windows([smoothed])  # of 8 s, in which models are compared with the run
     nominal = windows.errors()
-    slower = windows.errors(vessel={"delta_X_u": -4.0})
+    slower = windows.errors(diagnosis.Model(vessel={"delta_X_u": -4.0}))
 
 or all at once, as ``python -m diagnosis.learn`` does it::
 
     runs = diagnosis.gather(["run1.csv", "run2.csv"])
-    found = diagnosis.diagnose(runs[:1], held_out=runs[1:])
-    print(found.verdict, [f.id for f in found.learned.findings])
+    result = diagnosis.diagnose(runs[:1], held_out=runs[1:])
+    print(result.verdict, [f.id for f in result.learned.effects])
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as type checkers know it: importing typing takes longer than all of this file
 if TYPE_CHECKING:
     from cosim import InputError
 
-    from .cleaning import Counts, Track, clean
+    from .assessment.evaluation import Evaluation, PredictionError, evaluate_run
+    from .assessment.stability import Stability, check_stability
+    from .assessment.uncertainty import omega_std
+    from .assessment.windows import WindowErrors, Windows
+    from .data import Counts, Run, Track, clean, read
     from .gathering import gather
-    from .measurement import Run, read
-    from .model import Model
-    from .session import Confronted, Diagnosed, confront, diagnose
+    from .identification import Finding, Findings, method
+    from .model import Integrals, Model, integrals, omega
+    from .report.content import comparison_content, diagnosis_content
+    from .report.result_keys import ComparisonContent, DiagnosisContent, EffectResult
+    from .session import Comparison, Diagnosis, diagnose, evaluate
     from .smoothing import Smoothed, smooth
-    from .windows import WindowErrors, Windows
 
 __all__ = [
-    "Confronted",
+    "Comparison",
+    "ComparisonContent",
     "Counts",
-    "Diagnosed",
+    "Diagnosis",
+    "DiagnosisContent",
+    "EffectResult",
+    "Evaluation",
+    "Finding",
+    "Findings",
     "InputError",
+    "Integrals",
     "Model",
+    "PredictionError",
     "Run",
     "Smoothed",
+    "Stability",
     "Track",
     "WindowErrors",
     "Windows",
+    "check_stability",
     "clean",
-    "confront",
+    "comparison_content",
     "diagnose",
+    "diagnosis_content",
+    "evaluate",
+    "evaluate_run",
     "gather",
+    "integrals",
+    "method",
+    "omega",
+    "omega_std",
     "read",
     "smooth",
 ]
 
 _HOME = {
     "InputError": "cosim",
-    "Counts": "diagnosis.cleaning",
-    "Track": "diagnosis.cleaning",
-    "clean": "diagnosis.cleaning",
+    "Counts": "diagnosis.data",
+    "Track": "diagnosis.data",
+    "clean": "diagnosis.data",
     "gather": "diagnosis.gathering",
+    "Finding": "diagnosis.identification.findings",
+    "Findings": "diagnosis.identification.findings",
+    "method": "diagnosis.identification.methods",
+    "Integrals": "diagnosis.model",
     "Model": "diagnosis.model",
-    "Confronted": "diagnosis.session",
-    "Diagnosed": "diagnosis.session",
-    "confront": "diagnosis.session",
+    "integrals": "diagnosis.model",
+    "omega": "diagnosis.model",
+    "Comparison": "diagnosis.session",
+    "Diagnosis": "diagnosis.session",
     "diagnose": "diagnosis.session",
-    "Run": "diagnosis.measurement",
-    "read": "diagnosis.measurement",
+    "evaluate": "diagnosis.session",
+    "Run": "diagnosis.data",
+    "read": "diagnosis.data",
     "Smoothed": "diagnosis.smoothing",
     "smooth": "diagnosis.smoothing",
-    "WindowErrors": "diagnosis.windows",
-    "Windows": "diagnosis.windows",
+    "Evaluation": "diagnosis.assessment.evaluation",
+    "PredictionError": "diagnosis.assessment.evaluation",
+    "evaluate_run": "diagnosis.assessment.evaluation",
+    "Stability": "diagnosis.assessment.stability",
+    "check_stability": "diagnosis.assessment.stability",
+    "omega_std": "diagnosis.assessment.uncertainty",
+    "WindowErrors": "diagnosis.assessment.windows",
+    "Windows": "diagnosis.assessment.windows",
+    "ComparisonContent": "diagnosis.report.result_keys",
+    "DiagnosisContent": "diagnosis.report.result_keys",
+    "EffectResult": "diagnosis.report.result_keys",
+    "comparison_content": "diagnosis.report.content",
+    "diagnosis_content": "diagnosis.report.content",
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Import on demand: a user's effects must be loaded before the vessel that is to have them."""
+def __getattr__(name: str) -> object:
+    """Import on demand, so that a command pays only for what it uses."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

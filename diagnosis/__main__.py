@@ -1,8 +1,13 @@
 """``python -m diagnosis`` tells which commands there are."""
 
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
 from cosim.command import run_command
 
-COMMANDS = """Holds a ship model against measurements, and learns what it lacks.
+COMMANDS = """Compares a ship model with measurements, and learns what it lacks.
 
   python -m diagnosis.compare RUN...                  where does the model fail?
   python -m diagnosis.learn TRAIN... [--test RUN...]  which physical effect is missing?

@@ -1,4 +1,9 @@
-"""Hold a model against measured runs: ``python -m diagnosis.compare RUN...``."""
+"""Compare a model with measured runs: ``python -m diagnosis.compare RUN...``."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence
@@ -7,9 +12,9 @@ from pathlib import Path
 
 from cosim.command import run_command
 
-from .command import Done, folder, load_effects, parser, run
-from .folder import together
-from .steps import Advance
+from .command_line import Done, folder, parser, run, ship_with
+from .progress import Advance
+from .result_folder import together
 
 FILES = ("comparison.json", "report.html")
 
@@ -20,29 +25,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
-    """Do what the options say."""
-    load_effects(options.effects)
-    from . import outcome, session  # only now: they import the vessel, which has the effects
+    """Run the command with parsed options."""
+    from . import session  # only now: it takes a second to import
     from .gathering import gather
-    from .parameter_set import read_model
-    from .report import write_report
-    from .terminal import show_comparison
+    from .model import Model, read_model
+    from .report import comparison_content, show_comparison, write_report
 
     with together(options.out, FILES) as new:
-        model = read_model(options.model) if options.model else None
-        found = session.confront(gather(options.runs, advance), model, advance=advance)
+        craft = ship_with(options.effects)
+        model = read_model(options.model, craft) if options.model else Model(ship=craft)
+        comparison = session.evaluate(gather(options.runs, advance), model, advance=advance)
         advance("where it fails")
-        result = outcome.comparison(found, options.model, FILES)
-        (new / "comparison.json").write_text(result.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        content = result.model_dump(mode="json")
-        write_report(new / "report.html", content, found.evidence, found.std, advance=advance)
-    return Done(0, show_comparison(result, str(options.out)))
+        content = comparison_content(comparison, options.model, FILES)
+        (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        write_report(
+            new / "report.html", content, comparison.evaluations, comparison.omega_std, advance=advance
+        )
+    return Done(0, show_comparison(content, str(options.out)))
 
 
 def _parser() -> argparse.ArgumentParser:
     made = parser(
         "compare",
-        "Hold a model against measured runs: how far it goes wrong, and where.",
+        "Compare a model with measured runs: how large its error is, and where.",
         "examples:  python -m diagnosis.compare run1.csv run2.csv\n"
         "           python -m diagnosis.compare results/ellipse --model model.ssv --out results/after\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",

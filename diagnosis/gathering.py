@@ -1,6 +1,5 @@
 """From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
 
-import signal
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -12,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
+from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
 
-from .cleaning import clean
-from .measurement import Run, read
+from .data import Run, clean, read
+from .model import Integrals, integrals
+from .progress import Advance, silent
 from .smoothing import Smoothed, smooth
-from .steps import Advance, silent
-from .weak import Integrals, integrals
 
-PROCESSES = 2
+PROCESSES = 2  # more need more memory than they save time (chosen)
 # Rows in all; below, a second process takes longer to start than it saves.
 WORTH = 60_000
 
@@ -29,7 +28,7 @@ def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integ
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`.
-        advance: told what is being done.
+        advance: progress callback.
 
     Returns:
         For each run its windows of the weak form; names are unique.
@@ -45,14 +44,14 @@ def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integ
 
 def _refuse_twice(runs: Sequence[Run], paths: Sequence[str | Path]) -> None:
     """The same measurement twice would count twice, and held out it would prove nothing."""
-    seen: dict[bytes, str | Path] = {}
+    known: dict[bytes, str | Path] = {}
     for run, path in zip(runs, paths, strict=True):
         content = np.column_stack([run.time, run.pose]).tobytes()
-        if content in seen:
+        if content in known:
             again = f"'{path}' is given twice"
-            same = f"'{path}' holds the same measurement as '{seen[content]}'"
-            raise InputError(again if Path(path) == Path(seen[content]) else same)
-        seen[content] = path
+            same = f"'{path}' holds the same measurement as '{known[content]}'"
+            raise InputError(again if Path(path) == Path(known[content]) else same)
+        known[content] = path
 
 
 def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
@@ -75,11 +74,10 @@ def _smooth_all(runs: Sequence[Run], advance: Advance) -> Iterable[Smoothed]:
             yield _smoothed(run)
         return
     # Ctrl-C is for this process alone, which then lets the others end.
-    pool = ProcessPoolExecutor(
-        PROCESSES, get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
-    )
+    pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), ignore_interrupts)
     try:
-        futures = [pool.submit(_smoothed, run) for run in runs]
+        with UninterruptedProcesses():
+            futures = [pool.submit(_smoothed, run) for run in runs]
         for run, future in zip(runs, futures, strict=True):
             advance(f"smoothing {run.name}")
             yield future.result()

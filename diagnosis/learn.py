@@ -1,5 +1,10 @@
 """Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``."""
 
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
 import argparse
 from collections.abc import Sequence
 from functools import partial
@@ -8,9 +13,10 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command import Done, folder, load_effects, parser, run
-from .folder import together
-from .steps import Advance
+from .command_line import Done, folder, parser, run, ship_with
+from .identification.methods import DEFAULT, METHODS, method
+from .progress import Advance
+from .result_folder import together
 
 DIAGNOSIS, MODEL, REPORT = FILES = ("diagnosis.json", "model.ssv", "report.html")
 
@@ -21,31 +27,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
-    """Do what the options say."""
-    load_effects(options.effects)
-    from . import outcome, session  # only now: they import the vessel, which has the effects
+    """Run the command with parsed options."""
+    from . import session  # only now: it takes a second to import
     from .gathering import gather
-    from .parameter_set import read_model, write_model
-    from .report import write_report
-    from .terminal import show_diagnosis
+    from .model import Model, read_model, write_model
+    from .report import diagnosis_content, show_diagnosis, write_report
 
+    method(options.method)  # before any work: an unknown name, or a library that is missing
     with together(options.out, FILES) as new:
-        model = read_model(options.model) if options.model else None
+        craft = ship_with(options.effects)
+        model = read_model(options.model, craft) if options.model else Model(ship=craft)
+        by = method(options.method)
         runs = gather([*options.train, *options.test], advance)
-        many = len(options.train)
-        found = session.diagnose(runs[:many], runs[many:], options.prior, model, advance)
-        refused = "" if found.sound or options.allow_unstable else UNSOUND
+        train = len(options.train)
+        diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
+        refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND
         if not refused:
             try:
-                write_model(new / MODEL, found.learned.model)
+                write_model(new / MODEL, diagnosis.learned.model)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         files = [name for name in FILES if not (refused and name == MODEL)]
-        result = outcome.diagnosis(found, options.model, files)
-        (new / DIAGNOSIS).write_text(result.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        content = result.model_dump(mode="json")
-        write_report(new / REPORT, content, found.runs.evidence, found.runs.std, advance=advance)
-    shown = [*show_diagnosis(result, str(options.out))]
+        content = diagnosis_content(diagnosis, options.model, files)
+        (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        comparison = diagnosis.comparison
+        write_report(
+            new / REPORT, content, comparison.evaluations, comparison.omega_std, advance=advance
+        )
+    shown = [*show_diagnosis(content, str(options.out))]
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)
@@ -95,7 +104,13 @@ def _parser() -> argparse.ArgumentParser:
         type=_prior,
         metavar="SHARE",
         default=0.1,
-        help="relative standard deviation believed of every nominal coefficient; 0: exact (0.1)",
+        help="relative standard deviation of every nominal coefficient; 0: exact (0.1)",
+    )
+    made.add_argument(
+        "--method",
+        metavar="NAME",
+        default=DEFAULT,
+        help=f"of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
     )
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"

@@ -1,71 +1,76 @@
-"""All that the commands find out, for those who want it from Python."""
+"""The two tasks of the commands as functions: evaluate a model on runs, and diagnose what it lacks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
 from cosim import InputError
 
-from .evidence import Evidence, examine
-from .model import Model
-from .selection import Learned, learn
-from .stability import Region, Stability, check
-from .steps import Advance, silent
-from .uncertainty import omega_std
-from .weak import BLOCK, Integrals, omega
-from .where import Where, where
+from .assessment.evaluation import Evaluation, evaluate_run
+from .assessment.regions import ErrorRegions, find_regions
+from .assessment.stability import OperatingRegion, Stability, check_stability
+from .assessment.uncertainty import omega_std
+from .identification import DEFAULT, Method, method
+from .identification.findings import Findings
+from .model import Integrals, Model, omega
+from .model.weak_form import BLOCK
+from .progress import Advance, silent
 
-FEWEST_BLOCKS = 4
+MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
+REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
 
 Verdict = Literal["found", "ambiguous", "none"]
 
 
 @dataclass(frozen=True, eq=False)
-class Confronted:
-    """Runs held against a model, or against two.
+class Comparison:
+    """The error of a model, or of the initial and the learned one, on measured runs.
 
     Attributes:
-        evidence: of each run.
-        std: of each run the uncertainty (K, 3) of its model error [N, N, N m].
+        evaluations: one for each run.
+        omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
     """
 
-    evidence: Sequence[Evidence]
-    std: Sequence[np.ndarray]
+    evaluations: Sequence[Evaluation]
+    omega_std: Sequence[np.ndarray]
 
     @cached_property
-    def before(self) -> Where:
-        """Where the model fails at first."""
-        return self._where([e.before.omega for e in self.evidence])
+    def before(self) -> ErrorRegions:
+        """Where the initial model fails."""
+        return self._regions([e.before.omega for e in self.evaluations])
 
     @cached_property
-    def after(self) -> Where:
-        """Where it still fails at last."""
-        return self._where([e.after.omega for e in self.evidence])
+    def after(self) -> ErrorRegions:
+        """Where the learned model still fails."""
+        return self._regions([e.after.omega for e in self.evaluations])
 
-    def _where(self, errors: Sequence[np.ndarray]) -> Where:
-        return where([e.integrals for e in self.evidence], errors, self.std)
+    def _regions(self, errors: Sequence[np.ndarray]) -> ErrorRegions:
+        return find_regions([e.integrals for e in self.evaluations], errors, self.omega_std)
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosed:
-    """What was learned from some runs.
+class Diagnosis:
+    """What a model lacks, as learned from some runs.
 
     Attributes:
-        learned: the findings.
-        shares: for each finding the share of the error's sum of squares that it takes away.
-        runs: those for training, then those held out, before and after.
-        start: the model at first.
+        learned: the findings, and the model with them.
+        shares: for each finding the share of the error's sum of squares that it explains.
+        comparison: errors before and after, on the training runs and then on those held out.
+        start: the initial model.
         stability: of the learned model.
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
-        prior, seed: that it was learned with.
+        prior: relative standard deviation of the nominal coefficients.
+        seed: of everything random.
     """
 
-    learned: Learned
+    learned: Findings
     shares: Sequence[float]
-    runs: Confronted
+    comparison: Comparison
     start: Model
     stability: Stability
     speeds: tuple[float, float, float]
@@ -74,9 +79,9 @@ class Diagnosed:
 
     @property
     def verdict(self) -> Verdict:
-        if not self.learned.findings:
+        if not self.learned.effects:
             return "none"
-        return "ambiguous" if self.learned.findings[0].alike else "found"
+        return "ambiguous" if self.learned.effects[0].alike else "found"
 
     @property
     def sound(self) -> bool:
@@ -84,30 +89,48 @@ class Diagnosed:
         return bool(self.stability.safe)
 
 
-def confront(
+@contextmanager
+def well_posed() -> Iterator[None]:
+    """Tell an ill-posed problem as one of the data, in place of an error of linear algebra.
+
+    Raises:
+        InputError: a system of equations inside is singular or not finite.
+    """
+    try:
+        yield
+    except LinAlgError as error:
+        raise InputError(f"these runs do not determine what is asked of them: {error}") from None
+
+
+@well_posed()
+def evaluate(
     runs: Sequence[Integrals],
     model: Model | None = None,
     after: Model | None = None,
     held_out: Sequence[Integrals] = (),
     advance: Advance = silent,
-) -> Confronted:
-    """Hold runs against a model.
+) -> Comparison:
+    """Compare a model, or two, with measured runs.
 
     Args:
         runs: see :func:`diagnosis.gather`.
         model: the nominal one by default.
-        after: the model with what was learned; None: nothing was.
+        after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
-        advance: told what is being done.
+        advance: receives the name of each step when it begins.
+
+    Raises:
+        InputError: the runs are so ill-conditioned that nothing can be computed of them.
     """
-    model, found = model or Model(), []
-    for out, group in ((False, runs), (True, held_out)):
+    model, evaluations = model or Model(), []
+    for is_held_out, group in ((False, runs), (True, held_out)):
         for w in group:
             advance(f"predicting {w.run.name}")
-            found.append(examine(w, model, after, out))
-    return Confronted(found, [omega_std(e.integrals) for e in found])
+            evaluations.append(evaluate_run(w, model, after, is_held_out))
+    return Comparison(evaluations, [omega_std(e.integrals, model) for e in evaluations])
 
 
+@well_posed()
 def diagnose(
     train: Sequence[Integrals],
     held_out: Sequence[Integrals] = (),
@@ -115,51 +138,49 @@ def diagnose(
     model: Model | None = None,
     advance: Advance = silent,
     seed: int = 0,
-) -> Diagnosed:
+    by: str | Method = DEFAULT,
+) -> Diagnosis:
     """Learn what a model lacks.
 
     Args:
         train: runs to learn from, see :func:`diagnosis.gather`.
         held_out: runs to test on only.
-        prior: relative standard deviation believed of every nominal coefficient.
-        model: to start from; the nominal one by default.
-        advance: told what is being done.
-        seed: of the bootstrap.
+        prior: relative standard deviation of every nominal coefficient.
+        model: the initial one; the nominal one by default.
+        advance: receives the name of each step when it begins.
+        seed: of everything random.
+        by: method of identification, or the name of one.
 
     Raises:
-        InputError: too little data, or a prior that is none.
+        InputError: too little data, or a prior that is negative or not finite.
     """
     if not 0.0 <= prior < np.inf:
         raise InputError(f"the prior must be zero or more, not {prior:g}")
     blocks = sum(np.unique(w.block).size for w in train)
-    if blocks < FEWEST_BLOCKS:
+    if blocks < MIN_BLOCKS:
         raise InputError(
             f"too little to learn from: {blocks * BLOCK:g} s with thrusters at work, "
-            f"at least {FEWEST_BLOCKS * BLOCK:g} s are needed"
+            f"at least {MIN_BLOCKS * BLOCK:g} s are needed"
         )
     start = model or Model()
-    learned = learn(train, prior, start, advance, seed)
-    runs = confront(train, start, learned.model if learned.findings else None, held_out, advance)
+    chosen = method(by) if isinstance(by, str) else by
+    learned = chosen.fit(train, start, prior, advance, seed)
+    final = learned.model if learned.effects else None
+    comparison = evaluate(train, start, final, held_out, advance)
     advance("stability")
-    reached = Region.of(np.concatenate([w.smoothed.nu[w.known] for w in train]))
-    stability = check(learned.model, start, advance, reached)
+    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
+    stability = check_stability(learned.model, start, advance, OperatingRegion.of(nu))
     shares = _shares(learned, start, held_out)
-    return Diagnosed(learned, shares, runs, start, stability, _reached(train), prior, seed)
+    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
+    return Diagnosis(learned, shares, comparison, start, stability, (u, v, r), prior, seed)
 
 
-def _shares(learned: Learned, start: Model, held_out: Sequence[Integrals]) -> list[float]:
-    """Fall of the sum of squares by each finding, as a part of that at first; axes weighted by noise."""
+def _shares(learned: Findings, start: Model, held_out: Sequence[Integrals]) -> list[float]:
+    """Share of the initial sum of squares that each finding explains; axes weighted by noise."""
     if not held_out:
-        return [min(1.0, max(0.0, f.share)) for f in learned.findings]
-    models = [start, *(f.model for f in learned.findings)]
+        return [min(1.0, max(0.0, f.share)) for f in learned.effects]
+    models = [start, *(f.model for f in learned.effects)]
     sums = np.array(
         [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
     )
     return [min(1.0, max(0.0, share)) for share in (-np.diff(sums) / sums[0]).tolist()]
-
-
-def _reached(runs: Sequence[Integrals]) -> tuple[float, float, float]:
-    """Speeds that the ship seldom went beyond."""
-    nu = np.concatenate([w.smoothed.nu[w.known] for w in runs])
-    u, v, r = np.quantile(np.abs(nu), 0.9, axis=0).tolist()
-    return u, v, r

@@ -260,16 +260,25 @@ class Component:
         return [replace(v, start=self.starts.get(v.name, v.start)) for v in found]
 
 
-def discover() -> Iterator[tuple[str, Component]]:
-    """Every (module name, component) below this package's folders, found by importing them."""
+# Folders of this package that hold components, one a module.
+KINDS = ("controller", "guidance", "observer", "thrusters", "vessel")
+
+
+def discover(effects: Any = None) -> Iterator[tuple[str, Component]]:
+    """Every (module name, component) of this project, found by importing the modules of all kinds.
+
+    Args:
+        effects: an :class:`~fmus.effects.EffectSet` that the components of the ship are to have; by
+            default that of this project.
+    """
     root = __package__ or "fmus"
-    here = importlib.import_module(root).__path__
-    for folder in pkgutil.iter_modules(here):
-        if not folder.ispkg:
-            continue
-        package = importlib.import_module(f"{root}.{folder.name}")
+    for kind in KINDS:
+        package = importlib.import_module(f"{root}.{kind}")
         for info in pkgutil.iter_modules(package.__path__):
-            name = f"{root}.{folder.name}.{info.name}"
-            component = getattr(importlib.import_module(name), "COMPONENT", None)
-            if isinstance(component, Component):
-                yield name, component
+            name = f"{root}.{kind}.{info.name}"
+            module = importlib.import_module(name)
+            component = getattr(module, "COMPONENT", None)
+            if not isinstance(component, Component):
+                continue
+            make = getattr(module, "make", None)
+            yield name, component if effects is None or make is None else make(effects)

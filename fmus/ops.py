@@ -14,6 +14,7 @@ from typing import Any
 Number = Any
 
 TWO_PI = 2.0 * math.pi
+TINY = 1e-300  # in place of zero, of which there is no logarithm
 _SCALARS = (float, int, bool)
 
 
@@ -109,6 +110,18 @@ def pick(rows: Sequence[Any], index: Number) -> Any:
     return found
 
 
+def is_series(x: Number) -> bool:
+    """Whether x is an array."""
+    return x.__class__ not in _SCALARS and not hasattr(x, "apply_operation")
+
+
+def series_between(x: Number, low: float, high: float, values: Sequence[float]) -> Number:
+    """An array interpolated linearly between values at equally spaced nodes from low to high."""
+    import numpy
+
+    return numpy.interp(x, numpy.linspace(low, high, len(values)), values)
+
+
 def fmin(a: Number, b: Number) -> Number:
     if a.__class__ in _SCALARS and b.__class__ in _SCALARS:
         return a if a < b else b
@@ -124,6 +137,16 @@ def fmax(a: Number, b: Number) -> Number:
 def clip(x: Number, low: Number, high: Number) -> Number:
     """x limited to [low, high]."""
     return fmax(low, fmin(x, high))
+
+
+def sign(x: Number) -> Number:
+    """-1, 0 or 1."""
+    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
+
+
+def power(x: Number, exponent: Number) -> Number:
+    """x^exponent of x >= 0 and an exponent > 0 that need be no whole number."""
+    return exp(exponent * log(fmax(x, TINY)))
 
 
 def not_(condition: Number) -> Number:

@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 
 import cosim
 
-from .command import progress, run_study, study_parser
-from .report import Report
-from .runs import Content, Interval, interval
+from .monte_carlo import Content, Interval, interval
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
 
 # Where the thrust of the hidden ships really acts, forward of where it is assumed [m].
 HIDDEN = (-0.05, 0.0, 0.05, 0.18)
@@ -34,7 +34,7 @@ class Push(NamedTuple):
 
 
 def scenario(p_x: float, hidden: float, push: Push, seed: int) -> Content:
-    """A ship at rest that is asked for a sway force and nothing else.
+    """A ship at rest with a commanded sway force and nothing else.
 
     Args:
         p_x: point of attack that the allocation assumes [m].
@@ -137,7 +137,7 @@ def study(out: Path, seeds: Sequence[int], push: Push, hidden: Sequence[float]) 
                 advance()
     report = Report(out, "Tuning the thrust allocation (6.3.4)", seeds)
     report.text(
-        f"A ship at rest is asked for {push.force:g} N to starboard and to port for {push.seconds:g} s. "
+        f"A ship at rest is commanded {push.force:g} N to starboard and to port for {push.seconds:g} s. "
         "The assumed point of attack p_o is moved until neither push turns it. "
         f"It took {np.mean(steps):.1f} pairs of pushes on average. The heading is measured with "
         f"{push.noise:g} rad of noise."

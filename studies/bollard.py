@@ -1,4 +1,4 @@
-"""Bollard pulls of the real ship's propellers: a truth that no learned model has seen."""
+"""Bollard pulls of the real ship's propellers: reference data that no model is learned from."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from cosim import InputError
 from cosim.errors import nearest
-from diagnosis.model import Model
-from fmus.effects.registry import Running
-from fmus.thrusters.chain import IN_THRUSTERS, act
+from diagnosis import Model
+from fmus.effects import Running
+from fmus.thrusters import chain
 
 PULLS = Path("cse1_static", "vsp_surge_bollard.csv")
 COLUMNS = ("pitch", "F_per_vsp")
@@ -70,18 +70,16 @@ def surge_force(model: Model, command: np.ndarray) -> np.ndarray:
     Returns:
         (n,) [N].
     """
-    p = model.drive
-    acting = [member.acting(p.wrong) for member in IN_THRUSTERS.members]
     none = np.zeros_like(command)
-    X, _, _ = act((command, none, none), Running(u_vsp_x=command), p.plant, acting, p.wrong)
+    X, _, _ = chain.act((command, none, none), Running(u_vsp_x=command), model.drive)
     return np.broadcast_to(X, command.shape)
 
 
 def difference(model: Model, pulls: Pulls) -> Difference:
     """A model's force against the pulls with at most WITHIN of full pitch."""
     kept = np.abs(pulls.command) <= WITHIN
-    asked, pulled = pulls.command[kept], pulls.force[kept]
-    given = surge_force(model, asked)
+    commanded, pulled = pulls.command[kept], pulls.force[kept]
+    given = surge_force(model, commanded)
     factor = float(given @ pulled / max(float(given @ given), 1e-12))
 
     def rms(x: np.ndarray) -> float:

@@ -13,12 +13,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import cosim
-from cosim.plots import draw
+from cosim.results import draw
 
-from .command import progress, run_study, study_parser
+from .monte_carlo import Content, interval, ratio, run_all, shipped, vary
 from .outcome import Outcome, columns, outcome, true_states
-from .report import Report
-from .runs import Content, interval, ratio, run_all, shipped, vary
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
 from .verdict import CONTROLLERS, FOUR, OLD, claims
 
 PATHS = ("ellipse", "eight")
@@ -31,7 +31,7 @@ NEEDED = [
     "controller.sigma_min",
     "controller.rank_met",
 ]
-# As printed, a sample may be stored whatever force was asked for.
+# As printed, a sample may be stored whatever force is commanded.
 UNGATED = {"controller.tau_max": 1e6}
 
 Table = Mapping[str, Mapping[str, list[Outcome]]]
@@ -104,8 +104,8 @@ def tables(report: Report, path: str, by_condition: Table) -> None:
         rows = []
         for controller, each in outcomes.items():
             broken = sum(not o.done for o in each)
-            told = [str(interval(columns(each, name))) for name in names]
-            rows.append([controller + (f" ({broken} broke off)" if broken else ""), *told])
+            cells = [str(interval(columns(each, name))) for name in names]
+            rows.append([controller + (f" ({broken} broke off)" if broken else ""), *cells])
         report.table(header, rows)
 
 
@@ -172,7 +172,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
         "yaw rate. Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; "
         "`true` means the ship's own state. In the thesis stored errors go stale (Algorithms 1 and 2 "
         "store ε itself); here they are formed anew, and `stale` is the printed form. Samples stored "
-        "while more than 2 N was asked for, which the thrusters do not give, are kept out by default; "
+        "while more than 2 N was commanded, which the thrusters do not give, are kept out by default; "
         "`ungated` stores them too, as printed."
     )
     report.text(

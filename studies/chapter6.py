@@ -11,23 +11,23 @@ from pathlib import Path
 from typing import Any
 
 import cosim
-from cosim.plots import draw
+from cosim.results import draw
 
-from .command import progress, run_study, study_parser
 from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found, Runs, label, lost, mean
-from .hoard import hoard, logged
 from .lessons import DELAYS, lessons
 from .margin import SETTINGS
+from .monte_carlo import Content, run_all, vary
 from .outcome import AXES, Log, missing
-from .report import Report
-from .runs import Content, run_all, vary
+from .store_contents import logged, store_contents
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
 from .trials import ABS, CLE, CLZ, CONTROLLERS, LABELS, TRIALS, Sailed, Trial, gains, sailed, scenario
 
 CL = ("controller_cl_win_eps", "controller_cl_win_z2", "controller_cl_svd_eps", "controller_cl_svd_z2")
 FEW = 3  # seeds of the experiments in which little is random
 OFF = 1e6
 OPEN = {f"controller.{name}": OFF for name in ("tau_max", "nu_dot_max", "nu_max")}
-# Twice the acceleration that is told on the ellipse, a spike's is three times this.
+# Twice the acceleration that is estimated on the ellipse, a spike's is three times this.
 BLOCKER = {"controller.tau_max": 3.0, "controller.nu_dot_max": 0.1, "controller.nu_max": 1.0}
 STALE = {"controller.stale": 1.0}
 STORES = {
@@ -79,7 +79,7 @@ def delayed(trial: Trial) -> Jobs:
     }
 
 
-def hoarding(trial: Trial) -> dict[str, Content]:
+def storing(trial: Trial) -> dict[str, Content]:
     """Controller -> scenario with spikes and no blocker, of which all is logged that its store needs."""
     return {
         c: vary(scenario(trial, c, parameters=OPEN), log={"signals": logged(f"{c}.fmu")}) for c in CL
@@ -104,15 +104,15 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
         (slow_eight(every[1]), seeds),
         (delayed(slow), few),
     ]
-    hoards = hoarding(slow)
-    total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(hoards) * len(few)
+    stores = storing(slow)
+    total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(stores) * len(few)
     with progress(total, "chapter 6") as advance:
         logs = out / "logs"
         first = together(sailing, seeds[:1], logs, jobs, advance)
         rest = together(sailing, seeds[1:], None, jobs, advance)
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
         others = [together(group, some, None, jobs, advance) for group, some in groups[1:]]
-        kept = run_all(hoards, few, hoard, None, jobs, advance)
+        kept = run_all(stores, few, store_contents, None, jobs, advance)
     return Found(sailed_all, others[0], others[1], others[2], kept)
 
 

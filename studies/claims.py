@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from .monte_carlo import Interval, interval, paired
 from .replay import OBSERVERS, SIGNALS
-from .report import Report
-from .runs import Interval, interval, paired
+from .study_report import Report
 
 Runs = Mapping[str, Sequence[Mapping[str, Mapping[str, float]]]]
 Row = tuple[str, str, str]
@@ -32,12 +32,12 @@ def _verdict(holds: bool) -> str:
 
 
 def lag_and_noise(found: Runs) -> Row:
-    calm = "rich, no freezes"
+    clean = "rich, no freezes"
     others = ("nonlinear", "luenberger")
-    lags = all(_less(found, calm, "lag_u", o, "mdf") for o in others)
-    quiet = all(_less(found, calm, "noise_u", "mdf", o) for o in others)
+    lags = all(_less(found, clean, "lag_u", o, "mdf") for o in others)
+    quiet = all(_less(found, clean, "noise_u", "mdf", o) for o in others)
     numbers = "; ".join(
-        f"{o}: lag {_mean(found, calm, o, 'lag_u')} s, noise {_mean(found, calm, o, 'noise_u')} m/s"
+        f"{o}: lag {_mean(found, clean, o, 'lag_u')} s, noise {_mean(found, clean, o, 'noise_u')} m/s"
         for o in ("mdf", *others)
     )
     said = "The derivative filter lags behind the other observers, but is less noisy"

@@ -17,10 +17,10 @@ import cosim
 from cosim.command import BAD_INPUT, FAILED, run_command
 
 from . import basin, claims, pictures
-from .command import progress, study_parser
+from .monte_carlo import Interval, interval, run_all, shipped, vary, without
 from .replay import LOGGED, OBSERVERS, SIGNALS, UNITS, freezes, measures, observer, replay
-from .report import Report
-from .runs import Interval, interval, run_all, shipped, vary, without
+from .study_command import progress, study_parser
+from .study_report import Report
 
 STOP, QUICK_STOP, QUICK_SEEDS = 120.0, 60.0, 2
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
@@ -50,8 +50,8 @@ def variants(stop: float) -> dict[str, dict[str, Any]]:
     upset = found["ellipse, no freezes"]
     found["ellipse, upsets"] = vary(upset, faults=upset["faults"] + UPSETS)
     for name, change in HIDDEN.items():
-        for calm in ("", ", no freezes"):
-            found[f"rich{calm}, {name}"] = vary(found[f"rich{calm}"], parameters=change)
+        for condition in ("", ", no freezes"):
+            found[f"rich{condition}, {name}"] = vary(found[f"rich{condition}"], parameters=change)
     return found
 
 

@@ -1,10 +1,10 @@
-"""What was asked and expected of the real ship before looking, and what came of it."""
+"""Targets and expectations of the real ship, set before the study, and the result of each."""
 
 from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from diagnosis.results import Diagnosis
+from diagnosis import DiagnosisContent
 
 AXES = ("surge", "sway", "yaw")
 BY_HAND, STEERED = "by hand", "dynamic positioning"
@@ -21,11 +21,11 @@ CLEARLY = 0.1  # of what is left
 
 
 class Fall(NamedTuple):
-    """Of one axis of a run: what was left out, what the same would be if not, and what noise allows.
+    """Of one axis of a run: left out of training, in training, and at most.
 
     Attributes:
         out: fall of the model error when the run is left out.
-        seen: when it is among those learned from; NaN if that was not tried.
+        seen: when it is among the training runs; NaN if that was not tried.
         most: at which only the measurement's noise is left.
         both, single: shares of what is left that the commands of the VSP would explain, by the sum of
             the two and by each.
@@ -65,7 +65,7 @@ def reason(fall: Fall, target: float) -> str:
 
 
 def commanded(fall: Fall) -> str:
-    """What the commands of the VSP say of what is left; empty: nothing."""
+    """Share of the rest that the commands of the VSP explain, in words; empty: hardly any."""
     if fall.single < CLEARLY:
         return ""
     text = f"; {100.0 * fall.single:.0f} % of the squares that are left go with the commands of each VSP"
@@ -74,7 +74,7 @@ def commanded(fall: Fall) -> str:
     return text
 
 
-def vsp_curve(found: Diagnosis) -> str:
+def vsp_curve(found: DiagnosisContent) -> str:
     """The shape of the VSP's surge force."""
     came = [e.id for e in found.effects if e.id in SHAPES]
     if came:
@@ -83,14 +83,14 @@ def vsp_curve(found: Diagnosis) -> str:
     return f"only as indistinguishable ({', '.join(dict.fromkeys(alike))})" if alike else "no"
 
 
-def coefficients(found: Diagnosis, axis: str) -> str:
+def coefficients(found: DiagnosisContent, axis: str) -> str:
     """Damping coefficients of an axis: as effects, and as nominal ones that are likely wrong."""
     effects = [e.id for e in found.effects if e.id.startswith(f"{axis}_")]
     suspects = [f"{s.name} = {s.value:.3g}" for s in found.suspect_coefficients if s.name[0] == axis]
     return ", ".join(effects + suspects) or "no"
 
 
-def delay(found: Diagnosis) -> str:
+def delay(found: DiagnosisContent) -> str:
     """A pure delay of the thrusters, and whether it is as long as expected."""
     for e in found.effects:
         value = e.coefficients["delay"].value if e.id == "delay" else None
@@ -101,8 +101,8 @@ def delay(found: Diagnosis) -> str:
     return f"no; {', '.join(others)} in its place" if others else "no"
 
 
-def expectations(found: Sequence[Diagnosis]) -> list[Expectation]:
-    """What was expected, and what each diagnosis says of it."""
+def expectations(found: Sequence[DiagnosisContent]) -> list[Expectation]:
+    """What was expected, and the result of each diagnosis."""
     return [
         Expectation("thrust_curve or curve_vsp_x(c)", [vsp_curve(d) for d in found]),
         Expectation("Y coefficients", [coefficients(d, "Y") for d in found]),

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from .hoard import Hoard
-from .runs import Interval, interval
+from .monte_carlo import Interval, interval
+from .store_contents import StoreContents
 from .trials import Sailed
 from .verdict import finite_ratio
 
@@ -23,14 +23,14 @@ class Found(NamedTuple):
         spiked: (store, with spikes) -> controller -> runs.
         eight: (blocker, with spikes) -> controller -> runs of the slow eight.
         delayed: (gains, delay) -> controller -> runs.
-        hoards: controller -> what its store held.
+        stores: controller -> what its store held.
     """
 
     trials: Mapping[tuple[str, bool], Runs]
     spiked: Mapping[tuple[str, bool], Runs]
     eight: Mapping[tuple[str, bool], Runs]
     delayed: Mapping[tuple[str, float], Runs]
-    hoards: Mapping[str, Sequence[Hoard]]
+    stores: Mapping[str, Sequence[StoreContents]]
 
 
 def values(runs: Sequence[Sailed], name: str) -> list[float]:

@@ -15,11 +15,11 @@ import cosim
 from fmus.controller.models import SURGE
 
 from . import sysid4
-from .command import progress, run_study, study_parser
 from .lap_pictures import errors_picture, force_picture, path_picture
+from .monte_carlo import Content, Interval, interval, paired, run_all, shipped, vary
 from .outcome import AXES, LEARNED_FROM, Log, missing, rms, true_states
-from .report import Report
-from .runs import Content, Interval, interval, paired, run_all, shipped, vary
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
 from .verdict import Verdict, finite_ratio
 
 IMPROVED = "controller_cl_improved"
@@ -74,9 +74,9 @@ def last_lap(result: cosim.Result) -> Lap:
     """
     if result.status != "done":
         raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    whole = cosim.read_log(result.folder)
-    late = whole["time"] >= max(whole["time"][-1] - LAP, 0.5 * whole["time"][-1])
-    log = {name: column[late] for name, column in whole.items()}
+    complete = cosim.read_log(result.folder)
+    lap_time = complete["time"] >= max(complete["time"][-1] - LAP, 0.5 * complete["time"][-1])
+    log = {name: column[lap_time] for name, column in complete.items()}
     z1 = log["controller.z1_x"]
     wrong = tuple(rms(log[f"controller.omega_hat_{a}"] - missing(log, a)) for a in AXES)
     lap = Lap(float(z1.mean()), rms(z1), rms(log["controller.z1_y"]), wrong)
@@ -108,7 +108,7 @@ def column(laps: Sequence[Lap], name: str) -> list[float]:
 
 
 def claims(found: Found) -> list[Verdict]:
-    """What the thesis says of the improved controller, and what was asked of it here."""
+    """The thesis' statements on the improved controller, and the goals set here."""
     shares, means, others, aside = {}, {}, [], {}
     for sense, runs in found.items():
         for name in ORIGINALS:
@@ -148,7 +148,7 @@ def claims(found: Found) -> list[Verdict]:
 
 
 def coefficients(report: Report, found: Found) -> None:
-    """Estimated and true coefficients, and what of them can be told apart."""
+    """Estimated and true coefficients, and which of them can be distinguished."""
     report.heading("Estimates of the improved controller and the truth")
     header = ["coefficient", "unit", "truth", *found]
     rows = []
@@ -214,9 +214,9 @@ def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> 
 
 def lap_row(sense: str, name: str, laps: Sequence[Lap]) -> list[str]:
     """A line of the table of last laps."""
-    told: list[Interval] = [interval(column(laps, key)) for key in ("mean", "size", "aside")]
-    told += [interval([lap.error[k] for lap in laps]) for k in range(3)]
-    return [sense, name.removeprefix("controller_"), *map(str, told)]
+    cells: list[Interval] = [interval(column(laps, key)) for key in ("mean", "size", "aside")]
+    cells += [interval([lap.error[k] for lap in laps]) for k in range(3)]
+    return [sense, name.removeprefix("controller_"), *map(str, cells)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

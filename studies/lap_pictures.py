@@ -33,8 +33,8 @@ def force_picture(log: Log) -> Figure:
         panel.plot(log["time"], log[f"controller.omega_hat_{a}"], "tab:red", label="estimate")
         panel.set_ylabel(f"ω_{a} [{'N m' if a == 'N' else 'N'}]")
         # The start, where ship and estimate are still far off, would flatten the rest.
-        late = log["time"] > 0.1 * log["time"][-1]
-        low, high = np.quantile(missing(log, a)[late], [0.005, 0.995])
+        settled = log["time"] > 0.1 * log["time"][-1]
+        low, high = np.quantile(missing(log, a)[settled], [0.005, 0.995])
         panel.set_ylim(low - 0.5 * (high - low) - 0.02, high + 0.5 * (high - low) + 0.02)
         panel.grid(alpha=0.3)
     panels[0].legend(fontsize=8)

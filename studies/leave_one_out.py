@@ -1,4 +1,4 @@
-"""Each measured run left out in turn: what is learned from the others, and what it is worth there."""
+"""Each measured run left out in turn: what is learned from the others, evaluated on it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,14 +10,9 @@ import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Diagnosed, Model, outcome
-from diagnosis.evidence import Evidence
-from diagnosis.measurement import propellers
-from diagnosis.model import delayed
-from diagnosis.results import Diagnosis
-from diagnosis.steps import Advance
-from diagnosis.uncertainty import omega_std
-from diagnosis.weak import Integrals, omega
+from diagnosis import Diagnosis, DiagnosisContent, Evaluation, Integrals, Model, diagnosis_content, omega
+from diagnosis.model import Response
+from diagnosis.progress import Advance
 
 SAME = 1e-6
 TOGETHER = 2  # blocks of 15 s: what counts as independent
@@ -28,25 +23,25 @@ class Fold:
     """What was learned without one run, and how it does there.
 
     Attributes:
-        found: what was learned; its last evidence is that of the run left out.
-        seen: fall (3,) of the model error on this run when it is among those learned from.
+        found: what was learned; its last evaluation is that of the run left out.
+        in_sample: fall (3,) of the model error on this run when it is among the training runs.
     """
 
-    found: Diagnosed
-    seen: np.ndarray | None = None
+    found: Diagnosis
+    in_sample: np.ndarray | None = None
 
     @property
-    def evidence(self) -> Evidence:
-        return self.found.runs.evidence[-1]
+    def evaluation(self) -> Evaluation:
+        return self.found.comparison.evaluations[-1]
 
     @property
     def name(self) -> str:
-        return self.evidence.name
+        return self.evaluation.name
 
     @cached_property
-    def content(self) -> Diagnosis:
+    def content(self) -> DiagnosisContent:
         """As in ``diagnosis.json``."""
-        return outcome.diagnosis(self.found, None, [])
+        return diagnosis_content(self.found, None, [])
 
     @property
     def model(self) -> Model:
@@ -55,16 +50,16 @@ class Fold:
     @property
     def fall(self) -> np.ndarray:
         """(3,): RMS of the model error before over that after."""
-        return fall(self.evidence)
+        return fall(self.evaluation)
 
     @property
     def ceiling(self) -> np.ndarray:
         """(3,): the fall at which only the measurement's own noise is left."""
-        std = np.sqrt(np.mean(omega_std(self.evidence.integrals) ** 2, axis=0))
-        return self.evidence.before.omega_rms / std
+        std = np.sqrt(np.mean(self.found.comparison.omega_std[-1] ** 2, axis=0))
+        return self.evaluation.before.omega_rms / std
 
 
-def fall(e: Evidence) -> np.ndarray:
+def fall(e: Evaluation) -> np.ndarray:
     """(3,): RMS of the model error before over that after."""
     return e.before.omega_rms / e.after.omega_rms
 
@@ -76,7 +71,7 @@ def leave_out(runs: Sequence[Integrals], k: int, prior: float, advance: Advance)
         runs: at least two.
         k: which one is left out.
         prior: relative standard deviation believed of every nominal coefficient.
-        advance: told what is being done.
+        advance: receives the name of each step when it begins.
     """
     others = [w for i, w in enumerate(runs) if i != k]
     return Fold(diagnosis.diagnose(others, [runs[k]], prior, advance=advance))
@@ -100,11 +95,11 @@ def steered(w: Integrals) -> bool:
 
 
 def at_full_power(w: Integrals) -> np.ndarray:
-    """RMS (3,) of the nominal model error of who does not know the power settings."""
+    """RMS (3,) of the nominal model error without the power settings of the run."""
     track = w.smoothed.track
     run = replace(track.run, power=None)
-    blind = replace(w, smoothed=replace(w.smoothed, track=replace(track, run=run)), memory={})
-    return np.sqrt(np.mean(omega(blind, Model()) ** 2, axis=0))
+    at_full = replace(w, smoothed=replace(w.smoothed, track=replace(track, run=run)), memory={})
+    return np.sqrt(np.mean(omega(at_full, Model()) ** 2, axis=0))
 
 
 class Commanded(NamedTuple):
@@ -119,7 +114,7 @@ class Commanded(NamedTuple):
     single: np.ndarray
 
 
-def commanded(e: Evidence, model: Model) -> Commanded:
+def commanded(e: Evaluation, model: Model) -> Commanded:
     """How much of what is left goes with the commands of the VSP, in any direction of the force.
 
     Fitted are commands and their sizes, delayed as in the model, and judged on blocks that were not
@@ -133,9 +128,8 @@ def commanded(e: Evidence, model: Model) -> Commanded:
     if w.run.five is None:
         return Commanded(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
-    late, _ = model.drive.dynamics
-    one, other = np.moveaxis(propellers(w.run.five), 1, 0)
-    first, second = (delayed(w.run.time, part, late)[:, :2] for part in (one, other))
+    arriving, _ = Response(w.run, model).between_samples
+    first, second = np.moveaxis(arriving[:, :, :2], 1, 0)
     two, four = first + second, np.hstack([first, second])
     return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
 

@@ -1,4 +1,4 @@
-"""The lessons learned of 6.5: what our runs say of each, and an experiment that shows the cause."""
+"""The lessons learned of 6.5: the result of our runs on each, and an experiment that shows the cause."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -22,11 +22,11 @@ from .found import (
     share,
     values,
 )
-from .hoard import Hoard
 from .margin import margins
-from .runs import Interval
+from .monte_carlo import Interval
+from .store_contents import StoreContents
 from .trials import ABS, CLE, CLZ, HARD, LABELS, RBS, TRIALS
-from .verdict import Verdict, finite_ratio, judged, told
+from .verdict import Verdict, finite_ratio, judged, listed
 
 DELAYS = (0.0, 0.1, 0.3, 0.5, 1.0)
 SWINGS = 3.0  # times the swing without delay that count as an oscillation
@@ -54,9 +54,9 @@ def guidance(found: Found) -> Verdict:
     return Verdict(
         "Guidance was four times as fast as desired, and worsens the tracking",
         worse(shares),
-        f"position error with the fault over that without, at the same true speed: {told(shares)}. "
-        "Cause: the target's derivatives tell a quarter of its speed, so the law brakes. In surge that "
-        "lengthens the lag by ¾ u_t (K_d + m11 K_p) / (1 + K_d K_p) = "
+        f"position error with over without the fault, at the same true speed: {listed(shares)}. "
+        "Cause: the derivatives of the target are those of a quarter of its speed: the law brakes. In "
+        "surge that lengthens the lag by ¾ u_t (K_d + m11 K_p) / (1 + K_d K_p) = "
         f"{must:.3f} m at {ellipse.u_t:g} m/s; the runs (RBS) have {b.mean - a.mean:.3f} m",
     )
 
@@ -83,7 +83,7 @@ def adaptive(found: Found) -> Verdict:
     return Verdict(
         "The performance difference of BS and ABS was not significant",
         f"{here} (within 5 %, or the interval holds 1)",
-        f"position error of ABS over RBS: {told(shares)}. Cross-track error: {told(aside)}. "
+        f"position error of ABS over RBS: {listed(shares)}. Cross-track error: {listed(aside)}. "
         f"Fell behind for good: {falls or 'none'}. Cause: the error along the ship, in which neither "
         f"adapts, makes {100 * min(surge):.0f} to {100 * max(surge):.0f} % of the mean square",
     )
@@ -112,7 +112,7 @@ def surge_error(found: Found) -> Verdict:
         "Large model-error, especially in surge; the ship lags and runs inside of the ellipse",
         f"{'lag reproduced' if all(lags) else 'lag not everywhere'}; inside in {within} of {len(known)}",
         f"mean magnitude of ω in surge and lag, RBS: {'; '.join(rows)}. The thesis has 0.4 N at 0.08 "
-        f"and 0.5 N at 0.16 m/s. Inside of the ellipse by [m]: {told(dict(sides))}",
+        f"and 0.5 N at 0.16 m/s. Inside of the ellipse by [m]: {listed(dict(sides))}",
     )
 
 
@@ -132,7 +132,7 @@ def no_surge(found: Found) -> Verdict:
         "The parametrisation (2.32) makes adaptation in surge impossible",
         "reproduced" if largest == 0.0 and not falls else "not reproduced",
         f"largest |ω̂| in surge in {len(everything)} runs of every controller: {largest:g} N. z1_x on "
-        f"the second lap over the first, {TRIALS[0].name}: {told(laps)}. Cause: the first row of Φ is "
+        f"the second lap over the first, {TRIALS[0].name}: {listed(laps)}. Cause: the first row of Φ is "
         "empty; with (7.1) the lag goes (`python -m studies.improved`)",
     )
 
@@ -143,10 +143,10 @@ def spikes(found: Found) -> list[Verdict]:
     for store in dict.fromkeys(store for store, _ in found.spiked):
         numbers = []
         for c, runs in found.spiked[store, True].items():
-            calm = found.spiked[store, False][c]
-            hurt[store, c] = share(runs, calm, "cross_track")
-            fell = f", lost {lost(calm)}→{lost(runs)}" if lost(calm) or lost(runs) else ""
-            size = f"{mean(calm, 'cross_track').mean:.3f}→{mean(runs, 'cross_track').mean:.3f} m"
+            clean = found.spiked[store, False][c]
+            hurt[store, c] = share(runs, clean, "cross_track")
+            fell = f", lost {lost(clean)}→{lost(runs)}" if lost(clean) or lost(runs) else ""
+            size = f"{mean(clean, 'cross_track').mean:.3f}→{mean(runs, 'cross_track').mean:.3f} m"
             numbers.append(f"{short(c)} {hurt[store, c]} ({size}{fell})")
         parts.append(f"{store}: {'; '.join(numbers)}")
     surely = {store: [s.low > 1.0 for (of, _), s in hurt.items() if of == store] for store, _ in hurt}
@@ -155,7 +155,7 @@ def spikes(found: Found) -> list[Verdict]:
         round(mean(runs, "cross_track").mean / mean(found.spiked[FRESH, False][c], "cross_track").mean)
         for c, runs in found.spiked[PRINTED, False].items()
     ]
-    kept = {c: Hoard(*np.mean(each, axis=0)) for c, each in found.hoards.items()}
+    kept = {c: StoreContents(*np.mean(each, axis=0)) for c, each in found.stores.items()}
     time = float(np.mean([h.time for h in kept.values()]))
     ages = [[h.oldest for c, h in kept.items() if kind in c] for kind in ("svd", "win")]
     held = "; ".join(
@@ -199,7 +199,7 @@ def eight(found: Found) -> Verdict:
     return Verdict(
         "On the slow eight CLZ and CLE keep an error in sway and come worst out of the metrics (6.4.3)",
         worse({LABELS[c]: spiked[c] for c in (CLZ, CLE)}),
-        f"IAEW over that of RBS, {trial}: {told({LABELS[c]: s for c, s in spiked.items()})}. Cause: "
+        f"IAEW over that of RBS, {trial}: {listed({LABELS[c]: s for c, s in spiked.items()})}. Cause: "
         f"stored spikes; {'; '.join(cause)}",
     )
 
@@ -212,11 +212,11 @@ def oscillation(found: Found) -> Verdict:
     """Delay and gains."""
     numbers, begins = [], {}
     for name, (T, hertz) in margins().items():
-        for c, calm in found.delayed[name, 0.0].items():
+        for c, undelayed in found.delayed[name, 0.0].items():
             swings = []
             for delay in DELAYS:
                 runs = found.delayed[name, delay][c]
-                factor = share(runs, calm, "swing").mean
+                factor = share(runs, undelayed, "swing").mean
                 if factor > SWINGS or lost(runs):
                     begins.setdefault((name, c), delay)
                 rate = np.median(kept(runs, "frequency") or [float("nan")])

@@ -1,8 +1,8 @@
 """What the thesis' model lacks of the real ship: ``python -m studies.measured_ship DATA``.
 
-Each of the measured runs is left out in turn, the model learns from the others, and is held against the
-one left out. What all runs teach of the propellers is held against bollard pulls, which were never
-learned from.
+Each of the measured runs is left out in turn, the model learns from the others, and is evaluated on the
+one left out. The thrust curve learned from all runs is compared with bollard pulls, which are not
+among the training data.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,14 @@ from rich.console import Console
 
 import cosim
 import diagnosis
-from diagnosis import Diagnosed, outcome
-from diagnosis.library import MEASURED
-from diagnosis.steps import Advance, steps
-from diagnosis.weak import Integrals
+from diagnosis import Diagnosis, Integrals, diagnosis_content
+from diagnosis.identification import MEASURED
+from diagnosis.progress import Advance, progress
 
 from . import basin, bollard, ship_tables
-from .command import run_study, study_parser
 from .leave_one_out import Fold, fall, gather, leave_out
-from .report import Report
+from .study_command import run_study, study_parser
+from .study_report import Report
 
 PRIOR = 1.0
 # Profiles of the model error over all covariates: a megabyte that the reports of single runs have.
@@ -38,16 +37,16 @@ def learned(runs: Sequence[Integrals], prior: float, quick: bool, advance: Advan
     return [leave_out(runs, k, prior, without(w.run.name)) for k, w in enumerate(chosen)]
 
 
-def with_all(folds: Sequence[Fold], found: Diagnosed) -> list[Fold]:
-    """The folds with what their run gives when it is learned from as well."""
-    seen = {e.name: fall(e) for e in found.runs.evidence}
-    return [Fold(f.found, seen[f.name]) for f in folds]
+def with_all(folds: Sequence[Fold], found: Diagnosis) -> list[Fold]:
+    """The folds with the fall on their run when it is among the training runs."""
+    in_sample = {e.name: fall(e) for e in found.comparison.evaluations}
+    return [Fold(f.found, in_sample[f.name]) for f in folds]
 
 
 def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
     """Learn from the measured runs and write the report; returns its path."""
     pulls, files = bollard.read(data), basin.files(data)
-    with steps(Console(stderr=True)) as advance:
+    with progress(Console(stderr=True)) as advance:
         runs = gather(files, advance)
         folds = learned(runs, prior, quick, advance)
         last = diagnosis.diagnose(runs, (), prior, advance=lambda what: advance(f"all runs: {what}"))
@@ -71,8 +70,8 @@ def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
     for f in folds:
         ship_tables.write_findings(report, f"Learned without {f.name}", f.content)
         caption = f"{f.name}: the force that the model lacks, before and after, not learned from it."
-        report.figure(f"omega_{f.name}", ship_tables.course(f.evidence), caption)
-    everything = outcome.diagnosis(last, None, [])
+        report.figure(f"omega_{f.name}", ship_tables.model_error_picture(f.evaluation), caption)
+    everything = diagnosis_content(last, None, [])
     ship_tables.write_findings(report, "Learned from all runs", everything)
     contents = {f"without {f.name}": f.content for f in folds} | {"all runs": everything}
     report.result(

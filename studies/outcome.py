@@ -91,17 +91,17 @@ def outcome(result: cosim.Result) -> Outcome:
     if result.status == "failed":
         return BROKEN
     log = cosim.read_log(result.folder)
-    late = log["time"] >= SETTLED
+    settled = log["time"] >= SETTLED
     half = log["time"] >= 0.5 * log["time"][-1]
     m = result.metrics
     wrong = {
-        a: rms((log[f"controller.omega_hat_{a}"] - log[f"vessel.omega_star_{a}"])[late]) for a in AXES
+        a: rms((log[f"controller.omega_hat_{a}"] - log[f"vessel.omega_star_{a}"])[settled]) for a in AXES
     }
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     learns = "controller.sigma_min" in log
     return Outcome(
         done=True,
-        position=rms(distance[late]),
+        position=rms(distance[settled]),
         second=rms(distance[half]),
         cross_track=m["cross_track_rms"],
         heading=m["heading_rms"],
@@ -112,18 +112,18 @@ def outcome(result: cosim.Result) -> Outcome:
         omega_hat_X=float(log["controller.omega_hat_X"][half].mean()),
         iaew=m["IAEW"],
         iaewwt=m["IAEWWT"],
-        swing=rms(quick(log["controller.tau_N"], log["time"][1] - log["time"][0])[late]),
+        swing=rms(quick(log["controller.tau_N"], log["time"][1] - log["time"][0])[settled]),
         sigma=float(log["controller.sigma_min"][-1]) if learns else float("nan"),
-        rank=float(log["controller.rank_met"][late].mean()) if learns else float("nan"),
+        rank=float(log["controller.rank_met"][settled].mean()) if learns else float("nan"),
     )
 
 
 def true_states(content: dict[str, Any]) -> dict[str, Any]:
     """The scenario with the ship's true state in place of the observer's estimate, and no faults."""
     state = ("x", "y", "psi", "u", "v", "r", "u_dot", "v_dot", "r_dot")
-    told = [[f"vessel.{name}", f"controller.{name}_hat"] for name in state]
+    true = [[f"vessel.{name}", f"controller.{name}_hat"] for name in state]
     kept = [pair for pair in content["connections"] if pair != ["observer.*", "controller.*"]]
-    return {**content, "connections": [*kept, *told], "faults": []}
+    return {**content, "connections": [*kept, *true], "faults": []}
 
 
 def columns(outcomes: Sequence[Any], name: str) -> list[float]:

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 
 import cosim
 
-from .command import progress, run_study, study_parser
-from .report import Report
-from .runs import Content, shipped, vary
+from .monte_carlo import Content, shipped, vary
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
 
 CONTROLLERS = ("controller_bs", "controller_abs", "controller_cl_win_z2", "controller_cl_svd_eps")
 FACTORS = (1.0, 10.0, 100.0)

@@ -72,15 +72,15 @@ def rms(values: np.ndarray) -> float:
 
 def errors(log: Log, estimate: Log) -> dict[str, float]:
     """RMS error of each signal against the true state, after the observer has settled."""
-    late = log["time"] >= SETTLED
-    return {name: rms((estimate[name] - log[f"vessel.{name}"])[late]) for name in SIGNALS}
+    settled = log["time"] >= SETTLED
+    return {name: rms((estimate[name] - log[f"vessel.{name}"])[settled]) for name in SIGNALS}
 
 
 def lag(log: Log, estimate: Log, name: str) -> float:
     """Time [s] by which the truth, delayed, comes closest to an estimate."""
     h = float(np.median(np.diff(log["time"])))
-    late = log["time"] >= SETTLED
-    true, found = log[f"vessel.{name}"][late], estimate[name][late]
+    settled = log["time"] >= SETTLED
+    true, found = log[f"vessel.{name}"][settled], estimate[name][settled]
     shifts = range(round(0.8 / h))
     cost = [rms(found[k:] - true[: len(true) - k]) for k in shifts]
     return int(np.argmin(cost)) * h
@@ -134,7 +134,7 @@ def held(log: Log, estimate: Log, moving: float = 0.02) -> float:
 
 
 def measures(log: Log, estimate: Log) -> dict[str, float]:
-    """Everything that the study tells of one observer on one run."""
+    """All measures of the study of one observer on one run."""
     found = {f"rms_{name}": value for name, value in errors(log, estimate).items()}
     ends = [b for _, b in freezes(log)]
     for name in ("u", "v", "r"):

@@ -6,32 +6,32 @@ from math import isfinite
 import numpy as np
 from matplotlib.figure import Figure
 
-from diagnosis import Model
-from diagnosis.evidence import Evidence
-from diagnosis.results import Diagnosis, EffectResult
+from diagnosis import DiagnosisContent, EffectResult, Evaluation, Model
 
 from . import bollard
 from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, reason, wanted
 from .leave_one_out import Fold, at_full_power, commanded, steered
-from .report import Report
+from .study_report import Report
 
 UNITS = ("N", "N", "N m")
 RUNS_AWAY = "runs away"
 
 
 def kind(fold: Fold) -> str:
-    return STEERED if steered(fold.evidence.integrals) else BY_HAND
+    return STEERED if steered(fold.evaluation.integrals) else BY_HAND
 
 
 def falls(fold: Fold) -> list[Fall]:
     """The fall of each axis, and what bounds it."""
-    seen = np.full(3, np.nan) if fold.seen is None else fold.seen
-    columns = zip(fold.fall, seen, fold.ceiling, *commanded(fold.evidence, fold.model), strict=True)
+    in_sample = np.full(3, np.nan) if fold.in_sample is None else fold.in_sample
+    columns = zip(
+        fold.fall, in_sample, fold.ceiling, *commanded(fold.evaluation, fold.model), strict=True
+    )
     return [Fall(*map(float, row)) for row in columns]
 
 
 def write_falls(report: Report, folds: Sequence[Fold]) -> None:
-    """The model error before and after on the run left out, beside what was asked."""
+    """The model error before and after on the run left out, beside the target."""
     report.heading("The model error on the run left out")
     report.text(
         "RMS of the force that the model lacks, in windows of 3 s with the thrusters at work. Before: "
@@ -42,18 +42,18 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
     rows, results = [], {}
     every = [(f, falls(f)) for f in folds]
     for f, of in every:
-        blind, e = at_full_power(f.evidence.integrals), f.evidence
+        unpowered, e = at_full_power(f.evaluation.integrals), f.evaluation
         results[f.name] = {"kind": kind(f), "axes": {}}
         for k, (axis, x) in enumerate(zip(AXES, of, strict=True)):
             before, after = float(e.before.omega_rms[k]), float(e.after.omega_rms[k])
             target = wanted(axis, kind(f))
             said = "–" if target is None else f"{target:g}×: {'' if x.out >= target else 'not '}reached"
-            changes = f"{before:.3g} ({blind[k]:.3g})", f"{after:.3g}", f"{x.out:.2f}×"
+            changes = f"{before:.3g} ({unpowered[k]:.3g})", f"{after:.3g}", f"{x.out:.2f}×"
             name = f"{f.name}, {kind(f)}"
             rows.append([name, f"{axis} [{UNITS[k]}]", *changes, said, _times(x.seen)])
             results[f.name]["axes"][axis] = {
                 "before": before,
-                "before_without_power": float(blind[k]),
+                "before_without_power": float(unpowered[k]),
                 "after": after,
                 "target": target,
                 **x._asdict(),
@@ -92,45 +92,48 @@ def write_windows(report: Report, folds: Sequence[Fold]) -> None:
     """Errors of prediction over 8 s."""
     report.heading("Prediction over 8 s on the run left out")
 
-    def row(e: Evidence) -> list[str]:
+    def row(e: Evaluation) -> list[str]:
         position = [window_error(s.position, 1000.0) for s in (e.before, e.after)]
         heading = [window_error(s.heading, 180.0 / np.pi) for s in (e.before, e.after)]
         return [e.name, *position, *heading]
 
     header = ["run left out", "position [mm]: before", "after", "heading [°]: before", "after"]
-    report.table(header, [row(f.evidence) for f in folds])
-    seen = [(f.name, f.evidence.before, f.evidence.after) for f in folds]
-    farther = [name for name, before, after in seen if after.position > before.position]
-    askew = [name for name, before, after in seen if after.heading > before.heading]
+    report.table(header, [row(f.evaluation) for f in folds])
+    errors = [(f.name, f.evaluation.before, f.evaluation.after) for f in folds]
+    farther = [name for name, before, after in errors if after.position > before.position]
+    askew = [name for name, before, after in errors if after.heading > before.heading]
     for what, names in (("position", farther), ("heading", askew)):
         if names:
             report.text(
                 f"The {what} is predicted worse than by the nominal model in {', '.join(names)}."
             )
-    away = [f.name for f in folds if np.isinf(f.evidence.after.position)]
+    away = [f.name for f in folds if np.isinf(f.evaluation.after.position)]
     if away:
         report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
 
 
 def write_expected(report: Report, folds: Sequence[Fold]) -> None:
-    """What was expected before looking, and what came."""
+    """Expectations set before the study, and the result of each."""
     report.heading("What was expected")
     rows = expectations([f.content for f in folds])
     header = ["expected", *(f"without {f.name}" for f in folds)]
     report.table(header, [[row.expected, *row.came] for row in rows], words=True)
-    late = {f.name: f.evidence.smoothed.late for f in folds}
-    told = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in late.items() if isfinite(seconds))
-    if told:
+    delays = {f.name: f.evaluation.smoothed.delay for f in folds}
+    listed = ", ".join(
+        f"{name} {seconds:.2f} s" for name, seconds in delays.items() if isfinite(seconds)
+    )
+    if listed:
         report.text(
-            f"The pose alone tells, without any model of the ship, how late its commands act: {told}. "
+            f"Pose and commands alone, without any model of the ship, give the delay of the commands: "
+            f"{listed}. "
             "The model's delay is learned along with all else, and other effects take a part of it."
         )
     report.result("expected", rows)
-    report.result("late", late)
+    report.result("late", delays)
 
 
-def write_findings(report: Report, name: str, d: Diagnosis) -> None:
-    """What one set of runs taught."""
+def write_findings(report: Report, name: str, d: DiagnosisContent) -> None:
+    """The findings of one set of runs."""
     report.heading(name)
 
     def row(e: EffectResult) -> list[str]:
@@ -143,7 +146,7 @@ def write_findings(report: Report, name: str, d: Diagnosis) -> None:
             "with 95 % intervals",
             "confidence",
             "share of error",
-            "not to be told apart",
+            "indistinguishable",
         ]
         report.table(header, [row(e) for e in d.effects], words=True)
     else:
@@ -168,9 +171,9 @@ def write_curve(report: Report, folds: Sequence[Fold], last: Model, pulls: bolla
     said = "reached" if rms <= CURVE_WITHIN else "not reached"
     report.text(
         f"RMS difference to the pulls at |pitch| ≤ {bollard.WITHIN:g}: {rms:.3f} N learned from all "
-        f"runs, {found['nominal'].rms:.3f} N nominal; asked were {CURVE_WITHIN:g} N: {said}. It is not "
-        "known at which speed the propellers ran in the pulls: with one factor on the model's force, "
-        "fitted to the pulls, only the shape counts."
+        f"runs, {found['nominal'].rms:.3f} N nominal; the target was {CURVE_WITHIN:g} N: {said}. It is "
+        "not known at which speed the propellers ran in the pulls: with one factor on the model's "
+        "force, fitted to the pulls, only the shape counts."
     )
     header = ["learned from", "RMS [N]", "best factor", "RMS with it [N]"]
     report.table(header, [[name, *map(float, x)] for name, x in found.items()])
@@ -180,7 +183,7 @@ def write_curve(report: Report, folds: Sequence[Fold], last: Model, pulls: bolla
     report.result("bollard", {"pulls": pulls, "forces": forces, "differences": found})
 
 
-def course(e: Evidence) -> Figure:
+def model_error_picture(e: Evaluation) -> Figure:
     """The model error of a run over time, before and after."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True)
@@ -188,9 +191,9 @@ def course(e: Evidence) -> Figure:
     gaps = np.flatnonzero(np.diff(e.integrals.middle) > 3.0) + 1
     time = np.insert(e.integrals.middle, gaps, np.nan)
     for k, panel in enumerate(panels):
-        for seen, label, color in ((e.before, "before", "0.6"), (e.after, "after", "tab:blue")):
+        for error, label, color in ((e.before, "before", "0.6"), (e.after, "after", "tab:blue")):
             panel.plot(
-                time, np.insert(seen.omega[:, k], gaps, np.nan), color=color, linewidth=0.9, label=label
+                time, np.insert(error.omega[:, k], gaps, np.nan), color=color, linewidth=0.9, label=label
             )
         panel.set_ylabel(f"{AXES[k]} [{UNITS[k]}]")
         panel.grid(alpha=0.3)

@@ -8,11 +8,11 @@ from scipy import signal
 from scipy.spatial import KDTree
 
 import cosim
-from cosim import metrics
+from cosim.scenario import Roles
 
 from . import sysid4
+from .monte_carlo import Content, shipped, vary
 from .outcome import AXES, SETTLED, Log, missing, quick, rms
-from .runs import Content, shipped, vary
 
 RBS, ABS = "controller_bs", "controller_abs"
 CLZ, CLE = "controller_cl_win_z2", "controller_cl_win_eps"
@@ -28,7 +28,7 @@ HARD: dict[str, float] = dict(zip(AXIS_NAMES, (0.2, 0.6, 0.2, 3.0, 6.0, 3.0), st
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 SPIKES = {"kind": "spikes", "signals": POSE, "size": [0.1, 0.1, 0.1], "rate": 1.0 / 60.0}
 LOGGED = [
-    *metrics.COLUMNS[1:],
+    *Roles().columns[1:],
     "controller.z1_x",
     *(f"thrusters.tau_act_{a}" for a in AXES),
 ]
@@ -146,20 +146,20 @@ def sailed(result: cosim.Result) -> Sailed:
         return BROKEN
     log = cosim.read_log(result.folder)
     t = log["time"]
-    late, half = t >= min(SETTLED, 0.5 * t[-1]), t >= 0.5 * t[-1]
+    settled, half = t >= min(SETTLED, 0.5 * t[-1]), t >= 0.5 * t[-1]
     m, z1_x, h = result.metrics, log["controller.z1_x"], t[1] - t[0]
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
-    swing = quick(log["vessel.r"], h, SLOW)[late]
+    swing = quick(log["vessel.r"], h, SLOW)[settled]
     frequencies, power = signal.periodogram(swing, 1.0 / h)
     return Sailed(
         lost=float(distance[half].max() > LOST),
         position=rms(distance[half]),
         cross_track=m["cross_track_rms"],
         heading=m["heading_rms"],
-        first=float(z1_x[late & ~half].mean()) if (late & ~half).any() else float("nan"),
+        first=float(z1_x[settled & ~half].mean()) if (settled & ~half).any() else float("nan"),
         lag=float(z1_x[half].mean()),
         inside=inside(log, half),
-        omega_X=float(np.abs(missing(log, "X")[late]).mean()),
+        omega_X=float(np.abs(missing(log, "X")[settled]).mean()),
         omega_hat_X=float(np.abs(log["controller.omega_hat_X"]).max()),
         iae=m["IAE"],
         work=m["W"],

@@ -1,4 +1,4 @@
-"""The conclusions of chapter 5, each with what our runs say of it."""
+"""The conclusions of chapter 5, each with the result of our runs."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from scipy import stats
 
+from .monte_carlo import Interval, interval, ratio
 from .outcome import Outcome, columns
-from .runs import Interval, interval, ratio
 
 FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")
 OLD = ("controller_bs", "controller_abs", "controller_cl_svd_eps", "controller_cl_win_z2")
@@ -55,7 +55,8 @@ def judged(shares: Mapping[str, Interval]) -> str:
     return "undecided"
 
 
-def told(shares: Mapping[str, Interval]) -> str:
+def listed(shares: Mapping[str, Interval]) -> str:
+    """Intervals with the names of their runs."""
     return "; ".join(f"{run}: {value}" for run, value in shares.items())
 
 
@@ -66,7 +67,7 @@ def better(by_path: Paths, thesis: str, a: str, b: str, *conditions: str) -> Ver
         for path, table in by_path.items()
         for condition in conditions
     }
-    return Verdict(thesis, judged(shares), f"error of {a} over {b}: {told(shares)}")
+    return Verdict(thesis, judged(shares), f"error of {a} over {b}: {listed(shares)}")
 
 
 def correlation(by_path: Paths) -> Verdict:
@@ -113,12 +114,12 @@ def stale(by_path: Paths) -> Verdict:
     return Verdict(
         "Algorithms 1 and 2 as printed, with stored ε_j (4.1.3), are fit for use",
         "no: they wind up" if all(s.low > 1.0 for s in shares.values()) else "mixed",
-        f"error with stale over recomputed errors, MDF: {told(shares)}",
+        f"error with stale over recomputed errors, MDF: {listed(shares)}",
     )
 
 
 def saturated(by_path: Paths) -> Verdict:
-    """What samples do that were stored while the thrusters gave less than was asked for."""
+    """The effect of samples that were stored while the thrusters saturated."""
     numbers = []
     for path, table in by_path.items():
         for name in FOUR:
@@ -128,7 +129,7 @@ def saturated(by_path: Paths) -> Verdict:
             label = name.removeprefix("controller_cl_")
             numbers.append(f"{path}, {label}: {without:.4f} m, with the gate {with_gate:.4f} m")
     return Verdict(
-        "SVD storage is fragile: it hoards what is wrong (5.3.3, Table 5.2)",
+        "SVD storage is fragile: it keeps what is wrong (5.3.3, Table 5.2)",
         "reproduced without any spike"
         if _svd_suffers(by_path["eight"])
         else "not reproduced in these runs",
@@ -181,7 +182,7 @@ def goals(by_path: Paths) -> list[Verdict]:
         Verdict(
             "(goal) with the best observer and freezes at least twice as good as ABS",
             "reached" if all(s.high < 0.5 for s in shares.values()) else "not by all",
-            f"share of the error of ABS: {told(shares)}",
+            f"share of the error of ABS: {listed(shares)}",
         ),
     ]
 

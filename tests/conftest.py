@@ -1,20 +1,25 @@
-"""What several tests share: the built FMUs, and a scenario to vary."""
+"""What several tests share: the built FMUs, scenarios to vary, and how the tests are spread over processes."""
 
+import gc
+import hashlib
 import json
 import os
 import signal
-import textwrap
-import zipfile
-from pathlib import Path
+from functools import partial
+from types import SimpleNamespace
 
 import pytest
+from support.plain import make_fmu, ramp_and_gain, with_unit
+from support.project import ROOT
+from support.serial import Serial
+from support.shared import keep_in, once, shared_folder
 
-from cosim.fmu import Model
-from cosim.instance import Instance
+from cosim.fmu import LocalInstance, Model, archive_check
+from cosim.master import loop_surroundings
+from cosim.system import own_fmus
 from fmus.build import build
-from fmus.declare import discover
+from fmus.build.building import cache_folder
 
-ROOT = Path(__file__).parent.parent
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
 ACCEPTED = (
     "no measured runs",
@@ -23,18 +28,40 @@ ACCEPTED = (
     "no binary for",
     "root may write",
 )
-COMPONENTS = {component.name: component for _, component in discover()}
 
 
-def pytest_configure():
-    """A shell that starts the tests in the background makes them, and what they start, deaf to Ctrl-C."""
+def pytest_configure(config):
+    """Settings of this process, and through the environment of the workers and of what the tests start.
+
+    A shell that starts the tests in the background makes them deaf to Ctrl-C. Without byte code on the disk,
+    each of the hundreds of processes compiles the project anew.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    if getattr(config.option, "numprocesses", None):
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the worker processes take the cores
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    """Slow tests first, so that no worker process is left alone with one at the end."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """A worker that has finished takes tests from another one, unless ``--dist`` says otherwise."""
+    if config.getvalue("dist") != "load":
+        return None
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport():
-    """A skip that nobody expected fails where all tools must be there, as on the machine of the gate."""
+    """An unexpected skip fails where all tools must be installed, as on the machine of the gate."""
     report = yield
     if (
         report.skipped
@@ -47,24 +74,99 @@ def pytest_runtest_makereport():
     return report
 
 
-@pytest.fixture(autouse=True, scope="session")
-def _private_cache(tmp_path_factory):
-    """FMUs built by the tests do not touch the user's cache."""
-    os.environ["CYBERSHIP_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """A folder that all worker processes of this session see."""
+    return shared_folder(tmp_path_factory)
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _first_library(_private_cache):
-    """The first pythonfmu library of a process is one that the master puts to rest (see Instance.free)."""
+def _session_cache(shared):
+    """FMUs and results are made once for all worker processes, and not into the user's cache."""
+    keep_in(shared)
+    os.environ["CYBERSHIP_CACHE"] = str(shared / "cache")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _first_library(_session_cache):
+    """The first pythonfmu library of a process is one that the master finalises (see Component.free)."""
     model = Model(build(["vessel"])[0])
-    Instance("first", model, print).free()
+    LocalInstance("first", model, print).free()
     model.close()
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory, _private_cache):
+def fmus(_session_cache):
     """Name -> path of every FMU of the project."""
-    return {path.stem: path for path in build([], tmp_path_factory.mktemp("fmus"))}
+    return {path.stem: path for path in build([])}
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _ask_the_builder_once(_session_cache):
+    """Scenarios that this process loads need one process of the builder for each FMU, not for each load.
+
+    Processes that the tests start, and tests with a cache of their own, ask it as always.
+    """
+    ask, cache, known = own_fmus.run_builder, cache_folder(), {}
+
+    def builder(*arguments):
+        if arguments[0] != "--" or cache_folder() != cache:
+            return ask(*arguments)
+        names = arguments[1:]
+        if missing := [name for name in names if name not in known]:
+            known.update(zip(missing, ask("--", *missing), strict=True))
+        return [known[name] for name in names]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(own_fmus, "run_builder", builder)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _unpack_once(shared):
+    """Our FMUs are unpacked once for all runs, where the byte code of their modules stays, too."""
+    own, unpack = cache_folder(), Model.unpack
+
+    def unpacked(model):
+        if model._folder is None and own in model.path.parents:
+            content = hashlib.sha256(model.path.read_bytes()).hexdigest()[:16]
+            model._folder = once(
+                shared / f"unpacked_{content}", partial(archive_check.unpack, model.path)
+            )
+            model._owns_folder = False
+        return unpack(model)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Model, "unpack", unpacked)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _collect_young_garbage_only():
+    """Before each run the master collects all garbage; here that of hundreds of tests would be searched."""
+    functions = {name: getattr(gc, name) for name in dir(gc) if not name.startswith("_")}
+    light = SimpleNamespace(**functions | {"collect": partial(gc.collect, 1)})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop_surroundings, "gc", light)
+        yield
+
+
+@pytest.fixture
+def serial(monkeypatch):
+    """Runs of a study one after the other in this process; test_studies.py covers the pool of processes.
+
+    Each process of the pool would import everything and start the builder for each of its runs.
+    """
+    monkeypatch.setattr("studies.monte_carlo.ProcessPoolExecutor", Serial)
+
+
+@pytest.fixture
+def short_loops(monkeypatch):
+    """The closed loops of the check of a learned model last 30 s, for tests that are about something else."""
+    from diagnosis.assessment import stability
+
+    short = tuple(r._replace(seconds=30.0) for r in stability.REFERENCES)
+    monkeypatch.setattr(stability, "REFERENCES", short)
 
 
 @pytest.fixture
@@ -78,57 +180,8 @@ def ellipse():
 
 @pytest.fixture
 def plain_fmu(tmp_path):
-    """A function that makes an FMU with plain pythonfmu, as somebody else would.
-
-    Arguments: a unique name, the body of ``__init__``, the body of ``do_step``, and edits of the model
-    description as (old, new) pairs.
-    """
-    from pythonfmu.builder import FmuBuilder
-
-    def make(name, init, step="return True", edits=()):
-        script = tmp_path / f"{name}.py"
-        script.write_text(
-            "import math, os, time\n"
-            "from pythonfmu import *\n"
-            "from pythonfmu.enums import Fmi2Status\n\n"
-            f"class {name}(Fmi2Slave):\n"
-            "    def __init__(self, **kwargs):\n"
-            "        super().__init__(**kwargs)\n"
-            f"{indent(init, 8)}\n"
-            "    def do_step(self, t, h):\n"
-            f"{indent(step, 8)}\n"
-        )
-        fmu = FmuBuilder.build_FMU(script, dest=tmp_path)
-        if edits:
-            _edit(fmu, edits)
-        return fmu
-
-    return make
-
-
-def indent(text, spaces):
-    return textwrap.indent(textwrap.dedent(text), " " * spaces)
-
-
-def _edit(fmu, edits):
-    with zipfile.ZipFile(fmu) as archive:
-        content = {name: archive.read(name) for name in archive.namelist()}
-    xml = content["modelDescription.xml"].decode()
-    for old, new in edits:
-        assert old in xml, old
-        xml = xml.replace(old, new)
-    content["modelDescription.xml"] = xml.encode()
-    with zipfile.ZipFile(fmu, "w") as archive:
-        for name, data in content.items():
-            archive.writestr(name, data)
-
-
-GAIN = """
-self.x = 0.0
-self.y = 0.0
-self.register_variable(Real("x", causality=Fmi2Causality.input))
-self.register_variable(Real("y", causality=Fmi2Causality.output))
-"""
+    """A function that makes an FMU with plain pythonfmu: ``make_fmu`` in the folder of the test."""
+    return partial(make_fmu, tmp_path)
 
 
 @pytest.fixture
@@ -144,41 +197,14 @@ def own(portable):
     return portable
 
 
-def with_unit(name, base):
-    """Edits of a model description that give all its Reals a unit, defined by attributes of BaseUnit."""
-    definition = f'<UnitDefinitions><Unit name="{name}"><BaseUnit {base}/></Unit></UnitDefinitions>'
-    return [("<LogCategories>", f"{definition}<LogCategories>"), ("<Real", f'<Real unit="{name}"')]
-
-
 @pytest.fixture
-def chain(plain_fmu, tmp_path):
+def chain(plain_fmu):
     """Two foreign FMUs: a ramp, and a gain with a parameter that only it knows."""
-    return ramp_and_gain(plain_fmu, tmp_path)
+    return ramp_and_gain(plain_fmu)
 
 
 @pytest.fixture
-def angles(plain_fmu, tmp_path):
+def angles(plain_fmu):
     """The same, where the ramp is in degrees and the gain in radians."""
     degrees = with_unit("deg", 'rad="1" factor="0.017453292519943295"')
-    return ramp_and_gain(plain_fmu, tmp_path, degrees, with_unit("rad", 'rad="1"'))
-
-
-def ramp_and_gain(plain_fmu, tmp_path, ramp_edits=(), gain_edits=()):
-    plain_fmu("Ramp", "self.y = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))",
-              "self.y += h\nreturn True", ramp_edits)  # fmt: skip
-    plain_fmu(
-        "Gain",
-        "self.u = 0.0\nself.y = 0.0\nself.k = 1.0\n"
-        "self.register_variable(Real('u', causality=Fmi2Causality.input))\n"
-        "self.register_variable(Real('y', causality=Fmi2Causality.output))\n"
-        "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
-        " variability=Fmi2Variability.tunable))",
-        "self.y = self.k * self.u\nreturn True",
-        gain_edits,
-    )
-    return {
-        "name": "chain", "step": 0.25, "stop": 1.0, "algorithm": "jacobi",
-        "fmus": {"ramp": {"path": str(tmp_path / "Ramp.fmu")},
-                 "gain": {"path": str(tmp_path / "Gain.fmu"), "parameters": {"k": 3.0}}},
-        "connections": [["ramp.y", "gain.u"]],
-    }  # fmt: skip
+    return ramp_and_gain(plain_fmu, degrees, with_unit("rad", 'rad="1"'))

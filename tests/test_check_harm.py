@@ -7,10 +7,9 @@ import sys
 import time
 from pathlib import Path
 
-import ccode
-import lag
 import pytest
-from conftest import ROOT
+from support import ccode, lag
+from support.project import ROOT
 
 from fmus.check.examine import examine
 from fmus.check.fmu import Fmu

@@ -6,14 +6,16 @@ import random
 import subprocess
 import sys
 
-import ccode
 import numpy as np
 import pytest
-from conftest import COMPONENTS
+from support import ccode
+from support.cases import slow
+from support.project import COMPONENTS
 
 from fmus import ops
+from fmus.base_units import base_exponents
 from fmus.declare import Component, DeclarationError, flatten, packer, rebuild, variables
-from fmus.trace import (
+from fmus.fmi.trace import (
     TraceError,
     evaluate,
     initial_dependencies,
@@ -23,9 +25,15 @@ from fmus.trace import (
     used_variables,
     variable,
 )
-from fmus.units import base_exponents
 
 every_component = pytest.mark.parametrize("name", COMPONENTS)
+# Their stores make traces of up to 34,000 operations, at which a C compiler takes seconds.
+LARGE = [name for name in COMPONENTS if name.startswith("controller_cl_")]
+# The two of them that take longest; controller_cl_svd_z2 and controller_cl_win_eps are like them.
+LONGEST = ("controller_cl_svd_eps", "controller_cl_win_eps_all")
+every_component_longest_slow = pytest.mark.parametrize(
+    "name", [slow(n) if n in LONGEST else n for n in COMPONENTS]
+)
 
 
 def arguments(component, rng, spread=0.5):
@@ -54,7 +62,7 @@ def directly(component, params, inputs, state, h):
     return flatten(new) + flatten(outputs)
 
 
-@every_component
+@every_component_longest_slow
 def test_traced_component_computes_what_the_plain_one_does(name):
     """Also proves the style rules: what cannot be traced raises TraceError."""
     component = COMPONENTS[name]
@@ -75,7 +83,7 @@ def test_traced_initial_state_is_the_plain_one(name):
     assert evaluate(trace.state, values_of(params, inputs, (), 0.0)) == flatten(state)
 
 
-@every_component
+@pytest.mark.parametrize("name", [slow(n) if n in LARGE else n for n in COMPONENTS])
 @pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
 def test_same_source_in_c_computes_the_same(name, tmp_path):
     component = COMPONENTS[name]
@@ -128,7 +136,7 @@ def test_everything_is_declared(name):
     assert inspect.getmodule(component.step).__doc__
 
 
-@every_component
+@every_component_longest_slow
 def test_dependencies_hold_against_perturbation(name):
     """An input moves an output within one step if and only if it is declared to."""
     component = COMPONENTS[name]

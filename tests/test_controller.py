@@ -41,10 +41,10 @@ def rich_target(t):
 
 def closed_loop(component, params, seconds, h=H, start=None, plant=None):
     """Yield (time, vessel state, controller state, inputs, outputs), with true states fed back."""
-    plant = plant or vessel.Params()
+    plant = plant or vessel.COMPONENT.params()
     s = start or vessel.State()
     cs = component.init(Inputs(true_estimate(s), rich_target(0.0)), params)
-    b = vessel.hull(plant)
+    b = vessel.COMPONENT.prepare(plant).hull
     for k in range(round(seconds / h)):
         i = Inputs(true_estimate(s), rich_target(k * h))
         cs, out = component.step(cs, i, params, h)
@@ -101,7 +101,7 @@ def test_adaptation_recovers_known_parameters_under_rich_motion():
 def test_adaptation_approaches_four_unknown_parameters():
     """r and |r|r are alike at the same yaw rates, so this takes long: the error falls to a seventh."""
     only = RotationalDamping(Y_absr_v=0.0, Y_absv_r=0.0, N_absr_v=0.0, N_absv_r=0.0)
-    plant = vessel.Params(damping=Damping(rotational=only))
+    plant = vessel.COMPONENT.params(damping=Damping(rotational=only))
     gamma = ROTATIONAL.gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
     params = Params(gamma=gamma)
     *_, (_, _, state, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)
@@ -127,7 +127,7 @@ def test_earth_fixed_force_is_found():
         phi=ROTATIONAL.start(*TRUE_PHI), gamma=ROTATIONAL.gamma(*[0.0] * 8), disturbance=disturbance
     )
     north, east, h = 0.2, -0.1, 0.01
-    s, b = vessel.State(), vessel.hull(vessel.Params())
+    s, b = vessel.State(), vessel.COMPONENT.prepare(vessel.COMPONENT.params()).hull
     cs = ABS.init(None, params)
     for k in range(20000):
         cs, out = ABS.step(cs, Inputs(true_estimate(s), rich_target(k * h)), params, h)
@@ -143,7 +143,7 @@ def test_force_is_the_sum_of_its_parts_and_omega_hat_is_the_models():
     linear = (out.tau_lin_X, out.tau_lin_Y, out.tau_lin_N)
     nonlinear = (out.tau_nonlin_X, out.tau_nonlin_Y, out.tau_nonlin_N)
     assert tuple(out.tau) == pytest.approx([a + b for a, b in zip(linear, nonlinear, strict=True)])
-    _, plant = vessel.COMPONENT.step(s, Force(), vessel.Params(), 0.0)
+    _, plant = vessel.COMPONENT.step(s, Force(), vessel.COMPONENT.params(), 0.0)
     assert (out.omega_hat_Y, out.omega_hat_N) == pytest.approx((plant.omega_star_Y, plant.omega_star_N))
 
 

@@ -1,35 +1,41 @@
 """Judging samples: what was put in is found and counted, and what cannot be used is refused."""
 
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from measured import NOISE, changed, sail
+from support.measured import NOISE, changed, sail
 
 from diagnosis import InputError, clean
-from diagnosis.cleaning import in_order, noise, unwrap
+from diagnosis.data.cleaning import in_order, noise, unwrap
 
-RUN, _ = sail(24.0)
-N = RUN.time.size
+N = 1200
+
+
+@cache
+def base():
+    """The run that is varied."""
+    return sail(24.0)[0]
 
 
 def test_a_sound_run_is_used_as_it_is():
-    track = clean(RUN)
+    track = clean(base())
     assert tuple(track.counts()) == (N, 0, 0, 0, N)
     assert track.notes == ()
     assert track.period == pytest.approx(0.02)
-    np.testing.assert_array_equal(track.pose[:, :2], RUN.pose[:, :2])
-    turns = (track.pose[:, 2] - RUN.pose[:, 2]) / (2.0 * np.pi)
+    np.testing.assert_array_equal(track.pose[:, :2], base().pose[:, :2])
+    turns = (track.pose[:, 2] - base().pose[:, 2]) / (2.0 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
     assert np.abs(np.diff(track.pose[:, 2])).max() < 0.1
     assert np.abs(turns).max() >= 1.0, "the heading has wrapped"
 
 
 def test_every_fault_is_counted_exactly():
-    run = changed(RUN, slice(100, 120), RUN.pose[99])
+    run = changed(base(), slice(100, 120), base().pose[99])
     run = changed(run, slice(300, 307), np.nan)
     run = changed(run, slice(400, 403), 0.0)
     run = changed(run, 500, (np.inf, 1.0, 1.0))
@@ -43,24 +49,24 @@ def test_every_fault_is_counted_exactly():
 
 
 def test_freeze_with_a_dropout_in_it_is_one_freeze():
-    run = changed(RUN, slice(100, 120), RUN.pose[99])
+    run = changed(base(), slice(100, 120), base().pose[99])
     run = changed(run, 110, np.nan)
     assert tuple(clean(run).counts())[:3] == (N, 19, 1)
 
 
 def test_one_channel_that_repeats_is_no_freeze():
-    pose = RUN.pose[200].copy()
-    pose[:2] = RUN.pose[199, :2]
-    assert clean(changed(RUN, 200, pose)).counts().frozen == 0
+    pose = base().pose[200].copy()
+    pose[:2] = base().pose[199, :2]
+    assert clean(changed(base(), 200, pose)).counts().frozen == 0
 
 
 def test_time_stamps_that_repeat_or_go_backwards_are_left_out():
-    time = RUN.time.copy()
+    time = base().time.copy()
     time[300] = time[299]
     time[500] = 3.0
     time[700] = np.nan
     time[900] = 1e9
-    track = clean(replace(RUN, time=time))
+    track = clean(replace(base(), time=time))
     assert tuple(track.counts()) == (N, 0, 4, 0, N - 4)
     assert (np.diff(track.run.time) > 0.0).all()
     assert "4 rows left out" in track.notes[0]
@@ -68,15 +74,15 @@ def test_time_stamps_that_repeat_or_go_backwards_are_left_out():
 
 def test_gap_is_told():
     keep = np.r_[0:400, 500:N]
-    track = clean(RUN.rows(keep))
+    track = clean(base().rows(keep))
     assert track.counts().samples == keep.size
     assert track.notes == ("1 gaps, the longest 2.02 s at 7.98 s",)
 
 
 def test_rows_between_two_measurements_are_no_freeze():
-    slow = RUN.pose[np.arange(N) // 5 * 5]
+    slow = base().pose[np.arange(N) // 5 * 5]
     slow[500:600] = slow[499]
-    track = clean(replace(RUN, pose=slow))
+    track = clean(replace(base(), pose=slow))
     assert track.period == pytest.approx(0.1)
     fresh = int(track.valid.sum())
     assert fresh == N // 5 - 20
@@ -87,7 +93,7 @@ def test_rows_between_two_measurements_are_no_freeze():
 
 def test_heading_about_south_is_taken_for_radians():
     psi = np.angle(np.exp(1j * (np.pi + 0.01 * np.random.default_rng(0).standard_normal(N))))
-    track = clean(replace(RUN, pose=np.column_stack([RUN.pose[:, :2], psi])))
+    track = clean(replace(base(), pose=np.column_stack([base().pose[:, :2], psi])))
     assert np.ptp(track.pose[:, 2]) < 0.1
 
 
@@ -110,7 +116,7 @@ def test_longest_part_in_order_is_found(values):
 
 
 def test_noise_is_found_in_spite_of_motion_and_spikes():
-    pose = clean(RUN).pose.copy()
+    pose = clean(base()).pose.copy()
     np.testing.assert_allclose(noise(pose), NOISE, rtol=0.1)
     pose[::50] += 1.0
     np.testing.assert_allclose(noise(pose), NOISE, rtol=0.25)
@@ -141,10 +147,10 @@ def twice(run):
 )  # fmt: skip
 def test_run_that_cannot_be_used_is_refused_with_one_line(edit, message):
     with pytest.raises(InputError) as error:
-        clean(edit(RUN))
+        clean(edit(base()))
     assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_shortest_run_is_taken():
-    assert clean(RUN.rows(np.arange(400))).counts().used == 400
+    assert clean(base().rows(np.arange(400))).counts().used == 400

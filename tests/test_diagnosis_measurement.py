@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from measured import DATA, needs_data
 from scipy.io import savemat
+from support.measured import DATA, needs_data
 
 import cosim
 import diagnosis
-from diagnosis.columns import FIVE, POWER, TAU, THREE
-from diagnosis.measurement import force
+from diagnosis.data.columns import FIVE, POWER, TAU, THREE
+from diagnosis.data.reading import force
 from fmus.thrusters.allocation import Allocation, thrust
 
 N = 400

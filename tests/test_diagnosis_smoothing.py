@@ -1,20 +1,50 @@
 """The smoother: the same as Kalman's and Rauch's, honest about its uncertainty, hard on spikes."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from measured import DATA, NOISE, changed, needs_data, sail
 from scipy.linalg import cholesky_banded
+from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Run, clean, read, smooth
-from diagnosis.spline import basis, gram, inverse_band, knots, penalty, third, variance
+from diagnosis.smoothing.likelihood import Criterion, likeliest
+from diagnosis.smoothing.penalised import Problem
+from diagnosis.smoothing.spline import (
+    basis,
+    gram,
+    inverse_band,
+    knots,
+    penalty,
+    roughness,
+    third,
+    variance,
+)
 
-RUN, NU = sail(60.0)
-SMOOTHED = smooth(clean(RUN))
-N = RUN.time.size
+pytestmark = pytest.mark.numerical
+N = 3000
 INNER = slice(100, -100)
 JERK = np.array([2e-5, 5e-6, 2e-4])
+
+
+@cache
+def sailed():
+    """The run that is varied, and its true velocity (n, 3)."""
+    return sail(60.0)
+
+
+def base():
+    return sailed()[0]
+
+
+def true_nu():
+    return sailed()[1]
+
+
+@cache
+def smooth_base():
+    return smoothed(base())
 
 
 def white_jerk(time, seed):
@@ -59,7 +89,9 @@ def kalman_and_rauch(time, z, valid, q, sigma):
 
 
 def test_same_as_kalman_filter_and_rauch_smoother(monkeypatch):
-    monkeypatch.setattr("diagnosis.fitting.ADAPTIONS", 0)  # the jerk is equally strong throughout
+    monkeypatch.setattr(
+        "diagnosis.smoothing.likelihood.ADAPTIONS", 0
+    )  # the jerk is equally strong throughout
     time = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.03, 1000))
     run, _ = white_jerk(time, 2)
     run = changed(run, slice(400, 440), np.nan)
@@ -101,11 +133,11 @@ def test_uncertainty_is_honest_and_parameters_are_found():
 
 
 def test_velocity_of_a_ship_is_unbiased_and_sharp():
-    error = (SMOOTHED.nu - NU)[INNER]
+    error = (smooth_base().nu - true_nu())[INNER]
     assert np.abs(error.mean(axis=0)).max() < 5e-5
     rms = np.sqrt(np.mean(error**2, axis=0))
     assert (rms < (5e-4, 5e-4, 1e-3)).all(), "below half a millimetre per second"
-    normalised = np.sqrt(np.mean((error / SMOOTHED.nu_std[INNER]) ** 2, axis=0))
+    normalised = np.sqrt(np.mean((error / smooth_base().nu_std[INNER]) ** 2, axis=0))
     assert ((normalised > 0.5) & (normalised < 1.6)).all()
 
 
@@ -117,69 +149,108 @@ def test_without_noise_nothing_is_lost():
 
 
 def test_channel_that_rests_is_no_trouble():
-    pose = RUN.pose.copy()
+    pose = base().pose.copy()
     pose[:, 1] = 2.0
-    s = smooth(clean(replace(RUN, pose=pose)))
+    s = smooth(clean(replace(base(), pose=pose)))
     assert np.abs(s.eta_dot[:, 1]).max() < 5e-8
-    assert np.abs(s.nu - SMOOTHED.nu)[INNER, 2].max() < 5e-4
+    assert np.abs(s.nu - smooth_base().nu)[INNER, 2].max() < 5e-4
 
 
 def test_same_ship_elsewhere_and_later_gives_the_same_velocity():
     turn = 1.2
     c, d = np.cos(turn), np.sin(turn)
-    x, y, psi = RUN.pose.T
+    x, y, psi = base().pose.T
     pose = np.column_stack([40.0 + c * x - d * y, d * x + c * y - 7.0, psi + turn])
-    s = smooth(clean(replace(RUN, pose=pose, time=RUN.time + 1e5)))
-    assert np.abs(s.nu - SMOOTHED.nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
-    moved = smooth(clean(replace(RUN, pose=RUN.pose + np.array([40.0, -7.0, 0.0]))))
-    np.testing.assert_allclose(moved.nu, SMOOTHED.nu, atol=2e-5)
+    s = smooth(clean(replace(base(), pose=pose, time=base().time + 1e5)))
+    assert np.abs(s.nu - smooth_base().nu)[INNER].max() < 5e-4  # noise of x and y is weighted anew
+    moved = smooth(clean(replace(base(), pose=base().pose + np.array([40.0, -7.0, 0.0]))))
+    np.testing.assert_allclose(moved.nu, smooth_base().nu, atol=2e-5)
+
+
+@pytest.mark.parametrize("shift", [(10.0, 10.0), (40.0, -7.0), (1e4, -1e4)])
+def test_origin_does_not_matter(shift):
+    moved = smooth(clean(replace(base(), pose=base().pose + np.array([*shift, 0.0]))))
+    np.testing.assert_allclose(moved.nu, smooth_base().nu, atol=1e-9)
+    np.testing.assert_allclose(moved.nu_std, smooth_base().nu_std, rtol=1e-8)
+    np.testing.assert_allclose(moved.jerk, smooth_base().jerk, rtol=1e-8)
+
+
+@pytest.mark.parametrize("later", [1e5, 1e6])
+def test_start_of_time_does_not_matter(later):
+    s = smooth(clean(replace(base(), time=base().time + later)))
+    np.testing.assert_allclose(s.nu, smooth_base().nu, atol=1e-8)
+    np.testing.assert_allclose(s.jerk, smooth_base().jerk, rtol=1e-6)  # time stamps of 1e-10 s
+
+
+def test_smoothness_has_the_largest_likelihood():
+    """The root of the derivative is a minimum of -2 log L, and the derivative that of its differences."""
+    grid = knots(np.array([0.0]), np.array([20.0]), 0.05)
+    time = 0.02 * np.arange(1000)
+    z = 1e3 + np.sin(time)[:, None] + 1e-3 * np.random.default_rng(0).standard_normal((1000, 3))
+    p = Problem(
+        np.arange(1000), z, basis(grid, time), grid, roughness(grid), np.ones((3, 400)), np.full(3, 1e-3)
+    )
+    best, cost = likeliest(p, np.ones(1000))
+    again, same = likeliest(p, np.ones(1000), 30.0 * best)
+    np.testing.assert_allclose(again, best, rtol=1e-9)
+    assert same == pytest.approx(cost, abs=1e-6)
+    criteria = [Criterion(p, np.ones(1000), c) for c in range(3)]
+    values = [
+        sum(f.cost(np.log10(s) + off) for f, s in zip(criteria, best, strict=True))
+        for off in (-0.1, 0.1)
+    ]
+    assert min(values) > cost + 1e-3
+    for f, s in zip(criteria, best, strict=True):
+        at, h = np.log10(s) + 0.5, 1e-3
+        slope = (f.cost(at + h) - f.cost(at - h)) / (2.0 * h * np.log(10.0))
+        assert f.slope(at) == pytest.approx(slope, rel=1e-4)
 
 
 def test_spikes_are_found_and_nothing_else():
-    sound = np.flatnonzero(SMOOTHED.spikes)
+    sound = np.flatnonzero(smooth_base().spikes)
     rows = np.arange(75, N, 150)
     rows = rows[~np.isin(rows, sound)]
     far = 12.0 * NOISE * np.random.default_rng(0).choice([-1, 1], (rows.size, 3))
-    s = smooth(clean(changed(RUN, rows, RUN.pose[rows] + far)))
+    s = smooth(clean(changed(base(), rows, base().pose[rows] + far)))
     assert set(np.flatnonzero(s.spikes)) == {*rows, *sound}
     assert s.counts.used == N - rows.size - sound.size
-    assert np.abs(s.nu - SMOOTHED.nu).max() < 3e-3
+    assert np.abs(s.nu - smooth_base().nu).max() < 3e-3
 
 
 @pytest.mark.parametrize("size", [0.05, 1.0, 1e6, 1e300])
 def test_bursts_and_absurd_values_do_no_harm(size):
     rows = np.r_[500:503, 1000, 1500:1506]
-    pose = RUN.pose[rows] + [size, 0.0, 0.0]
-    s = smooth(clean(changed(RUN, rows, pose)))
+    pose = base().pose[rows] + [size, 0.0, 0.0]
+    s = smooth(clean(changed(base(), rows, pose)))
     assert s.spikes[rows].all()
     assert s.counts.spikes <= rows.size + 2
-    assert np.abs(s.nu - SMOOTHED.nu).max() < 5e-3
+    assert np.abs(s.nu - smooth_base().nu).max() < 5e-3
 
 
 def test_uncertainty_grows_in_a_gap_and_a_long_one_is_left_out():
-    s = smooth(clean(changed(RUN, np.r_[500:600, 1500:1800], np.nan)))
+    s = smooth(clean(changed(base(), np.r_[500:600, 1500:1800], np.nan)))
     inside, outside = s.eta_std[550], s.eta_std[400]
     assert (inside > 3.0 * outside).all()
-    assert (np.abs(s.eta[550, :2] - RUN.pose[550, :2]) < 6.0 * inside[:2] + 5.0 * NOISE[:2]).all()
+    assert (np.abs(s.eta[550, :2] - base().pose[550, :2]) < 6.0 * inside[:2] + 5.0 * NOISE[:2]).all()
     assert np.isnan(s.eta[1500:1800]).all()
     assert np.isfinite(s.eta[1800:]).all()
     assert not s.used[1500:1800].any()
 
 
 def test_stretch_in_which_nothing_agrees_is_refused_as_spikes():
-    wild = changed(RUN, np.r_[1000:1200, 1400:1600], np.nan)
+    wild = changed(base(), np.r_[1000:1200, 1400:1600], np.nan)
     wild = changed(wild, slice(1200, 1400), 3.0 * np.random.default_rng(0).standard_normal((200, 3)))
     s = smooth(clean(wild))
     assert s.spikes[1200:1400].mean() > 0.9
-    assert np.abs(s.nu - SMOOTHED.nu)[:900].max() < 1e-3
+    assert np.abs(s.nu - smooth_base().nu)[:900].max() < 1e-3
 
 
 def test_run_of_crumbs_is_refused():
-    crumbs = np.full_like(RUN.pose, np.nan)
+    crumbs = np.full_like(base().pose, np.nan)
     for k in range(0, N, 400):
-        crumbs[k : k + 10] = RUN.pose[k : k + 10]
+        crumbs[k : k + 10] = base().pose[k : k + 10]
     with pytest.raises(InputError, match="nowhere 20 samples without a long gap"):
-        smooth(clean(replace(RUN, pose=crumbs)))
+        smooth(clean(replace(base(), pose=crumbs)))
 
 
 def test_spline_is_exact_for_a_quintic():

@@ -5,25 +5,26 @@ import random
 import subprocess
 import sys
 
-import ccode
 import fmpy
 import numpy as np
 import pytest
-from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
+from support import ccode
+from support.project import ROOT
 
 from fmus.declare import flatten, packer, variables
-from fmus.effects import EFFECTS, Running, Ship, Thrust, effects
+from fmus.effects import STANDARD, Motion, Running, Thrust
 from fmus.effects.__main__ import table as effects_table
 from fmus.effects.environment import surface
+from fmus.fmi.trace import trace_step
 from fmus.frames import rotate_to_earth
 from fmus.hull import Inertia
 from fmus.signals import Force, Velocity
 from fmus.thrusters import propeller, table, thrusters
-from fmus.thrusters.chain import Inputs, Past
-from fmus.trace import trace_step
-from fmus.vessel.vessel import CHANGES, COMPONENT, OUTSIDE, Params, Start, State
+from fmus.thrusters.chain import Inputs
+from fmus.vessel.vessel import COMPONENT, Start, State
+from fmus.vessel.vessel_effects import vessel_effects
 
 CONTRACT = [
     "X_u",
@@ -78,7 +79,9 @@ CONTRACT = [
     "curve_vsp_x(c)",
     "curve_bow(|u|)",
 ]
-LINEAR = [e.id for e in EFFECTS.values() if e.linear and e.kind in ("force", "environment")]
+Params = COMPONENT.params
+CHANGES, OUTSIDE = vessel_effects(STANDARD).changes, vessel_effects(STANDARD).outside
+LINEAR = [e.id for e in STANDARD.values() if e.linear and e.kind in ("force", "environment")]
 speeds = st.floats(-0.6, 0.6)
 
 
@@ -101,25 +104,26 @@ def sail(p, seconds=5.0, h=0.01, tau=Force(0.5, 0.2, 0.1), start=None):
 
 
 def test_every_effect_of_the_contract_is_registered():
-    assert set(CONTRACT) <= set(EFFECTS)
+    assert set(CONTRACT) <= set(STANDARD)
 
 
 def test_every_parameter_of_an_effect_is_one_of_an_fmu():
     declared = {v.name for v in COMPONENT.variables} | {v.name for v in thrusters.COMPONENT.variables}
-    missing = [p.name for e in EFFECTS.values() for p in e.parameters if p.name not in declared]
+    of_fmus = [e for e in STANDARD.values() if e.function is not None]
+    missing = [p.name for e in of_fmus for p in e.parameters if p.name not in declared]
     assert not missing
     assert "delta_X_absu_u" in declared
     assert "delta_Y_absr_v" in declared
 
 
 def test_coefficients_start_at_zero_and_can_be_tuned():
-    for e in EFFECTS.values():
+    for e in STANDARD.values():
         for p in e.parameters:
             assert not p.fixed
             assert p.start == 0.0 or p.name not in e.coefficients
 
 
-@pytest.mark.parametrize("e", effects("force")[: len(CHANGES.members)], ids=lambda e: e.id)
+@pytest.mark.parametrize("e", STANDARD.of_kind("force")[: len(CHANGES.members)], ids=lambda e: e.id)
 def test_damping_like_force_is_the_coefficient_times_the_product_in_its_name(e):
     axis, _, text = e.id.partition("_")
     assert e.axis == axis
@@ -132,16 +136,16 @@ def test_damping_like_force_is_the_coefficient_times_the_product_in_its_name(e):
                 expected, rest = expected * abs(values[rest[1]]), rest[3:]
             else:
                 expected, rest = expected * values[rest[0]], rest[1:]
-        force = dict(zip("XYN", e.function(Ship(**values), 2.5), strict=True))
+        force = dict(zip("XYN", e.function(Motion(**values), 2.5), strict=True))
         assert force.pop(axis) == pytest.approx(expected, abs=1e-15)
         assert all(value == 0.0 for value in force.values())
 
 
 @pytest.mark.parametrize("name", LINEAR)
 def test_regressors_carry_the_whole_effect(name):
-    e = EFFECTS[name]
+    e = STANDARD[name]
     rng = np.random.default_rng(2)
-    ship = Ship(*rng.uniform(-0.5, 0.5, (7, 30)))
+    ship = Motion(*rng.uniform(-0.5, 0.5, (7, 30)))
     weights = rng.uniform(0.0, 1.0, len(e.coefficients))
     given_ = dict(zip(e.coefficients, weights, strict=True))
     values = [given_.get(p.name, p.start) for p in e.parameters]
@@ -179,7 +183,7 @@ def test_without_effects_there_is_no_model_error_at_all():
 
 @given(st.floats(-3.0, 3.0), speeds, speeds)
 def test_earth_force_pushes_the_same_way_on_every_heading(psi, F_n, F_e):
-    X, Y, N = EFFECTS["earth_force"].function(Ship(psi=psi), F_n, F_e, 100.0, 0.0)
+    X, Y, N = STANDARD["earth_force"].function(Motion(psi=psi), F_n, F_e, 100.0, 0.0)
     assert rotate_to_earth(psi, X, Y) == pytest.approx((F_n, F_e), abs=1e-12)
     assert N == 0.0
 
@@ -213,7 +217,7 @@ def test_the_integration_stays_of_fourth_order_with_effects():
 
 def test_waves_have_the_strength_the_peak_and_the_drift_that_were_asked_for():
     t = np.arange(0.0, 3600.0, 0.05)
-    F = np.array(EFFECTS["waves"].function(Ship(t=t), 0.3, 0.1, 4.0, 0.0, 0.1)[0])
+    F = np.array(STANDARD["waves"].function(Motion(t=t), 0.3, 0.1, 4.0, 0.0, 0.1)[0])
     assert F.mean() == pytest.approx(0.1, abs=0.003)
     assert F.std() == pytest.approx(0.3, rel=0.02)
     spectrum = np.abs(np.fft.rfft(F - F.mean())) ** 2
@@ -261,7 +265,7 @@ def test_an_effect_switched_on_during_a_run_makes_no_jump():
 
 
 def push(p, request=(0.5, 0.3, 0.1), velocity=Velocity(), steps=1, h=0.01, model=thrusters):
-    s, out = Past(), None
+    s, out = model.COMPONENT.init(None, p), None
     for _ in range(steps):
         s, out = model.COMPONENT.step(s, Inputs(Force(*request), velocity), p, h)
     return out
@@ -344,10 +348,10 @@ def test_free_curves_pass_through_their_nodes():
     assert push(p, (0.5 * 1.165, 0.0, 0.0)).tau_act_X == pytest.approx(0.5 * 1.165 + 0.1)
     moving = push(p, (0.0, 0.0, 0.5), Velocity(0.3, 0.0, 0.0))
     assert act(moving) == pytest.approx(act(push(thruster_params(loss_bow=0.5), (0.0, 0.0, 0.5))))
-    ship = Ship(u=0.3)
+    ship = Motion(u=0.3)
     nodes = [0.0] * 21
     nodes[15] = 2.0
-    assert EFFECTS["curve_X(u)"].function(ship, *nodes, 0.6)[0] == pytest.approx(2.0)
+    assert STANDARD["curve_X(u)"].function(ship, *nodes, 0.6)[0] == pytest.approx(2.0)
 
 
 def test_lag_is_the_exact_exponential():
@@ -357,7 +361,8 @@ def test_lag_is_the_exact_exponential():
 
 @pytest.mark.parametrize("delay", [0.01, 0.2, 0.63, 3.0])
 def test_delay_brings_every_command_later(delay):
-    p, s = thruster_params(delay=delay), Past()
+    p = thruster_params(delay=delay)
+    s = thrusters.COMPONENT.init(None, p)
     acted = []
     for k in range(500):
         request = Force(0.5 if k >= 100 else 0.0, 0.0, 0.0)
@@ -403,7 +408,7 @@ def test_same_source_in_c_with_every_effect_on(component, tmp_path):
     trace = trace_step(component)
     run = ccode.compiled(trace.state + trace.outputs, tmp_path)
     rng = random.Random(4)
-    names = {p.name for e in EFFECTS.values() for p in e.parameters}
+    names = {p.name for e in STANDARD.values() for p in e.parameters}
     for _ in range(20):
         changed = {
             v.name: v.start + rng.uniform(0.0, 0.3) for v in component.variables if v.name in names
@@ -421,8 +426,8 @@ def test_same_source_in_c_with_every_effect_on(component, tmp_path):
 def test_actuator_effects_leave_what_they_do_not_concern():
     now = Running(0.0, 0.1, 0.0, 0.0, 0.3, 0.2, 0.1)
     f = Thrust(0.3, 0.2, 0.1)
-    for e in effects("actuator"):
-        if e.function is not None:
+    for e in STANDARD.of_kind("actuator"):
+        if e.memory is None:
             assert e.function(f, now, *[p.start for p in e.parameters]) == pytest.approx(f), e.id
 
 

@@ -6,16 +6,16 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from conftest import with_unit
-from exchanged import log_of, need, write
+from support.exchanged import log_of, need, write
+from support.plain import with_unit
 
 from cosim import InputError
-from cosim.exchange.groups import variable_groups
-from cosim.exchange.portable import file_stems
-from cosim.exchange.ssp import SPACES
 from cosim.export import export_fmu, export_osp, export_ssp
-from cosim.export import main as export
+from cosim.export.__main__ import main as export
+from cosim.files import file_stems
 from cosim.fmu import Model
+from cosim.formats.groups import variable_groups
+from cosim.formats.namespaces import SSP_SPACES
 from cosim.scenario import load_scenario
 from cosim.system import prepare
 
@@ -128,7 +128,7 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["notes.txt", "scenarios/mine.json", "empty/"])
-def test_an_osp_directory_with_a_file_of_somebody_is_not_replaced(chain, tmp_path, name):
+def test_an_osp_directory_with_other_files_is_not_replaced(chain, tmp_path, name):
     folder = tmp_path / "osp"
     write(chain, folder, export_osp)
     (folder / name).mkdir() if name.endswith("/") else (folder / name).write_text("mine")
@@ -252,7 +252,7 @@ def test_models_of_one_name_have_one_description_or_none(plain_fmu, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "convention"), [("ramp", "structured"), ("é ü-1", "flat")])
-def test_a_container_is_honest_about_its_names(chain, tmp_path, name, convention, caplog):
+def test_a_container_states_its_naming_convention(chain, tmp_path, name, convention, caplog):
     from fmpy import read_model_description
 
     need("container_jacobi")
@@ -276,7 +276,7 @@ def test_nothing_is_left_after_a_failure(portable, tmp_path, monkeypatch):
     def fail(*arguments):
         raise OSError("disk full")
 
-    monkeypatch.setattr("cosim.exchange.xml.write", fail)
+    monkeypatch.setattr("cosim.export.ssp.write_document", fail)
     for fmu in portable["fmus"].values():
         fmu.pop("parameters", None)
     with pytest.raises(InputError, match="disk full"):
@@ -318,7 +318,7 @@ def test_variable_groups_hold_what_belongs_together(fmus):
 
 def test_the_namespaces_are_those_of_the_standard():
     """libcosim and Ecos look for prefixes, FMPy for namespaces."""
-    assert {prefix: uri.rpartition("/")[2] for prefix, uri in SPACES.items()} == {
+    assert {prefix: uri.rpartition("/")[2] for prefix, uri in SSP_SPACES.items()} == {
         "ssd": "SystemStructureDescription",
         "ssc": "SystemStructureCommon",
         "ssv": "SystemStructureParameterValues",

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from hypothesis import given
 from hypothesis import strategies as st
+from support.project import ROOT
 
-from cosim import faults
 from cosim.errors import InputError
-from cosim.scenario import load_scenario
+from cosim.scenario import faults, load_scenario
 
 H = 0.01
 

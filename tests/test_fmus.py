@@ -7,76 +7,38 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from conftest import COMPONENTS, ROOT
-from fmpy import fmi2
 from fmpy.model_description import read_model_description
 from fmpy.validation import validate_fmu
+from support.command import command
+from support.opened import Opened
+from support.project import COMPONENTS, ROOT
 
-from fmus import build as builder
-from fmus import packing
-from fmus.build import BuildError, build
+from fmus.build import BuildError, build, building, packing
+from fmus.build.__main__ import main
 from fmus.declare import flatten, packer, width
 
 every_fmu = pytest.mark.parametrize("name", COMPONENTS)
 
 
-class Opened:
-    """An FMU instance with variables by name, for tests."""
-
-    def __init__(self, path, folder, name="instance"):
-        self.messages = []
-        self.folder = folder / f"{path.stem}_{name}"
-        fmpy.extract(str(path), str(self.folder))
-        d = read_model_description(str(path))
-        self.references = {v.name: v.valueReference for v in d.modelVariables}
-        self.outputs = [v.name for v in d.modelVariables if v.causality == "output"]
-        self.inputs = [v.name for v in d.modelVariables if v.causality == "input"]
-        self.fmu = fmi2.FMU2Slave(
-            instanceName=name,
-            guid=d.guid,
-            modelIdentifier=d.coSimulation.modelIdentifier,
-            unzipDirectory=str(self.folder),
-        )
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(
-            lambda env, instance, status, category, text: self.messages.append((status, text.decode()))
-        )
-        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-        self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
-
-    def initialise(self, **values):
-        self.fmu.setupExperiment(startTime=0.0)
-        self.set(**values)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-        return self
-
-    def set(self, **values):
-        self.fmu.setReal([self.references[k] for k in values], list(values.values()))
-
-    def get(self, *names):
-        return self.fmu.getReal([self.references[n] for n in names or self.outputs])
-
-    def step(self, t, h=0.01):
-        return self.fmu.doStep(t, h)
-
-    def close(self):
-        self.fmu.terminate()
-        self.fmu.freeInstance()
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory):
+    """Where the FMUs of the project are unpacked, once for all tests of this file."""
+    return tmp_path_factory.mktemp("unpacked")
 
 
 @pytest.fixture
-def opened(tmp_path, fmus):
+def opened(tmp_path, unpacked, fmus):
     """A function that opens an FMU by name or path; closed after the test."""
     instances = []
 
     def make(fmu, name="instance"):
-        instances.append(Opened(fmus.get(fmu, fmu), tmp_path, name))
+        folder = unpacked if fmu in fmus else tmp_path
+        instances.append(Opened(fmus.get(fmu, fmu), folder, name))
         return instances[-1]
 
     yield make
@@ -289,17 +251,9 @@ def test_controller_holds_its_last_good_input(opened):
     assert "x_hat is nan" in controller.messages[-1][1]
 
 
-def test_builds_are_byte_identical(fmus, tmp_path, monkeypatch):
-    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "another"))
-    for path in build([], tmp_path / "again"):
-        assert path.read_bytes() == fmus[path.stem].read_bytes()
-
-
-def run_build(*arguments, **options):
-    return subprocess.run(
-        [sys.executable, "-m", "fmus.build", *map(str, arguments)],
-        capture_output=True, text=True, cwd=ROOT, check=False, **options,
-    )  # fmt: skip
+def run_build(*arguments):
+    """The command in this process; files of effects, which it would keep, need one of their own."""
+    return command(main, *arguments)
 
 
 def test_command_line_builds_what_is_asked_for(tmp_path):
@@ -439,18 +393,25 @@ def test_source_change_gives_another_package_name(fmus):
     assert len(package.removeprefix("vessel_")) == 16
 
 
-def test_builds_at_the_same_time_do_not_disturb_each_other(tmp_path):
+@pytest.mark.parametrize(
+    "names", [["vessel", "guidance_ellipse"], pytest.param([], id="all", marks=pytest.mark.slow)]
+)
+def test_builds_at_the_same_time_do_not_disturb_each_other_and_are_byte_identical(names, fmus, tmp_path):
+    """Also to the FMUs of this session, which another process has built in another folder."""
     env = {**os.environ, "CYBERSHIP_CACHE": str(tmp_path)}
     runs = [
-        subprocess.Popen([sys.executable, "-m", "fmus.build"], stdout=subprocess.PIPE, text=True,
+        subprocess.Popen([sys.executable, "-m", "fmus.build", *names], stdout=subprocess.PIPE, text=True,
                          cwd=ROOT, env=env)
         for _ in range(4)
     ]  # fmt: skip
     outputs = [run.communicate()[0] for run in runs]
     assert all(run.returncode == 0 for run in runs)
     assert len(set(outputs)) == 1
-    for path in outputs[0].split():
-        assert validate_fmu(path) == []
+    paths = [Path(line) for line in outputs[0].splitlines()]
+    assert [path.stem for path in paths] == (names or list(fmus))
+    for path in paths:
+        assert validate_fmu(str(path)) == []
+        assert path.read_bytes() == fmus[path.stem].read_bytes()
     assert not list(tmp_path.rglob("*.part"))
 
 
@@ -463,7 +424,7 @@ def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
     copy = tmp_path / "source"
     shutil.copytree(ROOT / "fmus", copy, ignore=shutil.ignore_patterns("__pycache__"))
     (copy / "hull.py").write_text((copy / "hull.py").read_text() + "\n# changed\n")
-    for module in (builder, packing):
+    for module in (building, packing):
         monkeypatch.setattr(module, "ROOT", copy)
     (second,) = build(["vessel"])
     assert second != first
@@ -524,14 +485,16 @@ def test_file_names_that_cannot_work_are_refused(tmp_path, name):
         build([str(tmp_path / name)], tmp_path)
 
 
-@pytest.mark.parametrize("name", COMPONENTS)
+@every_fmu
 def test_parameters_at_their_limits_keep_outputs_finite(name, opened):
+    fmu = opened(name)
     for v in COMPONENTS[name].variables:
         for limit in (v.range.min, v.range.max):
             if limit is not None:
-                fmu = opened(name, f"{v.name}_{limit}").initialise(**{v.name: limit})
+                fmu.initialise(**{v.name: limit})
                 rows = play(fmu, random.Random(0), 3)
                 assert np.isfinite(rows).all(), (v.name, limit)
+                fmu.fmu.reset()
 
 
 def test_step_that_is_no_step_is_an_error(opened):

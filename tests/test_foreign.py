@@ -7,7 +7,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from foreign import ANY_STEP, STATE, build_lag, needs_compiler
+from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
 

@@ -5,7 +5,7 @@ import random
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS
+from support.project import COMPONENTS
 
 from fmus.declare import flatten, packer, variables
 
@@ -42,11 +42,12 @@ LIVELY = {
 PACED = ["guidance_ellipse", "guidance_eight", "guidance_zigzag", "guidance_waypoints"]
 
 
+@pytest.mark.parametrize("seconds", [6.0, pytest.param(60.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("parameters", [{}, LIVELY], ids=["plain", "lively"])
 @pytest.mark.parametrize("name", GUIDANCE)
-def test_derivatives_are_those_of_the_target(name, parameters):
+def test_derivatives_are_those_of_the_target(name, parameters, seconds):
     h = 0.001
-    rows = follow(name, 60.0, h, **parameters.get(name, {}))
+    rows = follow(name, seconds, h, **parameters.get(name, {}))
     pose, rate, acceleration = rows[:, 0:3], rows[:, 3:6], rows[:, 6:9]
     pose = np.unwrap(pose, axis=0)
     middle = slice(1000, -2)  # a set point starts with a jump in its third derivative

@@ -20,12 +20,14 @@ from fmus.hull import (
 )
 from fmus.signals import Force
 from fmus.vessel.vessel import COMPONENT as VESSEL
-from fmus.vessel.vessel import Params, Start, State, hull, integrate, motion
+from fmus.vessel.vessel import Start, State, integrate, motion
 
 speed = st.floats(-1.0, 1.0)
 NO_DAMPING = Damping(
     TowedDamping._make([0.0] * 9), RotationalDamping._make([0.0] * 8), ExtraDamping._make([0.0] * 8)
 )
+Params = VESSEL.params
+HULL = VESSEL.prepare(Params()).hull
 UNDAMPED = Params(damping=NO_DAMPING)
 
 
@@ -73,7 +75,7 @@ def test_coriolis_force_is_the_momentum_carried_round(u, v, r):
 def test_steady_surge_needs_the_towing_force(u):
     c = TowedDamping()
     tow = -(c.X_u * u + c.X_absu_u * abs(u) * u + c.X_uuu * u**3)
-    accelerations = motion(u, 0.0, 0.0, Force(tow, 0.0, 0.0), hull(Params()))
+    accelerations = motion(u, 0.0, 0.0, Force(tow, 0.0, 0.0), HULL)
     assert np.allclose(accelerations, 0.0, atol=1e-15)
 
 
@@ -84,7 +86,7 @@ def test_steady_sway_needs_the_towing_force(v):
     tow = -(c.Y_v * v + c.Y_absv_v * abs(v) * v + c.Y_vvv * v**3)
     drag_by_sway, _, moment = damping_force(0.0, v, 0.0, Damping())
     holding = Force(-drag_by_sway, tow, -moment)
-    assert np.allclose(motion(0.0, v, 0.0, holding, hull(Params())), 0.0, atol=1e-15)
+    assert np.allclose(motion(0.0, v, 0.0, holding, HULL), 0.0, atol=1e-15)
 
 
 @given(speed, speed)
@@ -104,13 +106,13 @@ def test_integrator_keeps_energy_without_damping():
     s = State(u=0.3, v=-0.2, r=0.5)
     before = kinetic_energy(s)
     for _ in range(1000):
-        s = integrate(s, Force(), hull(UNDAMPED), 0.01)
+        s = integrate(s, Force(), VESSEL.prepare(UNDAMPED).hull, 0.01)
     assert kinetic_energy(s) == pytest.approx(before, rel=1e-8)
 
 
 def test_energy_balance_with_force_and_damping():
     """Change of kinetic energy equals the work of force and damping, by Simpson's rule over steps."""
-    b, tau, h = hull(Params()), Force(0.5, -0.3, 0.1), 0.01
+    b, tau, h = HULL, Force(0.5, -0.3, 0.1), 0.01
     s, work = State(u=0.1, v=0.05, r=-0.1), 0.0
     start = kinetic_energy(s)
 
@@ -156,7 +158,7 @@ def test_long_step_is_divided():
 def test_pure_rotation_does_not_move_the_ship():
     s = State(x=1.0, y=2.0, r=0.0)
     p = Params(inertia=Inertia(x_g=0.0))
-    s = integrate(s, Force(0.0, 0.0, 0.3), hull(p._replace(damping=NO_DAMPING)), 0.5)
+    s = integrate(s, Force(0.0, 0.0, 0.3), VESSEL.prepare(p._replace(damping=NO_DAMPING)).hull, 0.5)
     assert (s.x, s.y) == (1.0, 2.0)
     assert s.r > 0.0
 

@@ -6,12 +6,12 @@ import shutil
 import zipfile
 
 import pytest
-from exchanged import log_of, write
+from support.exchanged import log_of, write
 
 import cosim
 from cosim import InputError
-from cosim.exchange.bindings import MAPPINGS
 from cosim.export import export_osp, export_ssp
+from cosim.formats.namespaces import SSM
 from cosim.scenario import load_scenario
 from cosim.system import prepare
 
@@ -159,7 +159,7 @@ def edited(chain, tmp_path, edits):
         for name in old.namelist():
             content = old.read(name)
             if name == "SystemStructure.ssd":
-                text = content.decode().replace("xmlns:ssd=", f'xmlns:ssm="{MAPPINGS}" xmlns:ssd=', 1)
+                text = content.decode().replace("xmlns:ssd=", f'xmlns:ssm="{SSM}" xmlns:ssd=', 1)
                 for before, after in edits:
                     assert before in text
                     text = text.replace(before, after)
@@ -267,7 +267,7 @@ def test_several_osp_scenarios_leave_the_choice(chain, tmp_path):
     assert "none of several scenarios" in scenario.notes[0]
 
 
-def test_unpacked_archives_go_when_nobody_needs_them(chain, tmp_path):
+def test_unpacked_archives_are_removed_after_their_last_use(chain, tmp_path):
     write(chain, tmp_path / "chain.ssp", export_ssp)
     scenario = load_scenario(tmp_path / "chain.ssp")
     folder = scenario.folder

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import GAIN, ROOT
-from foreign import ANY_STEP, STATE, build_lag, needs_compiler
+from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
+from support.plain import GAIN
+from support.project import ROOT
 from test_run import start
 
 import cosim
@@ -161,9 +162,9 @@ def test_refused_instantiation_is_bad_input(plain_fmu, tmp_path, capfd):
     with pytest.raises(cosim.InputError, match="cannot be instantiated as 'a'"):
         cosim.simulate(cosim.load_scenario(one(fmu)), tmp_path / "out", show=print)
     assert not (tmp_path / "out").exists()
-    told = "".join(capfd.readouterr())
-    assert "died" not in told
-    assert "AttributeError" not in told
+    printed = "".join(capfd.readouterr())
+    assert "died" not in printed
+    assert "AttributeError" not in printed
 
 
 def test_two_versions_that_share_module_names_run_side_by_side(plain_fmu, tmp_path):
@@ -217,14 +218,15 @@ def test_what_an_fmu_has_started_ends_with_it(plain_fmu, tmp_path, last):
         {last}
     """
     cosim.simulate(
-        cosim.load_scenario(one(plain_fmu(f"Forks{len(last)}", GAIN, step))), tmp_path / "out"
+        cosim.load_scenario(one(plain_fmu(f"Forks{len(last)}", GAIN, step), timeout=5.0)),
+        tmp_path / "out",
     )
     assert gone([int(mark.read_text())])
 
 
 @pytest.fixture
 def running(ellipse, plain_fmu, tmp_path):
-    """A long run with an isolated observer and an isolated FMU that will hang at t = 10 s if told so."""
+    """A long run with an isolated observer and an isolated FMU that hangs at t = 10 s if that is wanted."""
     processes = []
 
     def begin(hang):
@@ -237,7 +239,8 @@ def running(ellipse, plain_fmu, tmp_path):
         path.write_text(json.dumps(ellipse | {"stop": 10000.0}))
         process = start(path, tmp_path / "out")
         assert soon(lambda: mark.exists() or not hang)
-        workers = children(process.pid)
+        (simulating,) = children(process.pid)
+        workers = children(simulating)
         assert len(workers) == 2
         processes.append(process)
         return process, workers

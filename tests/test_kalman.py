@@ -5,15 +5,15 @@ import random
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS
+from support.project import COMPONENTS
 
 import cosim
 from fmus.declare import flatten, packer, variables
 from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
 from fmus.observer.axis import MOST_DISTURBANCE, Axis, Learning, later, rates, taken
 from fmus.signals import Force
+from studies.monte_carlo import shipped, vary, without
 from studies.replay import LOGGED, OBSERVERS, SIGNALS, errors, observer, replay
-from studies.runs import shipped, vary, without
 
 KALMAN = COMPONENTS["observer_kalman"]
 NAN = math.nan
@@ -93,13 +93,22 @@ def velocity_error(estimates, nu, rows=slice(None)):
     return float(np.abs(found - nu[1 : len(found) + 1])[rows].max())
 
 
-@pytest.mark.parametrize("frozen", [True, False])
-@pytest.mark.parametrize("hidden", HIDDEN)
+@pytest.mark.parametrize(
+    ("hidden", "frozen"),
+    [
+        pytest.param(
+            hidden, frozen, marks=() if (hidden, frozen) == ("drag", True) else pytest.mark.slow
+        )
+        for hidden in HIDDEN
+        for frozen in (True, False)
+    ],
+)
 def test_best_of_all_observers_on_the_same_log(hidden, frozen, tmp_path):
     """Rich motion with noise: every velocity and acceleration, model right or wrong."""
     beats_all_others(log_of("rich", tmp_path, 60.0, frozen, **HIDDEN[hidden]), most=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden",
     [
@@ -113,6 +122,7 @@ def test_best_of_all_observers_in_gentle_motion_with_a_wrong_model(hidden, tmp_p
     beats_all_others(log_of("ellipse", tmp_path, 60.0, False, **hidden))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["ellipse", "eight"])
 def test_as_good_as_the_model_where_the_model_is_right(scenario, tmp_path):
     """Gentle motion, where all is noise: nothing is lost by not trusting the model."""

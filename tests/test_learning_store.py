@@ -5,8 +5,8 @@ import random
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS
-from loops import unlimited
+from support.loops import unlimited
+from support.project import COMPONENTS
 
 from fmus.controller.blocker import Blocker, BlockerOptions, blocked, exceeds
 from fmus.controller.eigen import exceed, smallest, tridiagonal
@@ -14,8 +14,8 @@ from fmus.controller.models import ROTATIONAL
 from fmus.controller.smoothing import TAPS, Register, Tap, shifted
 from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, offer, singular, window
 from fmus.declare import flatten, packer, variables
+from fmus.fmi.trace import evaluate, trace_step, variable
 from fmus.ops import choose, put, when
-from fmus.trace import evaluate, trace_step, variable
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 20])

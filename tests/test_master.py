@@ -7,10 +7,12 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS, GAIN, with_unit
+from support.plain import GAIN, with_unit
+from support.project import COMPONENTS
 
 import cosim
-from cosim.log import LogWriter
+from cosim.fmu import component
+from cosim.results.log import LogWriter
 from fmus.signals import Force
 
 
@@ -35,7 +37,8 @@ def closed_loop_in_plain_python(steps, h=0.01):
     c_in = C.inputs(o_out, g_out)
     c = C.init(c_in, c_p)
     c_out = C.step(c, c_in, c_p, 0.0)[1]
-    t_out = T.step(T.state(), T.inputs(c_out.tau, v_out.velocity), t_p, 0.0)[1]
+    t = T.init(None, t_p)
+    t_out = T.step(t, T.inputs(c_out.tau, v_out.velocity), t_p, 0.0)[1]
     rows = [(*v_out.pose, c_out.tau.tau_X)]
     for _ in range(steps):
         v, v_out = V.step(v, Force(t_out.tau_act_X, t_out.tau_act_Y, t_out.tau_act_N), v_p, h)
@@ -43,7 +46,7 @@ def closed_loop_in_plain_python(steps, h=0.01):
         o, o_out = O.step(o, O.inputs(v_out.measured, commanded), o_p, h)
         g, g_out = G.step(g, None, g_p, h)
         c, c_out = C.step(c, C.inputs(o_out, g_out), c_p, h)
-        t_out = T.step(T.state(), T.inputs(c_out.tau, v_out.velocity), t_p, h)[1]
+        t_out = T.step(t, T.inputs(c_out.tau, v_out.velocity), t_p, h)[1]
         rows.append((*v_out.pose, c_out.tau.tau_X))
     return np.array(rows)
 
@@ -360,20 +363,28 @@ def test_bytes_do_not_depend_on_when_blocks_are_written(tmp_path):
     assert np.array_equal(np.column_stack(list(log.values())), rows, equal_nan=True)
 
 
-def test_module_of_a_python_fmu_outlives_it(plain_fmu, tmp_path):
-    # Its class does, as the library never lets go of it; without the module it would point to freed memory.
+def test_namespace_of_a_python_fmu_outlives_it_and_is_empty(plain_fmu, tmp_path, monkeypatch):
+    # Its class does, as the library never lets go of it; without the namespace it would point to freed memory.
+    held, hold = [], component._hold
+    monkeypatch.setattr(component, "_hold", lambda namespace: (held.append(namespace), hold(namespace)))
     fmu = plain_fmu("Survivor", GAIN)
     fmus = {"a": {"path": str(fmu)}}
     content = {"name": "one", "step": 0.1, "stop": 0.3, "fmus": fmus, "connections": []}
     run(content, tmp_path / "out")
     gc.collect()
+    (namespace,) = held
+    held.clear()
+    assert namespace == {}
+    del namespace
+    gc.collect()
+    run(content, tmp_path / "again")  # what the library still has of the first one does no harm
+    held.clear()
     there = [o for o in gc.get_objects() if isinstance(o, ModuleType) and o.__name__ == "Survivor"]
-    # Making the FMU imports a module of that name as well.
-    assert any("resources" in str(module.__file__) for module in there)
+    assert not any("resources" in str(module.__file__) for module in there)
 
 
 def test_two_python_fmus_of_one_module_name_run_their_own_code(plain_fmu, tmp_path):
-    """As two versions of somebody's controller would be."""
+    """As in two versions of one user's controller."""
     paths = []
     for version in (1.0, 2.0):
         fmu = plain_fmu("SameName", GAIN, f"self.y = {version}\nreturn True")

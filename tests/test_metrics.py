@@ -5,9 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from cosim import metrics, plots
-from cosim.metrics import MetricsError, compute, main, over_time, tracking
-from cosim.plots import canvas, track
+from cosim.metrics import main
+from cosim.plots import main as plots_main
+from cosim.results import MetricsError, canvas, compute, drawing, over_time, performance, track, tracking
+from cosim.scenario import Roles
+
+ROLES = Roles()
 
 KEYS = [
     "e_pos_rms",
@@ -31,7 +34,7 @@ def circle(n=2001, step=0.01):
     time = np.arange(n) * step
     angle = 0.05 * time
     zero = np.zeros(n)
-    log = {name: zero.copy() for name in metrics.COLUMNS}
+    log = {name: zero.copy() for name in ROLES.columns}
     log["time"] = time
     for prefix, suffix in (("vessel.", ""), ("guidance.", "_t")):
         log[f"{prefix}x{suffix}"] = 2.0 * np.sin(angle)
@@ -53,7 +56,7 @@ def shift(log, ahead, starboard):
 
 def wild(seed=0, n=500):
     rng = np.random.default_rng(seed)
-    log = {name: rng.normal(size=n) for name in metrics.COLUMNS}
+    log = {name: rng.normal(size=n) for name in ROLES.columns}
     log["time"] = np.cumsum(rng.uniform(0.01, 0.1, n))
     return log
 
@@ -77,7 +80,7 @@ def folder(tmp_path):
 class TestCompute:
     def test_keys_and_order(self):
         result = compute(wild())
-        assert list(result) == KEYS == [metric.name for metric in metrics.METRICS]
+        assert list(result) == KEYS == [metric.name for metric in performance.METRICS]
         assert all(type(value) is float for value in result.values())
 
     def test_perfect_log_has_no_error(self):
@@ -111,7 +114,7 @@ class TestCompute:
     def test_wear_of_ramps_does_not_depend_on_the_step(self, every):
         log = circle()
         ramp = np.sqrt(np.linspace(0.0, 1.0, log["time"].size))
-        for name, height in zip(metrics.TAU_CMD, (1.0, -2.0, 2.0), strict=True):
+        for name, height in zip(ROLES.force, (1.0, -2.0, 2.0), strict=True):
             log[name] = height * ramp
         thinned = {name: values[::every] for name, values in log.items()}
         assert compute(thinned)["I_tau_dot"] == pytest.approx(3.0)
@@ -124,10 +127,10 @@ class TestCompute:
 
     def test_force_after_clipping_comes_first(self):
         log = wild()
-        for name in metrics.TAU:
+        for name in ROLES.requested_force:
             log[name] = log[name] * 1e3
         clipped = compute(log)
-        without = {name: values for name, values in log.items() if name not in metrics.TAU_CMD}
+        without = {name: values for name, values in log.items() if name not in ROLES.force}
         assert compute(without)["I_tau_dot"] > 100.0 * clipped["I_tau_dot"]
 
     def test_window_holds_its_ends(self):
@@ -165,7 +168,7 @@ class TestCompute:
 
     def test_no_rows(self):
         with pytest.raises(MetricsError, match="no rows"):
-            compute({name: np.empty(0) for name in metrics.COLUMNS})
+            compute({name: np.empty(0) for name in ROLES.columns})
 
     def test_overflow_is_an_error_not_infinity(self):
         log = shift(circle(), 0.0, 1e200)
@@ -199,7 +202,7 @@ class TestTracking:
 
     def test_wrap_keeps_pi_and_small_angles(self):
         given = np.array([np.pi, -np.pi, np.nextafter(np.pi, 4.0), 1e-300, -1e-300, 3.0 * np.pi])
-        wrapped = metrics.wrap(given)
+        wrapped = performance.wrap(given)
         assert wrapped[:2].tolist() == [np.pi, np.pi]
         assert wrapped[3:5].tolist() == given[3:5].tolist()
         assert np.all((wrapped > -np.pi) & (wrapped <= np.pi))
@@ -207,7 +210,7 @@ class TestTracking:
     def test_power_is_absolute(self):
         log = wild()
         result = tracking(log)
-        tau, nu = ([log[name] for name in names] for names in (metrics.TAU_CMD, metrics.VELOCITY))
+        tau, nu = ([log[name] for name in names] for names in (ROLES.force, ROLES.velocity))
         assert result["P"] == pytest.approx(np.abs(np.sum(np.multiply(tau, nu), axis=0)))
 
     def test_force_rate(self):
@@ -224,24 +227,24 @@ class TestOverTime:
             result = compute(log, start, stop)
             grown = over_time(log, start, stop)
             assert grown["time"][-1] == result["to"]
-            for name in metrics.OVER_TIME:
+            for name in performance.OVER_TIME:
                 assert grown[name][-1] == result[name]
 
     def test_grows_from_zero(self):
         grown = over_time(wild(), 4.0)
-        for name in metrics.OVER_TIME:
+        for name in performance.OVER_TIME:
             assert grown[name][0] == 0.0
             assert np.all(np.diff(grown[name]) >= 0.0)
 
 
 def test_needed_keeps_order():
     names = ["time", "vessel.u_dot", "controller.tau_X", "vessel.x", "observer.x_m"]
-    assert metrics.needed(names) == ["time", "controller.tau_X", "vessel.x"]
+    assert performance.needed(names) == ["time", "controller.tau_X", "vessel.x"]
 
 
 def test_needed_is_enough():
     log = wild()
-    names = metrics.needed([*log, "vessel.other"])
+    names = performance.needed([*log, "vessel.other"])
     assert compute({name: log[name] for name in names}) == compute(log)
 
 
@@ -249,7 +252,7 @@ class TestCommand:
     def test_table(self, folder, capsys):
         assert main([str(folder(shift(circle(), 0.0, 0.25)))]) == 0
         out = capsys.readouterr().out
-        assert all(metric.name in out for metric in metrics.METRICS)
+        assert all(metric.name in out for metric in performance.METRICS)
         assert "1.25 " in out  # ISE
 
     def test_json(self, folder, capsys):
@@ -262,12 +265,12 @@ class TestCommand:
         file = tmp_path / "grown.csv"
         assert main([str(folder(log)), "--out", str(file)]) == 0
         table = np.genfromtxt(file, delimiter=",", names=True)
-        assert table.dtype.names == ("time", *metrics.OVER_TIME)
+        assert table.dtype.names == ("time", *performance.OVER_TIME)
         assert table["IAEWWT"] == pytest.approx(over_time(log)["IAEWWT"])
         assert sorted(path.name for path in tmp_path.iterdir()) == ["grown.csv", "log.csv"]
 
     def test_log_without_thrusters(self, folder, capsys):
-        log = {name: values for name, values in wild().items() if name not in metrics.TAU_CMD}
+        log = {name: values for name, values in wild().items() if name not in ROLES.force}
         assert main([str(folder(log)), "--json"]) == 0
         assert json.loads(capsys.readouterr().out) == compute(log)
 
@@ -303,36 +306,37 @@ class TestPlots:
         return tuple(file.name for file in files)
 
     def test_all_pictures(self, tmp_path):
-        files = plots.draw({"a": wild(1, 5000), "b": wild(2)}, tmp_path / "new")
+        files = drawing.draw({"a": wild(1, 5000), "b": wild(2)}, tmp_path / "new")
         assert self.names(files) == self.ALL
         assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
         assert {path.name for path in (tmp_path / "new").iterdir()} == set(self.ALL)
 
     def test_pictures_without_their_columns_are_left_out(self, tmp_path):
         log = {name: values for name, values in wild().items() if not name.startswith("controller.")}
-        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL[:3]
-        pose = {name: log[name] for name in ("time", *metrics.POSE)}
-        assert self.names(plots.draw({"a": pose}, tmp_path)) == self.ALL[:1]
-        assert plots.draw({"a": {"time": log["time"]}}, tmp_path) == []
-        assert plots.draw({}, tmp_path) == []
+        assert self.names(drawing.draw({"a": log}, tmp_path)) == self.ALL[:3]
+        pose = {name: log[name] for name in ("time", *ROLES.pose)}
+        assert self.names(drawing.draw({"a": pose}, tmp_path)) == self.ALL[:1]
+        assert drawing.draw({"a": {"time": log["time"]}}, tmp_path) == []
+        assert drawing.draw({}, tmp_path) == []
 
     def test_a_run_that_blew_up_is_drawn_as_far_as_it_goes(self, tmp_path):
         log = wild()
-        for name in metrics.COLUMNS[1:]:
+        for name in ROLES.columns[1:]:
             log[name][300:] = 1e300
             log[name][400:] = np.nan
-        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL
+        assert self.names(drawing.draw({"a": log}, tmp_path)) == self.ALL
 
+    @pytest.mark.slow
     def test_a_ship_at_rest(self, tmp_path):
-        log = {name: np.zeros(100) for name in metrics.COLUMNS}
+        log = {name: np.zeros(100) for name in ROLES.columns}
         log["time"] = np.arange(100) * 0.1
-        assert self.names(plots.draw({"a": log}, tmp_path)) == self.ALL
+        assert self.names(drawing.draw({"a": log}, tmp_path)) == self.ALL
 
     def test_thin_keeps_peaks_and_order(self):
         time = np.arange(123457) * 0.01
         values = np.sin(time)
         values[[0, 4321, 99999, -1]] = [7.0, 5.0, -5.0, 9.0]
-        t, v = plots.thin(time, values)
+        t, v = canvas.thin(time, values)
         assert t.size <= canvas.MAX_POINTS
         assert np.all(np.diff(t) >= 0.0)
         assert {7.0, 5.0, -5.0, 9.0} <= set(v)
@@ -356,6 +360,56 @@ class TestPlots:
 
     def test_hull_points_where_the_ship_heads(self):
         log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
-        (east,) = track.outlines({**log, "vessel.psi": np.full(2, np.pi / 2.0)}, 1.0)
+        log["vessel.psi"] = np.full(2, np.pi / 2.0)
+        (east,) = track.outlines(canvas.Run("", log, {}, ROLES), 1.0)
         assert east[0] == pytest.approx([0.5, 0.0])
         assert east[1, 1] < 0.0  # starboard of a ship to the east is south
+
+
+class TestRoles:
+    OTHER = Roles(
+        pose=("boat.n", "boat.e", "boat.h"),
+        target=("aim.n", "aim.e", "aim.h"),
+        force=("u.a", "u.b", "u.c"),
+    )
+
+    def renamed(self, log):
+        """The log of another system, whose columns have names of its own."""
+        names = {
+            old: new
+            for role in ("pose", "target", "force")
+            for old, new in zip(ROLES.of(role), self.OTHER.of(role), strict=True)
+        }
+        return {names.get(name, name): values for name, values in log.items()}
+
+    def test_metrics_do_not_depend_on_names(self):
+        log = wild()
+        other = self.renamed(log)
+        assert compute(other, roles=self.OTHER) == compute(log)
+        for name, values in over_time(log, 3.0).items():
+            assert np.array_equal(over_time(other, 3.0, roles=self.OTHER)[name], values)
+        with pytest.raises(MetricsError, match=r"the log lacks vessel\.x, "):
+            compute(other)
+        with pytest.raises(MetricsError, match=r"the log lacks boat\.n, "):
+            compute(log, roles=self.OTHER)
+
+    @pytest.mark.slow
+    def test_pictures_do_not_depend_on_names(self, tmp_path):
+        log = wild()
+        drawing.draw({"a": log, "b": wild(2)}, tmp_path / "plain")
+        drawing.draw({"a": self.renamed(log), "b": wild(2)}, tmp_path / "other", roles={"a": self.OTHER})
+        for name in TestPlots.ALL:
+            assert (tmp_path / "plain" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+    def test_needed_follows_roles(self):
+        assert performance.needed(["vessel.x", "boat.n", "u.b"], self.OTHER) == ["boat.n", "u.b"]
+
+    def test_commands_find_the_roles_of_a_run(self, folder, capsys):
+        log = self.renamed(wild())
+        run = folder(log)
+        chosen = {"metrics": {"from": None, "to": None}, "roles": self.OTHER.model_dump(mode="json")}
+        (run / "log.json").write_text(json.dumps({"scenario": chosen}))
+        assert main([str(run), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out) == compute(log, roles=self.OTHER)
+        assert plots_main([str(run), "--out", str(run / "drawn")]) == 0
+        assert {path.name for path in (run / "drawn").iterdir()} == set(TestPlots.ALL)

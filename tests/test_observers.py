@@ -4,10 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from conftest import COMPONENTS
+from support.cases import in_part
+from support.project import COMPONENTS
+from support.shared import once
 
 import cosim
 from fmus.declare import packer, variables
+from studies.monte_carlo import shipped
 
 OBSERVERS = [name for name in COMPONENTS if name.startswith("observer_")]
 SIGNALS = ["observer.x_m", "observer.y_m", "observer.psi_m"]
@@ -28,7 +31,18 @@ def error(log, name, after=20.0):
     return float(np.sqrt(np.mean(difference[log["time"] >= after] ** 2)))
 
 
-@pytest.mark.parametrize("observer", OBSERVERS)
+@pytest.fixture(scope="module")
+def on_the_ellipse(shared):
+    """A function that gives the log of 60 s with an observer, which is run once in a session."""
+
+    def log(observer):
+        folder = shared / f"ellipse_{observer}"
+        return cosim.read_log(once(folder, lambda out: run(shipped("ellipse"), out, observer)))
+
+    return log
+
+
+@pytest.mark.parametrize("observer", in_part(OBSERVERS, keep=["observer_mdf", "observer_kalman"]))
 def test_faults_of_the_measurement_are_survived(ellipse, tmp_path, observer):
     """NaN, zeros and spikes one after the other; three seconds later all is well again."""
     faults = [
@@ -90,24 +104,26 @@ def test_no_upset_is_for_good(observer, h, upset):
     assert found[late] == pytest.approx(calm[late], abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observer", [o for o in OBSERVERS if o != "observer_df"])
-def test_heading_runs_on_over_turns(ellipse, tmp_path, observer):
-    log = run(ellipse, tmp_path, observer)
+def test_heading_runs_on_over_turns(on_the_ellipse, observer):
+    log = on_the_ellipse(observer)
     assert np.abs(log["vessel.psi"]).max() > math.pi
     assert np.abs(log["observer.psi_hat"] - log["vessel.psi"]).max() < 0.1
 
 
-def test_filter_of_before_the_thesis_takes_a_wrap_for_a_turn(ellipse, tmp_path):
+@pytest.mark.slow
+def test_filter_of_before_the_thesis_takes_a_wrap_for_a_turn(on_the_ellipse):
     """What the modification is for: the yaw rate it reports there is absurd."""
-    before = run(ellipse, tmp_path / "df", "observer_df")
-    modified = run(ellipse, tmp_path / "mdf", "observer_mdf")
+    before, modified = on_the_ellipse("observer_df"), on_the_ellipse("observer_mdf")
     assert np.abs(before["observer.r_hat"]).max() > 1.0
     assert np.abs(modified["observer.r_hat"]).max() < 0.3
 
 
-def test_model_makes_better_velocities(ellipse, tmp_path):
+@pytest.mark.slow
+def test_model_makes_better_velocities(on_the_ellipse):
     """With the true model, the Luenberger observer is the thesis' best in every velocity."""
-    logs = {o: run(ellipse, tmp_path / o, o) for o in OBSERVERS if o != "observer_kalman"}
+    logs = {o: on_the_ellipse(o) for o in OBSERVERS if o != "observer_kalman"}
     for name in ("u", "v", "r"):
         errors = {o: error(log, name) for o, log in logs.items()}
         assert min(errors, key=errors.__getitem__) == "observer_luenberger"

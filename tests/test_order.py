@@ -1,8 +1,8 @@
-"""Order of execution: sources before what follows them at the same instant, loops told by name."""
+"""Order of execution: sources before their followers at the same instant, loops reported by name."""
 
 import itertools
 
-from cosim.order import Link, execution_order
+from cosim.system.order import Link, execution_order
 
 # The closed loop as its FMUs declare it: the vessel's pose follows no input at the same instant.
 LINKS = [

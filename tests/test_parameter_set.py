@@ -9,23 +9,23 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from conftest import ROOT
 from fmpy.ssp.ssd import read_ssv
 from fmpy.validation import validate_fmu
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.opened import Opened
+from support.project import ROOT
 from test_effects import GOOD, OWN
-from test_fmus import Opened, run_build
+from test_fmus import run_build
 from test_run import SSV, command, parameter, scenario  # noqa: F401 - a fixture
 
 import cosim
 from cosim import InputError, Parameter, ParameterSet, read_parameters, write_parameters
-from diagnosis.model import Model
-from diagnosis.parameter_set import read_model, write_model
-from fmus.baking import read_starts
+from diagnosis.model import Model, read_model, write_model
 from fmus.build import build
+from fmus.build.start_values_file import read_starts
 
-LEARNED = Model({"delta_X_u": -4.123456789012345, "V_n": 0.05}, {"loss_bow": 0.3}, clock=0.2)
+LEARNED = Model({"delta_X_u": -4.123456789012345, "V_n": 0.05}, {"loss_bow": 0.3}, {"clock_offset": 0.2})
 
 
 @pytest.fixture
@@ -42,14 +42,14 @@ finite = st.floats(-1e300, 1e300)
 @given(st.dictionaries(st.sampled_from(["delta_X_u", "F_n", "curve_X_u_7", "X_uuu"]), finite), finite)
 def test_a_model_comes_back_to_the_last_digit(tmp_path_factory, vessel, clock):
     path = tmp_path_factory.mktemp("ssv") / "model.ssv"
-    write_model(path, Model(vessel, {"lag": 0.1 + 0.2}, clock))
+    write_model(path, Model(vessel, {"lag": 0.1 + 0.2}, {"clock_offset": clock}))
     found = read_model(path)
     nominal = {"delta_X_u": 0.0, "F_n": 0.0, "curve_X_u_7": 0.0, "X_uuu": -3.787}
     assert found.vessel == {k: v for k, v in vessel.items() if v != nominal[k]}
     assert (found.thrusters, found.clock) == ({"lag": 0.1 + 0.2}, clock)
 
 
-@pytest.mark.parametrize("model", [Model(), LEARNED, Model(clock=-0.1)])
+@pytest.mark.parametrize("model", [Model(), LEARNED, Model(measurement={"clock_offset": -0.1})])
 def test_the_file_is_valid_by_the_schema_of_the_standard(model, tmp_path):
     write_model(tmp_path / "model.ssv", model)
     found = read_ssv(str(tmp_path / "model.ssv"))  # checks against the schema
@@ -122,6 +122,7 @@ def run(content, folder, *parameters):
     return (folder / "log.csv").read_bytes(), result.warnings
 
 
+@pytest.mark.slow
 def test_a_baked_fmu_runs_as_a_plain_one_with_the_set(ellipse, learned, tmp_path):
     plain, _ = run(ellipse, tmp_path / "plain")
     bound, warnings = run(ellipse, tmp_path / "bound", learned)
@@ -205,6 +206,7 @@ def test_a_set_that_cannot_be_baked_is_one_message(text, message, tmp_path):
     assert list((tmp_path / "fmu").glob("*")) == []
 
 
+@pytest.mark.slow
 def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse, tmp_path):  # noqa: F811
     (tmp_path / "mine.py").write_text(OWN.format(body=GOOD))
     (tmp_path / "model.ssv").write_text(SSV.format(parameter("vessel.N_uuv", 100.0)))
@@ -213,12 +215,8 @@ def test_parameters_of_own_effects_need_the_fmu_that_has_them(scenario, ellipse,
     assert done.returncode == 2
     assert "python -m fmus.build vessel --effects FILE.py" in done.stderr
     for extra in ([], ["--parameters", tmp_path / "model.ssv"]):
-        assert (
-            run_build(
-                "vessel", "--effects", tmp_path / "mine.py", *extra, "--out", tmp_path / "fmu"
-            ).returncode
-            == 0
-        )
+        built = [sys.executable, "-m", "fmus.build", "vessel", "--effects", tmp_path / "mine.py", *extra]
+        assert subprocess.run([*built, "--out", tmp_path / "fmu"], cwd=ROOT, check=False).returncode == 0
         ellipse["fmus"]["vessel"]["path"] = "./fmu/vessel.fmu"
         assert command(scenario(), *arguments).returncode == 0
         with_set = (tmp_path / "out" / "log.csv").read_bytes()

@@ -1,4 +1,4 @@
-"""The report: one page that is whole by itself, and what a browser makes of it."""
+"""The report: one page that needs no other file, and how a browser shows it."""
 
 import html
 import os
@@ -11,15 +11,13 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from measured import sail
+from support.measured import sail, smoothed
 
-from diagnosis import clean, smooth
-from diagnosis.evidence import Seen, examine
-from diagnosis.model import Model
-from diagnosis.report import Curve, curves, write_report
-from diagnosis.report.regions import QUANTITIES, regions
-from diagnosis.weak import integrals
-from fmus.effects import EFFECTS
+from diagnosis import Model, PredictionError, evaluate_run
+from diagnosis.model import integrals
+from diagnosis.report import ComparisonContent, Curve, DiagnosisContent, curves, write_report
+from diagnosis.report.profiles import QUANTITIES, binned_errors
+from fmus.effects import STANDARD
 
 HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
 EVIL = "<script>alert(1)</script> & $x_1$ \" id=\"body' onload='x"
@@ -29,34 +27,72 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 @pytest.fixture(scope="module")
 def data():
     runs = [sail(40.0, thrusters=HIDDEN, seed=k)[0] for k in range(2)]
-    return [integrals(smooth(clean(replace(r, name=n)))) for r, n in zip(runs, (EVIL, "b"), strict=True)]
+    return [integrals(smoothed(replace(r, name=n))) for r, n in zip(runs, (EVIL, "b"), strict=True)]
 
 
 @pytest.fixture(scope="module")
-def evidence(data):
+def evaluations(data):
     after = Model().plus(HIDDEN)
-    return [examine(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
+    return [evaluate_run(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
 
 
-def errors(evidence, after=True):
-    sides = ("before", "after") if after else ("before",)
+def errors(evaluations):
     listed = []
-    for e in evidence:
-        seen = {side: getattr(e, side) for side in sides}
+    for e in evaluations:
+        models = {"before": e.before, "after": e.after}
         listed.append(
             {
                 "run": e.name,
                 "held_out": e.held_out,
-                "window_position_rmse": {side: s.position for side, s in seen.items()},
-                "window_heading_rmse": {side: s.heading for side, s in seen.items()},
-                "omega_rms": {side: s.omega_rms.tolist() for side, s in seen.items()},
+                "window_position_rmse": {side: s.position for side, s in models.items()},
+                "window_heading_rmse": {side: s.heading for side, s in models.items()},
+                "omega_rms": {side: s.omega_rms.tolist() for side, s in models.items()},
             }
         )
     return listed
 
 
-def found(evidence):
-    """What diagnosis.json holds."""
+COUNTS = {"samples": 4000, "frozen": 0, "dropped": 0, "spikes": 0, "used": 4000}
+NO_REGION = {"sentences": [], "regions": [], "profiles": []}
+
+
+def comparison(evaluations, where=NO_REGION):
+    """Content of comparison.json, as keywords."""
+    return {
+        "data": {**COUNTS, "runs": []},
+        "errors": errors(evaluations),
+        "where": where,
+        "runs": [e.name for e in evaluations],
+        "model": None,
+        "files": ["report.html"],
+        "versions": {"cybership": "0.1.0"},
+    }
+
+
+def nothing(evaluations):
+    """Content of diagnosis.json where nothing was found, as keywords."""
+    return comparison(evaluations) | {
+        "verdict": "none",
+        "sentence": "Nothing is missing that these data show.",
+        "effects": [],
+        "suspect_coefficients": [],
+        "ranking": [],
+        "where_after": NO_REGION,
+        "stability": {
+            "nominal_min_dissipation": 0.6,
+            "learned_min_dissipation": None,
+            "bounded": True,
+            "region": "|u| < 0.3 m/s",
+            "mass_definite": True,
+            "notes": [],
+        },
+        "prior": 0.1,
+        "seed": 0,
+    }
+
+
+def found(evaluations):
+    """Content of diagnosis.json."""
     values = {n: {"value": v, "unit": "1", "ci95": [v - 0.01, v + 0.01]} for n, v in HIDDEN.items()}
     effect = {
         "id": "thrust_curve",
@@ -66,8 +102,11 @@ def found(evidence):
         "share_of_error": 0.9,
         "indistinguishable": ["curve_vsp_x(c)"],
         "advice": "run astern & <b>slowly</b>",
+        "sentence": "The propellers give less than they should.",
+        "equation": "f = k c",
+        "separation": "",
     }
-    return {
+    content = nothing(evaluations) | {
         "verdict": "ambiguous",
         "effects": [effect],
         "suspect_coefficients": [{"name": "N_r", "z": -4.2, "value": -2.3}],
@@ -76,24 +115,16 @@ def found(evidence):
             {"id": "curve_vsp_x(c)", "score": 12.0, "q2": 0.98},
             {"id": "X_u", "score": 900.0, "q2": -0.1},
         ],
-        "data": {"samples": 4000, "frozen": 0, "dropped": 0, "spikes": 0, "used": 4000},
-        "errors": errors(evidence),
-        "stability": {
-            "nominal_min_dissipation": 0.6,
-            "learned_min_dissipation": None,
-            "bounded": True,
-            "region": "|u| < 0.3 m/s",
-        },
         "sentence": f"The propellers of {EVIL} give too little.",
-        "versions": {"cybership": "0.1.0"},
     }
+    return DiagnosisContent(**content)
 
 
 @pytest.fixture(scope="module")
-def report(evidence, tmp_path_factory):
-    std = [np.full_like(e.before.omega, 0.01) for e in evidence]
+def report(evaluations, tmp_path_factory):
+    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
     return write_report(
-        tmp_path_factory.mktemp("report") / "report.html", found(evidence), evidence, std
+        tmp_path_factory.mktemp("report") / "report.html", found(evaluations), evaluations, std
     )
 
 
@@ -158,10 +189,10 @@ def test_nobodys_text_becomes_part_of_the_page(report):
     assert "body" not in page.values("id")
 
 
-def test_page_says_what_the_result_says(report, evidence):
+def test_page_says_what_the_result_says(report, evaluations):
     assert "after" in Page(report).text
     text = " ".join("".join(Page(report).text).split())
-    for e in evidence:
+    for e in evaluations:
         assert f"{1e3 * e.before.position:.3g} → {1e3 * e.after.position:.3g}" in text
     assert "curve_vsp_x(c)" in text
     assert "97 %" in text
@@ -178,16 +209,17 @@ def test_every_colour_follows_the_page(report):
     ]
 
 
-def test_same_input_gives_the_same_bytes(report, evidence, tmp_path):
-    std = [np.full_like(e.before.omega, 0.01) for e in evidence]
-    again = write_report(tmp_path / "again.html", found(evidence), evidence, std)
+def test_same_input_gives_the_same_bytes(report, evaluations, tmp_path):
+    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
+    again = write_report(tmp_path / "again.html", found(evaluations), evaluations, std)
     assert again.read_bytes() == report.read_bytes()
 
 
 def test_comparison_has_no_after(data, tmp_path):
-    evidence = [examine(w, Model()) for w in data[1:]]
-    result = {"data": {}, "errors": errors(evidence, after=False), "where": ["Surge is worst <astern>."]}
-    path = write_report(tmp_path / "report.html", result, evidence)
+    evaluations = [evaluate_run(w, Model()) for w in data[1:]]
+    where = NO_REGION | {"sentences": ["Surge is worst <astern>."]}
+    content = ComparisonContent(**comparison(evaluations, where))
+    path = write_report(tmp_path / "report.html", content, evaluations)
     text = Page(path).text
     assert "Surge is worst <astern>." in text
     assert "model error" in text  # in a legend
@@ -195,54 +227,55 @@ def test_comparison_has_no_after(data, tmp_path):
 
 
 def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
-    evidence = [replace(examine(w, Model()), windows=None) for w in data[1:]]
-    listed = errors(evidence)
-    listed[0]["window_position_rmse"] = {"before": None, "after": None}
-    nothing = {"effects": [], "suspect_coefficients": [], "ranking": []}
-    result = {"verdict": "none", "data": {}, "errors": listed} | nothing
-    text = " ".join(Page(write_report(tmp_path / "report.html", result, evidence)).text)
+    evaluations = [replace(evaluate_run(w, Model()), windows=None) for w in data[1:]]
+    result = nothing(evaluations)
+    result["errors"][0]["window_position_rmse"] = {"before": None, "after": None}
+    content = DiagnosisContent(**result)
+    text = " ".join(Page(write_report(tmp_path / "report.html", content, evaluations)).text)
     assert "Nothing is missing" in text
     assert "None" not in text
     assert "nan" not in text
 
 
-def test_nothing_half_written_stays(evidence, tmp_path, monkeypatch):
+def test_nothing_half_written_stays(evaluations, tmp_path, monkeypatch):
     (tmp_path / "report.html").write_text("old")
 
     def stop(_):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_report(tmp_path / "report.html", found(evidence), evidence[:1], advance=stop)
+        write_report(tmp_path / "report.html", found(evaluations), evaluations[:1], advance=stop)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "old"
 
 
-def test_model_that_runs_away_is_drawn(evidence, tmp_path):
-    e = evidence[0]
+def test_model_that_runs_away_is_drawn(evaluations, tmp_path):
+    e = evaluations[0]
     assert e.windows is not None
-    off = np.where(np.arange(len(e.before.off))[:, None] % 400 > 200, np.inf, e.before.off)
-    wild = replace(e, before=Seen(e.before.omega, off, e.windows.summary(off)))
-    result = {"errors": errors([wild]), "data": {}}
-    assert Page(write_report(tmp_path / "report.html", result, [wild])).tags["svg"]
+    diverged = np.arange(len(e.before.residuals))[:, None] % 400 > 200
+    residuals = np.where(diverged, np.inf, e.before.residuals)
+    before = PredictionError(e.before.omega, residuals, e.windows.summary(residuals))
+    wild = replace(e, before=before)
+    content = ComparisonContent(**comparison([wild]))
+    assert Page(write_report(tmp_path / "report.html", content, [wild])).tags["svg"]
 
 
-def test_error_by_region_adds_up(evidence):
+def test_binned_errors_add_up(evaluations):
     """The mean square of all bins, weighted by their windows, is that of the windows in them."""
     for quantity in QUANTITIES:
-        values = np.concatenate([quantity.values(e.integrals) for e in evidence])
+        values = np.concatenate([quantity.values(e.integrals) for e in evaluations])
         columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
-        omega = np.concatenate([e.before.omega for e in evidence])
-        for axis, region in enumerate(regions(quantity, evidence, None)):
-            count, _ = np.histogram(columns[:, axis], region.edges)
-            known = np.isfinite(region.before)
+        omega = np.concatenate([e.before.omega for e in evaluations])
+        for axis, error in enumerate(binned_errors(quantity, evaluations, None)):
+            count, _ = np.histogram(columns[:, axis], error.edges)
+            known = np.isfinite(error.before)
             assert known.any()
-            inside = np.digitize(columns[:, axis], region.edges) - 1
+            inside = np.digitize(columns[:, axis], error.edges) - 1
             chosen = np.isin(inside, np.flatnonzero(known))
             total = np.sum(omega[chosen, axis] ** 2)
-            last = columns[:, axis] == region.edges[-1]  # histogram counts it, bins do not
+            last = columns[:, axis] == error.edges[-1]  # histogram counts it, bins do not
             assert not last.any()
-            assert np.sum(count[known] * region.before[known] ** 2) == pytest.approx(total)
+            assert np.sum(count[known] * error.before[known] ** 2) == pytest.approx(total)
 
 
 SHAPES = {
@@ -258,23 +291,23 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_shape_is_that_of_the_effect(name, evidence, tmp_path):
+def test_a_shape_is_that_of_the_effect(name, evaluations, tmp_path):
     given = {n: {"value": v, "unit": "1", "ci95": [v - 0.1, v + 0.1]} for n, v in SHAPES[name].items()}
-    drawn = curves([{"id": name, "coefficients": given}], evidence)
+    drawn = curves([{"id": name, "coefficients": given}], evaluations)
     assert drawn
     for c in drawn:
         assert isinstance(c, Curve)
-        assert c.seen is not None
-        assert c.seen[0] < c.seen[1]
-        assert (c.sure is not None) == EFFECTS[name].linear
+        assert c.covered is not None
+        assert c.covered[0] < c.covered[1]
+        assert (c.sure is not None) == STANDARD[name].linear
         if c.sure is not None:
             assert (c.sure[0] <= c.learned + 1e-12).all()
             assert (c.learned <= c.sure[1] + 1e-12).all()
-    assert curves([{"id": name, "coefficients": {}}], evidence) == []
+    assert curves([{"id": name, "coefficients": {}}], evaluations) == []
 
 
-def test_dead_band_is_seen_in_its_shape(evidence):
-    (vsp, bow) = curves([{"id": "deadband", "coefficients": {"deadband": {"value": 0.05}}}], evidence)
+def test_dead_band_is_seen_in_its_shape(evaluations):
+    (vsp, bow) = curves([{"id": "deadband", "coefficients": {"deadband": {"value": 0.05}}}], evaluations)
     for c in (vsp, bow):
         assert np.allclose(c.learned[np.abs(c.x) < 0.05], 0.0)
         assert np.interp(0.5, c.x, c.learned) == pytest.approx(0.45, abs=1e-9)

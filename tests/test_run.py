@@ -10,17 +10,27 @@ import time
 
 import numpy as np
 import pytest
-from conftest import GAIN, ROOT
+import support.command
+from support.plain import GAIN
+from support.project import ROOT
 
 import cosim
+from cosim import metrics, plots, run
+from cosim.scenario import Roles
 
 PICTURES = {"trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png"}
 
 
-def command(*arguments, **options):
+def command(*arguments, cwd=ROOT):
+    """``cosim.run`` in this process."""
+    return support.command.command(run.main, *arguments, cwd=cwd)
+
+
+def in_a_process(*arguments, **options):
+    """The same in a process of its own: what reaches its streams from wherever, and what it leaves."""
     return subprocess.run(
         [sys.executable, "-m", "cosim.run", *map(str, arguments)],
-        capture_output=True, text=True, cwd=options.pop("cwd", ROOT), check=False, **options,
+        capture_output=True, text=True, check=False, **{"cwd": ROOT} | options,
     )  # fmt: skip
 
 
@@ -37,7 +47,7 @@ def scenario(ellipse, tmp_path):
 
 
 def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
-    done = command(scenario(), "--out", tmp_path / "out")
+    done = in_a_process(scenario(), "--out", tmp_path / "out")
     assert done.returncode == 0
     assert done.stderr == ""
     assert "e_pos_rms" in done.stdout
@@ -50,7 +60,7 @@ def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
 
 
 def test_quiet_without_plots_says_and_draws_nothing(scenario, tmp_path):
-    done = command(scenario(), "--out", tmp_path / "out", "--quiet", "--no-plots")
+    done = in_a_process(scenario(), "--out", tmp_path / "out", "--quiet", "--no-plots")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert not PICTURES & {p.name for p in (tmp_path / "out").iterdir()}
 
@@ -65,10 +75,7 @@ def test_metrics_do_not_depend_on_what_is_logged(scenario, tmp_path):
 
 def test_metrics_of_a_log_are_those_of_its_run(scenario, tmp_path):
     command(scenario(metrics={"from": 0.5, "to": 1.5}), "--out", tmp_path / "out", "--no-plots")
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim.metrics", str(tmp_path / "out"), "--json"],
-        capture_output=True, text=True, cwd=ROOT, check=True,
-    )  # fmt: skip
+    done = support.command.command(metrics.main, tmp_path / "out", "--json")
     again, own = json.loads(done.stdout), json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert again == pytest.approx(own)
     assert (own["from"], own["to"]) == (0.5, 1.5)
@@ -77,18 +84,51 @@ def test_metrics_of_a_log_are_those_of_its_run(scenario, tmp_path):
 def test_runs_are_laid_over_each_other(scenario, tmp_path):
     for name in "ab":
         command(scenario(), "--out", tmp_path / name, "--no-plots")
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim.plots", *(str(tmp_path / n) for n in "ab"), "--out", str(tmp_path / "c")],
-        capture_output=True, text=True, cwd=ROOT, check=False,
-    )  # fmt: skip
+    done = support.command.command(plots.main, tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c")
     assert (done.returncode, done.stderr) == (0, "")
     assert {p.name for p in (tmp_path / "c").iterdir()} == PICTURES
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim.plots", str(tmp_path / "nowhere")],
-        capture_output=True, text=True, cwd=ROOT, check=False,
-    )  # fmt: skip
+    done = support.command.command(plots.main, tmp_path / "nowhere")
     assert done.returncode == 2
     assert "no log in" in done.stderr
+
+
+@pytest.mark.slow
+def test_instances_may_have_any_names(ellipse, tmp_path):
+    """With their roles stated, metrics and pictures are those of the usual names, to the byte."""
+    new = {
+        "vessel": "ship",
+        "guidance": "path",
+        "controller": "law",
+        "thrusters": "drives",
+        "observer": "filter",
+    }
+
+    def renamed(signal):
+        instance, dot, variable = signal.partition(".")
+        return new[instance] + dot + variable
+
+    other = {
+        **ellipse,
+        "fmus": {new[name]: entry for name, entry in ellipse["fmus"].items()},
+        "connections": [[renamed(end) for end in pair] for pair in ellipse["connections"]],
+        "faults": [
+            {**f, "signals": [renamed(name) for name in f["signals"]]} for f in ellipse["faults"]
+        ],
+        "roles": {
+            role: [renamed(name) for name in names] for role, names in Roles().model_dump().items()
+        },
+    }
+    results = [
+        cosim.simulate(cosim.load_scenario(content), tmp_path / name, pictures=True)
+        for name, content in (("usual", ellipse), ("other", other))
+    ]
+    assert results[0].metrics == results[1].metrics != {}
+    for name in ("metrics.json", *PICTURES):
+        assert (tmp_path / "usual" / name).read_bytes() == (tmp_path / "other" / name).read_bytes(), name
+    assert "roles" not in json.loads((tmp_path / "usual" / "log.json").read_text())["scenario"]
+    again = json.loads((tmp_path / "other" / "log.json").read_text())["scenario"]["roles"]
+    assert again == other["roles"]
+    assert cosim.simulate(cosim.load_scenario({**other, "roles": {}}), tmp_path / "none").metrics == {}
 
 
 def test_default_folder_is_results_and_the_name(scenario, tmp_path):
@@ -144,7 +184,7 @@ def test_failed_simulation_is_exit_3_with_the_log_kept(scenario, tmp_path):
     events = [
         {"time": 1.0, "model": "vessel", "variable": "tau_X", "action": "override", "value": 1e300}
     ]
-    done = command(scenario(events=events), "--out", tmp_path / "out")
+    done = in_a_process(scenario(events=events), "--out", tmp_path / "out")
     assert done.returncode == 3
     assert "vessel: the step from t = 1.0 s returned discard" in done.stderr
     assert "Traceback" not in done.stderr
@@ -289,7 +329,7 @@ def test_wrong_parameter_set_is_refused(scenario, tmp_path, text, message):
 def test_unpacked_fmus_are_removed(scenario, tmp_path):
     env = {**os.environ, "TMPDIR": str(tmp_path / "tmp")}
     (tmp_path / "tmp").mkdir()
-    assert command(scenario(), "--out", tmp_path / "out", "--no-plots", env=env).returncode == 0
+    assert in_a_process(scenario(), "--out", tmp_path / "out", "--no-plots", env=env).returncode == 0
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
@@ -356,9 +396,6 @@ def test_full_disk_is_one_message(scenario, tmp_path):
 
 def test_metrics_never_overwrite_the_log(scenario, tmp_path):
     command(scenario(), "--out", tmp_path / "out", "--no-plots")
-    done = subprocess.run(
-        [sys.executable, "-m", "cosim.metrics", str(tmp_path / "out"), "--out", str(tmp_path / "out" / "log.csv")],
-        capture_output=True, text=True, cwd=ROOT, check=False,
-    )  # fmt: skip
+    done = support.command.command(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / "log.csv")
     assert done.returncode == 2
     assert "is the log itself" in done.stderr

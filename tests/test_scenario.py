@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from conftest import GAIN, ROOT
+from support.plain import GAIN
+from support.project import ROOT
 
 import cosim
 from cosim.errors import InputError
@@ -41,6 +42,10 @@ def test_shipped_scenario_is_valid_and_named_like_its_file(path):
         ({"stop": 2.005}, "stop = 2.005 s is not a multiple of step = 0.01 s"),
         ({"stop": float("inf")}, "stop: "),
         ({"seed": -1}, "seed: "),
+        ({"roles": {"poses": []}}, "roles.poses: unknown key; did you mean 'pose'?"),
+        ({"roles": {"pose": ["vessel.x", "vessel.y"]}}, "roles.pose[2]: is missing"),
+        ({"roles": {"pose": ["vessel.x", "vessel.y", "vessel.psy"]}}, "roles.pose: 'vessel' has no variable 'psy'; did you mean 'psi'?"),
+        ({"roles": {"target": ["guide.x_t", "guidance.y_t", "guidance.psi_t"]}}, "roles.target: no instance 'guide'; did you mean 'guidance'?"),
         ({"algorithm": "newton"}, "'gauss_seidel' or 'jacobi'"),
         ({"name": "a/b"}, "name: cannot be the name of a folder"),
         ({"name": ".."}, "name: cannot be the name of a folder"),

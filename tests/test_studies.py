@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import cosim
-from studies.command import study_parser
-from studies.report import Report, seeds_line
-from studies.runs import Interval, interval, paired, ratio, run_all, shipped, vary, without
+from studies.monte_carlo import Interval, interval, paired, ratio, run_all, shipped, vary, without
+from studies.study_command import study_parser
+from studies.study_report import Report, seeds_line
 
 
 def test_variant_leaves_the_shipped_content_alone():
@@ -40,6 +40,7 @@ def last_x(result):
     return float(cosim.read_log(result.folder, ["observer.x_m"])["observer.x_m"][-1])
 
 
+@pytest.mark.slow
 def test_runs_come_back_by_variant_and_seed(tmp_path):
     short = vary(shipped("ellipse"), stop=0.5, metrics={})
     moved = vary(short, parameters={"vessel.x_0": 7.0})
@@ -102,7 +103,7 @@ def test_what_fails_half_way_leaves_the_file_of_before(tmp_path):
     path.write_text("before")
 
     def fail():
-        with cosim.whole(path) as scratch:
+        with cosim.atomic_write(path) as scratch:
             scratch.write_text("half")
             raise RuntimeError("stopped half way")
 

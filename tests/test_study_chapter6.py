@@ -8,11 +8,11 @@ import pytest
 import cosim
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
-from studies import chapter6, hoard, lessons, margin, sysid4, trials
+from studies import chapter6, lessons, margin, store_contents, sysid4, trials
 from studies.found import FAULTY, REGULAR, Found, share
+from studies.monte_carlo import shipped, vary
 from studies.outcome import missing, quick
 from studies.replay import parameters
-from studies.runs import shipped, vary
 
 SLOW = trials.TRIALS[0]
 
@@ -26,7 +26,7 @@ def run(content, folder):
 def test_plant_has_the_coefficients_of_table_7_1():
     named = sysid4.parameters()
     own = {k.removeprefix("vessel."): x for k, x in named.items() if k.startswith("vessel.")}
-    damping = vessel.hull(parameters(vessel.COMPONENT, own)).damping
+    damping = vessel.COMPONENT.prepare(parameters(vessel.COMPONENT, own)).hull.damping
     assert damping.rotational == pytest.approx(
         RotationalDamping(-0.014, 1.55, 0.017, 0.2, 0.017, -1.8, -0.02, -0.2)
     )
@@ -92,14 +92,14 @@ def test_quick_part_is_without_what_is_slow_even_at_the_ends():
     assert left == pytest.approx(fast, abs=0.01), "a moving mean would leave half of the slow part there"
 
 
-def test_spike_is_told_from_the_end_of_a_freeze():
+def test_spike_is_distinguished_from_the_end_of_a_freeze():
     t = np.arange(0.0, 10.0, 0.01)
     x = 0.08 * t
     x[300:400] = x[300]
     x[700] += 0.1
     x[800] -= 0.1
-    assert hoard.spike_times({"time": t, "observer.x_m": x}) == pytest.approx([7.0, 8.0])
-    assert hoard.echo(np.array([6.9, 7.0, 7.9, 9.1]), np.array([7.0, 8.0])).tolist() == [
+    assert store_contents.spike_times({"time": t, "observer.x_m": x}) == pytest.approx([7.0, 8.0])
+    assert store_contents.echo(np.array([6.9, 7.0, 7.9, 9.1]), np.array([7.0, 8.0])).tolist() == [
         False,
         True,
         True,
@@ -113,14 +113,16 @@ def test_replayed_controller_stores_what_it_stored_in_the_run(name, tmp_path):
     spikes = {**trials.SPIKES, "at": [8.0]}
     del spikes["rate"]
     faults = [f for f in content["faults"] if f["kind"] != "spikes"] + [spikes]
-    content = vary(content, faults=faults, log={"signals": hoard.logged(f"{name}.fmu")})
+    content = vary(content, faults=faults, log={"signals": store_contents.logged(f"{name}.fmu")})
     result = cosim.simulate(cosim.load_scenario(content), tmp_path)
     log = cosim.read_log(tmp_path)
     values = json.loads((tmp_path / "log.json").read_text())["scenario"]["fmus"]["controller"]
-    sigma, _ = hoard.replayed(hoard.controller(f"{name}.fmu"), log, values["parameters"])
+    sigma, _ = store_contents.replayed(
+        store_contents.controller(f"{name}.fmu"), log, values["parameters"]
+    )
     assert sigma[-1] > 0.0
     assert sigma == pytest.approx(log["controller.sigma_min"], rel=1e-9, abs=1e-12)
-    held = hoard.hoard(result)
+    held = store_contents.store_contents(result)
     assert held.spikes == 1.0
     assert held.time == pytest.approx(1.0 / 12.0, rel=0.02)
     assert 0.0 <= held.stored <= 1.0
@@ -229,8 +231,18 @@ def test_spikes_are_the_cause_where_they_are():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_whole_study_in_small(tmp_path):
-    report = chapter6.study(tmp_path, range(1), 0.03, None)
+@pytest.mark.usefixtures("serial")
+def test_whole_study_in_small(tmp_path, monkeypatch):
+    draw, sets = chapter6.draw, {}
+
+    def one_set(logs, folder):
+        """Of the eight sets of pictures, which differ by their data alone, the first is drawn."""
+        sets[folder.relative_to(tmp_path).as_posix()] = (
+            [path.name for path in draw(logs, folder)] if not sets else []
+        )
+
+    monkeypatch.setattr(chapter6, "draw", one_set)
+    report = chapter6.study(tmp_path, range(1), 0.02, None)
     text = report.read_text()
     results = json.loads((tmp_path / "results.json").read_text())
     assert len(results["lessons"]) == 10
@@ -242,4 +254,12 @@ def test_whole_study_in_small(tmp_path):
     assert set(surge) == {0.0}
     pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
     assert len(pictures) == 40
-    assert all((tmp_path / picture).is_file() for picture in pictures)
+    assert len(sets) == 8
+    drawn, names = next(iter(sets.items()))
+    assert len(names) == 5
+    for folder in sets:
+        assert {f"{folder}/{name}" for name in names} <= set(pictures)
+    for name in names:
+        picture = tmp_path / drawn / name
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert picture.stat().st_size > 10_000

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from scipy.io import savemat
+from support.project import ROOT
 
 from cosim import InputError
 from studies import basin, estimators
@@ -152,6 +152,7 @@ def test_kalman_predicts_the_real_ship_best():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("serial")
 def test_whole_study(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(estimators, "QUICK_STOP", 42.0)
     assert estimators.main(["--quick", "--seeds", "1", "--out", str(tmp_path)]) == 0

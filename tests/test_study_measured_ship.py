@@ -10,16 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import ROOT
-from measured import DATA, needs_data, sail
 from scipy.io import savemat
+from support.measured import DATA, needs_data, sail
+from support.project import ROOT
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Model, session
-from diagnosis.evidence import Evidence, Seen
-from diagnosis.selection import Finding, Learned, Suspect
-from diagnosis.weak import integrals, omega
+from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, integrals, omega, session
+from diagnosis.identification import Suspect
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import allocate
 from fmus.thrusters.chain import Inputs
@@ -52,7 +50,7 @@ def test_nominal_force_is_a_straight_line():
 
 def test_force_is_that_of_the_fmu_at_rest():
     model = Model().plus({**CURVE, "deadband": 0.05, "loss_surge": 0.1, "plant_F_vsp": 0.2})
-    p = model.drive
+    p = model.drive.params
     for command in COMMANDS:
         inputs = Inputs(Force(1.165 * command, 0.0, 0.0), Velocity())
         _, out = COMPONENT.advance(COMPONENT.init(inputs, p), inputs, COMPONENT.prepared(p), 0.01)
@@ -114,6 +112,14 @@ def test_power_that_is_full_changes_nothing():
     assert np.sqrt(np.mean(omega(half, Model())[:, 0] ** 2)) > 1.2 * known[0]
 
 
+def delayed(time, commands, delay):
+    """Mean over each interval of commands (n, k) that are held, ``delay`` [s] ago; zero before the first."""
+    edges = np.append(time, 2.0 * time[-1] - time[-2])
+    sums = np.vstack([0.0 * commands[:1], np.cumsum(commands * np.diff(edges)[:, None], axis=0)])
+    at = np.column_stack([np.interp(edges - delay, edges, column) for column in sums.T])
+    return np.diff(at, axis=0) / np.diff(edges)[:, None]
+
+
 def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
     def crossed(run):
         commands = five(run)
@@ -122,10 +128,10 @@ def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
 
     w = windows(crossed, seconds=160.0)
     model = Model().plus({"delay": 0.2})
-    late = leave_one_out.delayed(w.run.time, w.run.five[:, [0, 2, 4]], 0.2)
+    arriving = delayed(w.run.time, w.run.five[:, [0, 2]], 0.2)
     omega_left = np.random.default_rng(0).normal(size=(w.middle.size, 3))
-    omega_left[:, 1] = w.held @ (late[:, 0] - late[:, 1])
-    e = Evidence(w, None, True, *[Seen(omega_left, np.zeros((0, 3)), None)] * 2)
+    omega_left[:, 1] = w.held @ (arriving[:, 0] - arriving[:, 1])
+    e = Evaluation(Model(), w, None, True, *[PredictionError(omega_left, np.zeros((0, 3)), None)] * 2)
     found = leave_one_out.commanded(e, model)
     assert found.single[1] == pytest.approx(1.0)
     assert max(*found.both, found.single[0], found.single[2]) < 0.1
@@ -199,12 +205,13 @@ def measure(folder, seeds=(1, 2), seconds=64.0):
     pd.DataFrame(pulls).to_csv(folder / bollard.PULLS, index=False)
 
 
+@pytest.mark.slow
 def test_report_has_all_that_was_learned(tmp_path, monkeypatch):
     measure(tmp_path)
     model = Model().plus(CURVE)
     sure = {name: (value - 0.1, value + 0.1) for name, value in CURVE.items()}
     finding = Finding("thrust_curve", CURVE, sure, 0.9, ["deadband"], 0.8, 0.8, model)
-    told = Learned([finding], [], model, [Suspect("Y_r", 74.0, 0.5)])
+    learned = Findings([finding], [], model, [Suspect("Y_r", 74.0, 0.5)])
     sound = SimpleNamespace(
         nominal_min_dissipation=0.1,
         learned_min_dissipation=0.2,
@@ -213,8 +220,8 @@ def test_report_has_all_that_was_learned(tmp_path, monkeypatch):
         mass_definite=True,
         notes=(),
     )
-    monkeypatch.setattr(session, "learn", lambda *_: told)
-    monkeypatch.setattr(session, "check", lambda *_: sound)
+    monkeypatch.setattr(session, "method", lambda _: SimpleNamespace(fit=lambda *_: learned))
+    monkeypatch.setattr(session, "check_stability", lambda *_: sound)
     report = measured_ship.study(tmp_path, tmp_path / "out", 1.0, quick=False)
     text = report.read_text(encoding="utf-8")
     results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))

@@ -4,17 +4,16 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.project import ROOT
 
 import cosim
 from cosim.interface import interface
 from cosim.scenario import load_scenario
 from cosim.system import prepare
 
-ROOT = Path(__file__).parent.parent
 SWAP = (ROOT / "docs" / "swap.md").read_text()
 SCENARIO = ROOT / "scenarios" / "ellipse.json"
 

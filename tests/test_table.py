@@ -3,12 +3,12 @@
 import json
 
 import pytest
-from conftest import ROOT
+from support.project import ROOT
 
 import cosim
 from cosim.errors import InputError
 from cosim.system import prepare
-from cosim.table import read_table
+from cosim.system.parameter_table import read_table
 
 GOOD = "x, y, u\n5.0, 2.0, 0.06\n\n6.5, 2.0, 0.1\n6.5, -1.0, 0.06\n"
 

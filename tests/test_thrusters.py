@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import Allocation, allocate, thrust
-from fmus.thrusters.chain import Inputs, Past, Plant, Power
+from fmus.thrusters.chain import Inputs, Plant, Power
 from fmus.thrusters.thrusters import COMPONENT
 
 Params = COMPONENT.params
@@ -17,7 +17,7 @@ offset = st.floats(-0.1, 0.1)
 
 
 def run(X, Y, N, p=Params()):
-    return COMPONENT.step(Past(), Inputs(Force(X, Y, N), Velocity()), p, 0.01)[1]
+    return COMPONENT.step(COMPONENT.init(None, p), Inputs(Force(X, Y, N), Velocity()), p, 0.01)[1]
 
 
 @given(command, command, command, offset, offset)

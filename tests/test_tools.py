@@ -10,33 +10,34 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from exchanged import NEEDS, log_of, need, write
+from support.exchanged import NEEDS, log_of, need, write
+from support.shared import once
 
 import cosim
 from benchmarks import same_answer
 from cosim import InputError
-from cosim.exchange.groups import NAMESPACE as OSP_MODELS
 from cosim.export import export_fmu, export_osp, export_ssp
-from cosim.export import main as export
+from cosim.export.__main__ import main as export
+from cosim.formats.namespaces import OSP_MODELS
 
 TOOLS = (Path(__file__).parent.parent / "docs" / "tools.md").read_text()
 STEPS = 200
 
 
 @pytest.fixture(scope="module")
-def answers(tmp_path_factory):
-    """A folder with the exported ellipse, and this master's answers on demand."""
-    work = tmp_path_factory.mktemp("answers")
-    plan = same_answer.make_plan(work, STEPS)
-    kept = {}
+def answers(shared):
+    """The answers of this master and of other tools on demand, each made once for all worker processes."""
+    work = once(shared / "answers", lambda folder: same_answer.make_plan(folder, STEPS))
 
     def answer(case):
-        if case not in kept:
-            kept[case] = same_answer.run_apart(case, work)
-        assert not isinstance(kept[case], str), kept[case]
-        return kept[case][-STEPS:]
+        def work_out(folder):
+            found = same_answer.run_apart(case, work)
+            assert not isinstance(found, str), found
+            np.save(folder / "found.npy", found)
 
-    answer.plan = plan
+        return np.load(once(shared / f"answer_{case}", work_out) / "found.npy")[-STEPS:]
+
+    answer.plan = json.loads((work / "plan.json").read_text())
     return answer
 
 
@@ -98,15 +99,15 @@ def test_events_act_in_libcosim(portable, tmp_path):
     ]
     write(portable, tmp_path / "osp", export_osp)
     steps = round(portable["stop"] / portable["step"])
-    told = re.findall(r"^(\S+) (-\S+)$", python(WITH_EVENTS, tmp_path, steps), re.M)
-    v, delta = map(float, told[0])
+    found = re.findall(r"^(\S+) (-\S+)$", python(WITH_EVENTS, tmp_path, steps), re.M)
+    v, delta = map(float, found[0])
     assert delta == -9.0
     result, _ = log_of(portable, tmp_path / "out")
     assert v == pytest.approx(cosim.read_log(result.folder, ["vessel.v"])["vessel.v"][-1], rel=1e-9)
 
 
 def test_foreign_parameters_travel_beside(chain, tmp_path):
-    """FMPy does not take them, and that is told; the foreign FMUs are the same bytes."""
+    """FMPy ignores them, and a note says so; the foreign FMUs are the same bytes."""
     notes = write(chain, tmp_path / "chain.ssp", export_ssp)
     assert len(notes) == 1
     assert "gain: k cannot be baked" in notes[0]

@@ -1,4 +1,4 @@
-"""What strangers send: archives that would leave their folder or fill the disk, XML bombs, programs."""
+"""Untrusted input: archives that would leave their folder or fill the disk, XML bombs, unknown binaries."""
 
 import ast
 import json
@@ -10,12 +10,13 @@ import zipfile
 from dataclasses import replace
 
 import pytest
-from conftest import GAIN, ROOT
+from support.plain import GAIN
+from support.project import ROOT
 
 import cosim
-from cosim.archive import Limits, check_archive, unpack
 from cosim.errors import InputError
-from cosim.ssv import read_parameters
+from cosim.fmu.archive_check import Limits, check_archive, unpack
+from cosim.formats.ssv import read_parameters
 
 MODEL = '<fmiModelDescription fmiVersion="2.0"/>'
 
@@ -166,8 +167,8 @@ def test_master_has_no_way_to_run_text():
                 assert not modules & {n.partition(".")[0] for n in names}, (path, node.lineno)
 
 
-def test_whoever_reads_xml_or_unpacks_looks_first():
-    """Parsing goes with check_xml in the same module; archives are unpacked by cosim.archive alone."""
+def test_every_reader_of_xml_or_archives_checks_first():
+    """Parsing goes with check_xml in the same module; archives are unpacked by cosim.fmu.archive_check alone."""
     parsers = ("ElementTree.fromstring(", "ElementTree.parse(", "ElementTree.iterparse(", "etree.XML(")
     readers = []
     for path in (ROOT / "cosim").rglob("*.py"):
@@ -177,7 +178,7 @@ def test_whoever_reads_xml_or_unpacks_looks_first():
         if any(parser in source for parser in parsers):
             assert "check_xml(" in source, path
             readers.append(path.name)
-    assert {"fmu.py", "ssv.py", "reading.py"} <= set(readers)
+    assert {"fmu_model.py", "ssv.py", "documents.py"} <= set(readers)
 
 
 def test_text_in_a_scenario_stays_text(ellipse, tmp_path):

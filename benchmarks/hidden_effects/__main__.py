@@ -1,4 +1,4 @@
-"""Does the diagnosis find an effect that it was not told of? ``python -m benchmarks.hidden_effects``."""
+"""How often the diagnosis finds effects hidden in the ship: ``python -m benchmarks.hidden_effects``."""
 
 import argparse
 import os
@@ -16,14 +16,14 @@ import numpy as np
 from cosim import InputError, SimulationError
 from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.errors import nearest
-from studies.command import progress
+from studies.study_command import progress
 
+from .cell import Cell, trial
 from .cost import Cost, measure
 from .draw import SINGLE
-from .report import write
 from .results import Results, Row
-from .runs import NOISE, build
-from .trial import Cell, trial
+from .simulated_runs import NOISE, build
+from .summary import write
 
 OUT = Path("docs") / "benchmarks" / "hidden_effects"
 NONES, PAIRS = 5, 4  # cells without an effect and with two, for each of the others and a seed
@@ -41,7 +41,7 @@ def cells(
         rng = np.random.default_rng([seed, 4])
         drawn = [rng.choice(effects, 2, replace=False).tolist() for _ in range(PAIRS * several)]
         pairs = dict.fromkeys(tuple(pair) for pair in drawn)
-        # The courses are those of the seed; all else is drawn anew.
+        # The manoeuvres are those of the seed; all else is drawn anew.
         nones = [seed + 100 * k for k in range(NONES * several)]
         yield from (Cell((e,), *way, seed) for way in ways for e in effects)
         yield from (Cell((), *way, each) for way in ways for each in nones)
@@ -59,13 +59,13 @@ def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
     with TemporaryDirectory() as folder, progress(len(todo), "cells") as advance:
         build(Path(folder))
         for k in range(0, len(todo), CELLS * jobs):
-            for row in answers(todo[k : k + CELLS * jobs], Path(folder), jobs, peers):
+            for row in results_of(todo[k : k + CELLS * jobs], Path(folder), jobs, peers):
                 results.add(row)
                 advance()
 
 
-def answers(some: Sequence[Cell], fmus: Path, jobs: int, peers: bool) -> Iterator[Row]:
-    """What became of some cells, as they come, by new processes.
+def results_of(some: Sequence[Cell], fmus: Path, jobs: int, peers: bool) -> Iterator[Row]:
+    """Results of some cells, as they come, by new processes.
 
     A Python FMU stays in its process for good: after many runs each further one would be slower.
     """
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list[bool], range]:
-    """Effects, noises, kinds of coefficients and seeds that are asked for."""
+    """Effects, noises, kinds of coefficients and seeds that are chosen."""
     for e in options.effects:
         if e not in SINGLE:
             raise InputError(f"no effect '{e}'{nearest(e, SINGLE)}")
@@ -124,8 +124,8 @@ def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list
     return effects, noises, wrong, range(options.first, options.first + options.seeds)
 
 
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    """What turns an argument into a whole number within limits."""
+def _integer(low: int, high: int) -> Callable[[str], int]:
+    """Parser of an argument that is a whole number within limits."""
 
     def number(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
@@ -135,13 +135,13 @@ def _whole(low: int, high: int) -> Callable[[str], int]:
     return number
 
 
-_count, _seed = _whole(1, 100), _whole(0, 99)
+_count, _seed = _integer(1, 100), _integer(0, 99)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.hidden_effects",
-        description="Hide an effect in a ship, and see whether the diagnosis finds it.",
+        description="Hide an effect in a ship, and test whether the diagnosis finds it.",
         epilog="examples:\n"
         "  python -m benchmarks.hidden_effects --quick --out /tmp/hidden\n"
         "  python -m benchmarks.hidden_effects --effects X_u 'Y_|v|v' --noise n1 n10 --exact --seeds 3\n"

@@ -17,12 +17,11 @@ import numpy as np
 import pandas as pd
 
 from cosim import SimulationError
-from diagnosis import Run, clean, read, smooth
-from diagnosis.selection import learn
-from diagnosis.weak import integrals
+from diagnosis import Model, Run, clean, integrals, method, read, smooth
+from diagnosis.progress import silent
 
-from .courses import courses
-from .runs import Hidden, sail
+from .manoeuvres import manoeuvres
+from .simulated_runs import Hidden, sail
 
 HIDDEN = Hidden({"delta_X_u": -1.0})
 HOUR, RATE = 3600.0, 100.0
@@ -38,7 +37,7 @@ class Cost(NamedTuple):
 
 def measure(fmus: Path) -> Cost:
     """Make the runs, and let another process learn from them."""
-    runs = [sail(course, HIDDEN, 4.0, k, fmus).measured for k, course in enumerate(courses(0))]
+    runs = [sail(m, HIDDEN, 4.0, k, fmus).measured for k, m in enumerate(manoeuvres(0))]
     with TemporaryDirectory() as folder:
         files = [_save(Path(folder) / f"{k}.csv", run) for k, run in enumerate(runs)]
         seconds, _ = _learned(files)
@@ -77,7 +76,7 @@ def _learned(files: Sequence[Path]) -> tuple[float, float]:
 def main() -> None:
     begun = time.perf_counter()
     data = [integrals(smooth(clean(read(path)))) for path in sys.argv[1:]]
-    learn(data, 0.1)
+    method().fit(data, Model(), 0.1, silent, 0)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     print(time.perf_counter() - begun, peak)
 

@@ -1,8 +1,8 @@
 """What is hidden, and how much of it: sizes log-uniform, 5 to 40 % of the force on its axis.
 
 The size of an effect is the RMS of the force that it adds over the RMS of the force that the thrusters
-give, on the axis where that is most, over the courses to learn from. It is set by the motion of a ship
-that lacks nothing: the controller follows its course with the effect as well.
+give, on the axis where that is most, over the training runs. It is set by the motion of a ship without
+any effect: with the effect the controller follows the same path.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,20 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.effects import EFFECTS
+from fmus.effects import STANDARD
 
-from .runs import FINE, STEP, STOP
+from .simulated_runs import FINE, STEP, STOP
 from .truth import NAMES, Motion, Values, force, over, windows
 
 SMALLEST, LARGEST = 0.05, 0.4
 NODES = np.linspace(-1.0, 1.0, 21)
-# Ids of hidden effects whose form the analysis does not have, and the ids that come nearest.
+# Ids of hidden effects whose form the diagnosis does not have, and the ids that come nearest.
 FOREIGN: dict[str, tuple[str, ...]] = {
     "drag |u|^1.5": ("X_u", "X_|u|u", "curve_X(u)"),
     "bow exp(-(u/u0)^2)": ("bow_speed_loss", "curve_bow(|u|)"),
     "delay off the grid": ("delay",),
 }
-SINGLE = [*EFFECTS, *FOREIGN]
+SINGLE = [*STANDARD, *FOREIGN]
 Scaled = Callable[[float], dict[str, float]]
 
 
@@ -64,7 +64,7 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     """
     scaled = form(effect, rng, pilot)
     size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
-    if effect == "bow_failure":  # its moment is drawn, not its size
+    if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
     else:
         values = scaled(_solve(lambda s: share(pilot, effect, scaled(s)), size))
@@ -90,7 +90,7 @@ def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:
 
 
 def added_force(pilot: Sequence[Motion], effect: str, values: Values) -> np.ndarray:
-    """Windows (K, 3) of the force of an effect, those that the analysis does not have included."""
+    """Windows (K, 3) of the force of an effect, those of foreign form included."""
     if effect not in LAWS:
         return over(pilot, values)
     return np.concatenate([windows(LAWS[effect](m, *values.values())) for m in pilot])
@@ -106,8 +106,8 @@ def drag(m: Motion, at_one: float) -> np.ndarray:
 def fading(m: Motion, inverse: float) -> np.ndarray:
     """Force (n, 3) that is lost of a bow thruster as effective as exp(-(inverse u)^2)."""
     kept = np.exp(-((inverse * m.nu[:, 0]) ** 2))
-    asked = m.asked * np.column_stack([np.ones_like(kept), np.ones_like(kept), kept])
-    return Motion(m.time, m.eta, m.nu, m.nu_dot, asked).tau - m.tau
+    commanded = m.commanded * np.column_stack([np.ones_like(kept), np.ones_like(kept), kept])
+    return Motion(m.time, m.eta, m.nu, m.nu_dot, commanded).tau - m.tau
 
 
 LAWS = {"drag |u|^1.5": drag, "bow exp(-(u/u0)^2)": fading}
@@ -147,7 +147,7 @@ def form(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scal
     if effect in FORMS:
         return FORMS[effect](rng, pilot)
     sign = float(rng.choice([-1.0, 1.0]))
-    names = EFFECTS[effect].coefficients
+    names = STANDARD[effect].coefficients
     if len(names) == 1:
         return lambda s: {names[0]: sign * s}
     if effect in REACH:
@@ -159,8 +159,8 @@ def form(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scal
 # What a free curve is over, and whether it is over both signs.
 REACH: dict[str, tuple[Callable[[Motion], np.ndarray], bool]] = {
     "curve_X(u)": (lambda m: m.nu[:, 0], True),
-    "curve_vsp_x(c)": (lambda m: m.asked[:, 0], True),
-    "curve_vsp_y(c)": (lambda m: m.asked[:, 1], True),
+    "curve_vsp_x(c)": (lambda m: m.commanded[:, 0], True),
+    "curve_vsp_y(c)": (lambda m: m.commanded[:, 1], True),
     "curve_bow(|u|)": (lambda m: np.abs(m.nu[:, 0]), False),
 }
 
@@ -168,12 +168,12 @@ REACH: dict[str, tuple[Callable[[Motion], np.ndarray], bool]] = {
 def _shape(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
     """Two bumps of opposite sign within what the runs cover: no polynomial, no dead band."""
     over, both = REACH[effect]
-    e = EFFECTS[effect]
+    e = STANDARD[effect]
     reach = e.parameters[-1].start
-    seen = np.concatenate([over(m) for m in pilot])
+    covered = np.concatenate([over(m) for m in pilot])
     nodes = reach * (NODES if both else 0.5 * (NODES + 1.0))
     spacing = nodes[1] - nodes[0]
-    places = np.quantile(seen, [rng.uniform(0.1, 0.4), rng.uniform(0.6, 0.9)])
+    places = np.quantile(covered, [rng.uniform(0.1, 0.4), rng.uniform(0.6, 0.9)])
     sign = float(rng.choice([-1.0, 1.0]))
     bumps = [np.exp(-0.5 * ((nodes - place) / spacing) ** 2) for place in places]
     values = sign * (bumps[0] - float(rng.uniform(0.5, 1.0)) * bumps[1])
@@ -201,8 +201,8 @@ def _thrust_curve(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
 
 
 def _saturation(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    """The VSP, the bow thruster, or both, limited to a part of the most that they are asked for."""
-    most = np.max([np.abs(m.asked).max(axis=0) for m in pilot], axis=0)
+    """The VSP, the bow thruster, or both, limited to a part of their largest command."""
+    most = np.max([np.abs(m.commanded).max(axis=0) for m in pilot], axis=0)
     full = {"saturation_vsp": 1.165 * float(max(most[:2])), "saturation_bow": 2.629 * float(most[2])}
     names = list(full)[: rng.integers(1, 3)] if rng.random() < 0.5 else list(full)[1:]
     return lambda s: {name: full[name] / (1.0 + s) for name in names}

@@ -1,12 +1,12 @@
-"""Thrusters that the analysis does not share: the bow's effectiveness is exp(-(u/u_0)^2).
+"""Thrusters that the diagnosis does not know: the bow's effectiveness is exp(-(u/u_0)^2).
 
 A component file: ``python -m fmus.build benchmarks/hidden_effects/other_thrusters.py --out fmu``.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from fmus.declare import POSITIVE
-from fmus.effects.registry import Running
+from fmus.effects import Running
 from fmus.hull import Triple
 from fmus.ops import exp
 from fmus.thrusters.chain import thrusters
@@ -23,6 +23,5 @@ def fading(now: Running, p: Bow) -> Triple:
     return now.u_vsp_x, now.u_vsp_y, now.u_bow * exp(-slow * slow)
 
 
-COMPONENT: Any = thrusters(
-    "other_thrusters", "Thrusters whose bow fades with the surge speed", Bow, fading, same
-)
+make = thrusters("other_thrusters", "Thrusters whose bow fades with the surge speed", Bow, fading, same)
+COMPONENT = make()

@@ -1,34 +1,34 @@
-"""A ship that the analysis does not share: drag by |u|^1.5, integrated by semi-implicit Euler.
+"""A ship that the diagnosis does not know: drag by |u|^1.5, integrated by semi-implicit Euler.
 
 A component file: ``python -m fmus.build benchmarks/hidden_effects/other_vessel.py --out fmu``.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from fmus.declare import POSITIVE, Component
+from fmus.declare import POSITIVE, Component, bundle
 from fmus.frames import rotate_to_earth
 from fmus.ops import Number, sqrt
 from fmus.signals import Force, Velocity
 from fmus.vessel import vessel
+
+SHIP = vessel.COMPONENT
 
 
 class Drag(NamedTuple):
     drag_1_5: Annotated[float, "N", "surge drag at 1 m/s, growing as |u|^1.5", POSITIVE] = 0.0
 
 
-class Params(NamedTuple):
-    ship: vessel.Params = vessel.Params()
-    drag: Drag = Drag()
+Params = bundle("Params", ship=SHIP.params(), drag=Drag())
 
 
-def motion(s: vessel.State, tau: Force, p: Params, b: vessel.Prepared) -> tuple[Number, Number, Number]:
+def motion(s: vessel.State, tau: Force, p: Any, b: vessel.Prepared) -> tuple[Number, Number, Number]:
     """nu_dot [m/s2, m/s2, rad/s2]."""
     drag = p.drag.drag_1_5 * s.u * sqrt(abs(s.u))
-    return vessel.stirred(s, tau._replace(tau_X=tau.tau_X - drag), b)
+    return vessel.disturbed(s, tau._replace(tau_X=tau.tau_X - drag), b)
 
 
-def step(s: vessel.State, i: Force, p: Params, h: Number) -> tuple[vessel.State, vessel.Outputs]:
-    b = vessel.prepare(p.ship)
+def step(s: vessel.State, i: Force, p: Any, h: Number) -> tuple[vessel.State, vessel.Outputs]:
+    b = SHIP.prepared(p.ship)
     du, dv, dr = motion(s, i, p, b)
     u, v, r = s.u + h * du, s.v + h * dv, s.r + h * dr
     x_dot, y_dot = rotate_to_earth(s.psi + h * r, u, v)
@@ -39,8 +39,8 @@ def step(s: vessel.State, i: Force, p: Params, h: Number) -> tuple[vessel.State,
     return after, vessel.Outputs(pose, speed, *nu_dot, vessel.measured(after, b), *omega, *omega)
 
 
-def init(i: Force, p: Params) -> vessel.State:
-    return vessel.init(i, p.ship)
+def init(i: Force, p: Any) -> vessel.State:
+    return SHIP.init(i, p.ship)
 
 
 COMPONENT = Component(

@@ -9,14 +9,14 @@ from typing import Any
 
 from cosim import InputError
 
-from .runs import NOISE, POSITION
+from .simulated_runs import NOISE, POSITION
 
 BETWEEN = "; "
 
 
 @dataclass
 class Row:
-    """What became of one cell.
+    """The result of one cell.
 
     Attributes:
         effect, noise, coefficients, seed: which cell; ``none`` where nothing was hidden.
@@ -24,11 +24,11 @@ class Row:
         size: share of the force on its axis, of each effect.
         redrawn: how often the ship ran away and the effect was drawn smaller.
         found: ids in order of acceptance.
-        reported: the first id, and those that the diagnosis cannot tell from it.
+        reported: the first id, and those that the data do not distinguish from it.
         confidence: of the first.
         alike: ids that could do the same within 5 %, by the truth; "" is no effect at all.
         separable: there are none.
-        doubtful: the doubted coefficients alone could do the same.
+        absorbed: changes of nominal coefficients alone could do the same.
         right: the right effect came first; of two, both within two steps.
         in_set: the right effect is in the reported set.
         before_mm, after_mm: window position error of the run held out.
@@ -50,7 +50,7 @@ class Row:
     confidence: float = 0.0
     alike: list[str] = field(default_factory=list)
     separable: bool = False
-    doubtful: bool = False
+    absorbed: bool = False
     right: bool = False
     in_set: bool = False
     before_mm: float = float("nan")

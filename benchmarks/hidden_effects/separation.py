@@ -1,8 +1,8 @@
 """How much of a hidden force each other effect could not have given: from the truth alone.
 
 The separation of a hidden effect from another is the share of the hidden force, as a sum of squares with
-the axes weighted by noise, that the best fit of the other leaves over. Where the nominal coefficients
-are in doubt, they may change by up to 10 % each to help the other.
+the axes weighted by noise, that the best fit of the other leaves over. Nominal coefficients
+that are nuisance parameters may change by up to 10 % each in favour of the other.
 """
 
 from collections.abc import Sequence
@@ -12,19 +12,20 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from fmus.declare import variables
-from fmus.effects import EFFECTS
-from fmus.hull import Damping, Inertia
-from fmus.thrusters.chain import Plant
+from fmus.effects import STANDARD
+from fmus.ship import ship
 
 from .truth import WEIGHTS, Motion, Values, over
 
 SEPARABLE = 0.05
-# Coefficients that nobody knows exactly.
+# The nominal coefficients of hull and thrusters.
 COEFFICIENTS = {
-    v.name: v.start for group in (Inertia, Damping, Plant) for v in variables(group) if v.start != 0.0
+    name: declared[name].start
+    for name in ship().coefficients
+    for declared in (ship().parameters["vessel"] | ship().parameters["thrusters"],)
+    if declared[name].start != 0.0
 }
-DOUBT = 0.1
+MOST_CHANGE = 0.1  # of a coefficient; as much as the plants of the benchmark differ
 NOTHING = ""  # the id of no effect at all
 # A free curve that holds an effect as a special case is no rival of it: the simpler one must win.
 CONTAINS = {
@@ -48,11 +49,11 @@ GRIDS: dict[str, list[dict[str, float]]] = {
     "clock_offset": [{"clock_offset": sign * d} for sign, d in product((1.0, -1.0), STEPS)],
     "thrust_curve": [{"thrust_curve_deadband": d} for d in (0.0, *np.geomspace(0.01, 0.6, 14))],
 }
-# What scales an effect that a grid bends.
+# Linear parameters of an effect that is nonlinear in those of its grid.
 SCALES = {"thrust_curve": ("thrust_curve_ahead", "thrust_curve_astern")}
-ROUNDS = 3  # of effects that are straight where they are small
+GAUSS_NEWTON_STEPS = 3  # for effects that are differentiable and not linear
 SMALL = 1e-3
-CURVED = {
+DIFFERENTIABLE = {
     "current",
     "mass",
     "added_mass_X",
@@ -68,12 +69,12 @@ class Rivals:
     """All effects, as rivals on some runs.
 
     Attributes:
-        runs: true motions that the analysis learns from, of one plant.
-        doubted: whether nominal coefficients may change.
+        runs: true motions of the training runs, of one plant.
+        nuisance: whether nominal coefficients may change.
     """
 
     runs: Sequence[Motion]
-    doubted: bool
+    nuisance: bool
     Q: np.ndarray = field(init=False)
     R: np.ndarray = field(init=False)
 
@@ -87,7 +88,7 @@ class Rivals:
     @property
     def coefficients(self) -> dict[str, float]:
         """Those that may change."""
-        return COEFFICIENTS if self.doubted else {}
+        return COEFFICIENTS if self.nuisance else {}
 
     def separations(self, hidden: np.ndarray, right: Sequence[str]) -> dict[str, float]:
         """Separation of a hidden force from every rival.
@@ -98,17 +99,17 @@ class Rivals:
         """
         target = flat(hidden)
         contained = [e for e, held in CONTAINS.items() if held & set(right)]
-        found = {e: self.left(target, e) for e in EFFECTS if e not in {*right, *contained, "waves"}}
-        if self.doubted:
+        found = {e: self.left(target, e) for e in STANDARD if e not in {*right, *contained, "waves"}}
+        if self.nuisance:
             found[NOTHING] = self._share(target, target, [])
         return found
 
     def left(self, target: np.ndarray, effect: str) -> float:
         """Share of a force, flat and weighted, that the best fit of an effect leaves over."""
-        if effect in CURVED:
-            return self._bent(target, effect)
+        if effect in DIFFERENTIABLE:
+            return self._gauss_newton(target, effect)
         if effect not in GRIDS:
-            names = EFFECTS[effect].coefficients
+            names = STANDARD[effect].coefficients
             return self._share(target, target, [self._force({name: 1.0}) for name in names])
         shares = []
         for given in GRIDS[effect]:
@@ -122,11 +123,11 @@ class Rivals:
             shares += [(self._share(target, target - offset, []), offset) for offset in both]
         return min(1.0, *(share for share, _ in shares))  # it may as well be absent
 
-    def _bent(self, target: np.ndarray, effect: str) -> float:
-        """Share left by an effect that is nearly straight, by Gauss-Newton steps."""
-        names = EFFECTS[effect].coefficients
+    def _gauss_newton(self, target: np.ndarray, effect: str) -> float:
+        """Share left by a differentiable effect, by Gauss-Newton steps."""
+        names = STANDARD[effect].coefficients
         values, best = dict.fromkeys(names, 0.0), 1.0
-        for _ in range(ROUNDS):
+        for _ in range(GAUSS_NEWTON_STEPS):
             offset = self._force(values) if any(values.values()) else 0.0 * target
             columns = [self._slope(values, {name: SMALL}, SMALL) for name in names]
             best = min(best, self._share(target, target - offset, columns))
@@ -143,16 +144,16 @@ class Rivals:
         return (moved - self._force(given) if any(given.values()) else moved) / size
 
     def _share(self, target: np.ndarray, wanted: np.ndarray, free: Sequence[np.ndarray]) -> float:
-        """Least share of ``target`` that is left of ``wanted`` with free columns and doubted changes."""
+        """Least share of ``target`` left of ``wanted`` with free columns and changed coefficients."""
         columns = [c / size for c in free if (size := np.linalg.norm(c)) > 1e-9 * np.linalg.norm(target)]
         A = np.column_stack([*columns, np.zeros((target.size, 0))])
         beside = A - self.Q @ (self.Q.T @ A)
         q, r = np.linalg.qr(beside)
         by_changes, by_free = self.Q.T @ wanted, q.T @ (wanted - self.Q @ (self.Q.T @ wanted))
         left = float(wanted @ wanted - by_changes @ by_changes - by_free @ by_free)
-        if self.doubted:
+        if self.nuisance:
             matrix = np.block([[self.R, self.Q.T @ A], [np.zeros((len(r), len(self.R))), r]])
-            most = np.concatenate([np.full(len(self.R), DOUBT), np.full(len(r), np.inf)])
+            most = np.concatenate([np.full(len(self.R), MOST_CHANGE), np.full(len(r), np.inf)])
             fit = lsq_linear(matrix, np.concatenate([by_changes, by_free]), (-most, most), tol=1e-6)
             left += 2.0 * float(fit.cost)
         return max(left, 0.0) / float(target @ target)

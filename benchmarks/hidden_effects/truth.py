@@ -1,7 +1,7 @@
 """What a hidden effect did, and which other effects could have done the same: from the truth alone.
 
 Nothing here comes from the diagnosis: forces are computed with :mod:`fmus` on the true motion and the
-true commands, without noise. They are averaged over windows of 3 s, as a force that moves the ship is.
+true commands, without noise. They are averaged over windows of 3 s, as the diagnosis does.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,20 +13,20 @@ import numpy as np
 from scipy.signal import lfilter
 
 from fmus.declare import packer, variables
-from fmus.effects.registry import Running
-from fmus.hull import mass_matrix
+from fmus.effects import Running
+from fmus.hull import Inertia, mass_matrix
 from fmus.signals import Force
 from fmus.thrusters import chain
 from fmus.thrusters.allocation import Allocation, allocate
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 from fmus.vessel import vessel
 
-from .runs import HEADING, POSITION, STEP, Voyage
+from .simulated_runs import HEADING, POSITION, STEP, Voyage
 
 VESSEL = vessel.COMPONENT
 WINDOW, EVERY = 3.0, 0.5  # s, width of a window and from one to the next
 THIN = 5  # samples in a step for forces on the hull, which change slowly
-MASS = np.array(mass_matrix(vessel.Params().inertia))
+MASS = np.array(mass_matrix(Inertia()))
 # An acceleration of pose noise, as a force: how much a newton counts on each axis.
 WEIGHTS = 1.0 / (np.diag(MASS) * [POSITION, POSITION, HEADING])
 WEIGHTS = WEIGHTS / WEIGHTS[0]
@@ -42,24 +42,24 @@ def filled(component: Any, values: Values) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the camera would have seen without noise, and what was asked of the thrusters.
+    """What would be measured without noise, and what was commanded.
 
     Attributes:
         time: (n,) [s].
         eta, nu, nu_dot: (n, 3), SI.
-        asked: (n, 3), shares of full force of VSP surge, VSP sway and bow.
+        commanded: (n, 3), shares of full force of VSP surge, VSP sway and bow.
     """
 
     time: np.ndarray
     eta: np.ndarray
     nu: np.ndarray
     nu_dot: np.ndarray
-    asked: np.ndarray
+    commanded: np.ndarray
 
     @cached_property
     def thin(self) -> "Motion":
         """Every fifth sample."""
-        return Motion(*(x[::THIN] for x in (self.time, self.eta, self.nu, self.nu_dot, self.asked)))
+        return Motion(*(x[::THIN] for x in (self.time, self.eta, self.nu, self.nu_dot, self.commanded)))
 
     @cached_property
     def tau(self) -> np.ndarray:
@@ -75,16 +75,16 @@ class Motion:
 def motion(voyage: Voyage, values: Values) -> Motion:
     """The motion of a run as it is measured where the measurement has the effects in ``values``."""
     time = voyage.measured.time
-    asked = np.column_stack(allocate(*voyage.measured.tau_cmd.T, Allocation()))
-    true = Motion(time, voyage.eta, voyage.nu, voyage.nu_dot, asked)
+    commanded = np.column_stack(allocate(*voyage.measured.tau_cmd.T, Allocation()))
+    true = Motion(time, voyage.eta, voyage.nu, voyage.nu_dot, commanded)
     eta, nu, nu_dot = behind(true, {name: -value for name, value in values.items()})
-    return Motion(time, eta, nu, nu_dot, asked)
+    return Motion(time, eta, nu, nu_dot, commanded)
 
 
 def behind(m: Motion, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pose, velocity and acceleration behind what a measurement with these effects has seen."""
-    late = values.get("clock_offset", 0.0)
-    eta, nu, nu_dot = (ahead(m.time, x, late) for x in (m.eta, m.nu, m.nu_dot))
+    """Pose, velocity and acceleration behind what a measurement with these effects gives."""
+    clock = values.get("clock_offset", 0.0)
+    eta, nu, nu_dot = (ahead(m.time, x, clock) for x in (m.eta, m.nu, m.nu_dot))
     turn = values.get("heading_offset", 0.0)
     dx, dy = values.get("marker_offset_dx", 0.0), values.get("marker_offset_dy", 0.0)
     x, y, psi = eta.T
@@ -116,33 +116,32 @@ def ahead(time: np.ndarray, x: np.ndarray, by: float) -> np.ndarray:
 def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
     """tau (n, 3) from each sample to the next, of thrusters with these effects."""
     p = filled(THRUSTERS, values)
-    delay, lag = p.dynamics
-    asked = m.asked
+    delay, lag = p.dynamics.delay, p.dynamics.lag
+    shares = m.commanded
     if delay:
-        asked = np.where((m.time >= delay)[:, None], held(m.time, asked, delay), 0.0)
-    now = Running._make([m.time, *nu.T, *asked.T])
+        shares = np.where((m.time >= delay)[:, None], held(m.time, shares, delay), 0.0)
+    now = Running._make([m.time, *nu.T, *shares.T])
     if lag:
-        share = 1.0 - np.exp(-STEP / lag)
-        asked = lfilter([share], [1.0, share - 1.0], asked, axis=0)
-    acting = [member.acting(p.wrong) for member in chain.IN_THRUSTERS.members]
-    tau = chain.act(tuple(asked.T), now, p.plant, acting, p.wrong)
+        step = 1.0 - np.exp(-STEP / lag)
+        shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)
+    tau = chain.act(tuple(shares.T), now, THRUSTERS.prepared(p))
     return np.column_stack(np.broadcast_arrays(*tau))
 
 
 def held(time: np.ndarray, x: np.ndarray, delay: float) -> np.ndarray:
     """Mean over each interval of a signal (n, 3) that is held between samples, ``delay`` [s] ago."""
-    whole, part = divmod(delay / STEP + 1e-9, 1.0)
-    rows = np.arange(time.size) - int(whole)
+    steps, part = divmod(delay / STEP + 1e-9, 1.0)
+    rows = np.arange(time.size) - int(steps)
     return (1.0 - part) * x[np.maximum(rows, 0)] + part * x[np.maximum(rows - 1, 0)]
 
 
 def lack(m: Motion, values: Values) -> np.ndarray:
     """Force (n, 3) that a model with these additions lacks for the motion."""
     eta, nu, nu_dot = behind(m, values)
-    body = vessel.prepare(filled(VESSEL, values))
-    # A late pose leaves the commands where they are.
+    body = VESSEL.prepared(filled(VESSEL, values))
+    # An offset of the pose's clock leaves the commands where they are.
     tau = thrust(m, nu, values) if NAMES["thrusters"] & set(values) else thrust(m, nu, {})
-    free = vessel.stirred(vessel.State(*eta.T, *nu.T, m.time), Force(*tau.T), body)
+    free = vessel.disturbed(vessel.State(*eta.T, *nu.T, m.time), Force(*tau.T), body)
     mass = np.array(mass_matrix(body.hull.inertia))
     return (nu_dot - np.column_stack(np.broadcast_arrays(*free))) @ mass.T
 

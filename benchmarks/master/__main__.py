@@ -21,7 +21,7 @@ from typing import Any
 
 from .cases import CASES, TOOLS, run_apart, run_here
 from .plan import ROOT, SCENARIO, Plan, make_plan
-from .report import report
+from .timings import report
 
 PACKAGES = (
     "cybership",

@@ -13,7 +13,7 @@ from typing import Any
 
 from .parts import time_components, time_fmi
 from .plan import ROOT, Plan
-from .tools import time_container, time_ecos, time_fmpy, time_libcosim, time_master
+from .simulators import time_container, time_ecos, time_fmpy, time_libcosim, time_master
 
 
 @dataclass(frozen=True)

@@ -54,8 +54,7 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
 
     import numpy as np
 
-    from cosim.fmu import Model
-    from cosim.instance import Instance
+    from cosim.fmu import LocalInstance, Model
 
     pointer, size = ctypes.c_void_p.from_param, ctypes.c_size_t.from_param
     used = {*plan["signals"], *(source for source, _ in plan["connections"])}
@@ -68,20 +67,20 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
     time = ctypes.c_double()
     kept: list[Any] = []
 
-    def bind(instance: Instance, function: str, names: list[str], table: np.ndarray) -> None:
+    def bind(instance: LocalInstance, function: str, names: list[str], table: np.ndarray) -> None:
         own = [n for n in names if n.startswith(f"{instance.name}.")]
         if own:
             numbers = [instance.model.variables[n.partition(".")[2]].reference for n in own]
             references = (ctypes.c_uint * len(own))(*numbers)
             kept.append(references)
             address = table.ctypes.data + 8 * names.index(own[0])
-            arguments = (instance.component, ctypes.addressof(references), len(own), address)
+            arguments = (instance.component.pointer, ctypes.addressof(references), len(own), address)
             convert = (pointer, pointer, size, pointer)
             converted = [to_c(value) for to_c, value in zip(convert, arguments, strict=True)]
-            calls.append((instance.function(function), converted))
+            calls.append((instance.component.function(function), converted))
 
     for name, model in models.items():
-        instance = Instance(name, model, lambda *message: None)
+        instance = LocalInstance(name, model, lambda *message: None)
         kept.append(instance)
         instance.set_up(plan["steps"] * plan["step"])
         for parameter, value in plan["parameters"].items():
@@ -91,9 +90,8 @@ def time_fmi(plan: Plan, out: Path) -> dict[str, float]:
         instance.exit_initialization()
         bind(instance, "fmi2SetReal", set_, inputs)
         length, flag = ctypes.c_double.from_param(plan["step"]), ctypes.c_int.from_param(1)
-        calls.append(
-            (instance.function("fmi2DoStep"), [pointer(instance.component), time, length, flag])
-        )
+        component = pointer(instance.component.pointer)
+        calls.append((instance.component.function("fmi2DoStep"), [component, time, length, flag]))
         bind(instance, "fmi2GetReal", got, outputs)
     order = np.array([got.index(sources[n]) for n in set_])
     before = perf_counter()

@@ -1,43 +1,45 @@
-"""The figures of the model error, of the candidates and of learned shapes."""
+"""Figures of the model error, of the ranking of candidates and of learned shapes."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.plots import thin
+from cosim.results import thin
 
-from ..evidence import Evidence
-from ..weak import EVERY
+from ..assessment.evaluation import Evaluation
+from ..model.weak_form import EVERY
 from .panels import breaks, figure_of, legend, plain_numbers, stack
-from .regions import Quantity, Region
+from .profiles import BinnedError, Quantity
+from .result_keys import RankedResult
 from .shape import Curve
 from .svg import AFTER, BAND, BEFORE, INK, THIRD
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SURE = 1.96  # standard deviations, 95 %
-MOST_RANKED = 14
-WIDE_SPREAD = 20.0  # ratio of scores from which on their axis is logarithmic
+Z95 = 1.96  # standard deviations, 95 % of a normal distribution
+MAX_RANKED = 14  # candidates in the figure; chosen
+LOG_SPREAD = 20.0  # ratio of scores from which on their axis is logarithmic; chosen
+GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; chosen
 
 
-def model_error(e: Evidence, std: np.ndarray | None, learned: bool) -> "Figure":
-    """Omega over time, axis by axis: measured with its uncertainty, and the part that is explained."""
+def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> "Figure":
+    """Model error over time of X, Y and N, with its uncertainty, and the part that is explained."""
     figure, panels = stack(4.6)
     time = e.integrals.middle
-    stretch = np.concatenate([[0], np.cumsum(np.diff(time) > 1.5 * EVERY)])
+    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * EVERY)])
     for axis, panel in enumerate(panels):
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]
-        cuts = breaks(stretch[rows])
+        cuts = breaks(segment[rows])
 
         def drawn(values: np.ndarray, rows: np.ndarray = rows, cuts: np.ndarray = cuts) -> np.ndarray:
             return np.insert(values[rows], cuts, np.nan)
 
         t = drawn(time)
         if std is not None:
-            low, high = (drawn(measured + sign * SURE * std[:, axis]) for sign in (-1.0, 1.0))
+            low, high = (drawn(measured + sign * Z95 * std[:, axis]) for sign in (-1.0, 1.0))
             panel.fill_between(t, low, high, color=BAND, alpha=0.45, lw=0.0, label="uncertainty, 95 %")
         panel.axhline(0.0, color=INK, lw=0.6)
         panel.plot(t, drawn(measured), color=BEFORE, lw=1.8, alpha=0.8, label="measured")
@@ -50,18 +52,20 @@ def model_error(e: Evidence, std: np.ndarray | None, learned: bool) -> "Figure":
     return figure
 
 
-def where(quantity: Quantity, found: Sequence[Region], learned: bool) -> "Figure":
-    """RMS of omega over a quantity, axis by axis."""
+def profile(quantity: Quantity, errors: Sequence[BinnedError], learned: bool) -> "Figure":
+    """RMS of the model error over a quantity, for X, Y and N."""
     own = len(set(quantity.labels)) > 1
     figure, panels = stack(5.0 if own else 4.2, sharex=not own)
-    for panel, region, label in zip(panels, found, quantity.labels, strict=True):
-        if region.unsure is not None:
-            panel.stairs(region.unsure, region.edges, fill=True, color=BAND, alpha=0.45, label="noise")
-        middle = 0.5 * (region.edges[1:] + region.edges[:-1])
-        parts = [("before" if learned else "model error", region.before, BEFORE, "o")]
-        parts += [("after", region.after, AFTER, "s")] if learned else []
+    for panel, error, label in zip(panels, errors, quantity.labels, strict=True):
+        if error.uncertainty is not None:
+            panel.stairs(
+                error.uncertainty, error.edges, fill=True, color=BAND, alpha=0.45, label="noise"
+            )
+        middle = 0.5 * (error.edges[1:] + error.edges[:-1])
+        parts = [("before" if learned else "model error", error.before, BEFORE, "o")]
+        parts += [("after", error.after, AFTER, "s")] if learned else []
         for name, rms, colour, marker in parts:
-            panel.stairs(rms, region.edges, baseline=None, color=colour, lw=1.6, label=name)
+            panel.stairs(rms, error.edges, baseline=None, color=colour, lw=1.6, label=name)
             panel.plot(middle, rms, marker, color=colour, ms=3.0)
         panel.set_ylim(bottom=0.0)
         if own or panel is panels[2]:
@@ -72,25 +76,25 @@ def where(quantity: Quantity, found: Sequence[Region], learned: bool) -> "Figure
     return figure
 
 
-def ranking(ranked: Sequence[Mapping[str, Any]], alike: Sequence[str]) -> "Figure":
-    """Candidates by their loss: the best, and hollow those that the data cannot tell from the first."""
-    shown = [r for k, r in enumerate(ranked) if k < MOST_RANKED or r["id"] in alike]
+def ranking(ranked: Sequence[RankedResult], alike: Sequence[str]) -> "Figure":
+    """Candidates by their loss: the best, and hollow those that are indistinguishable from the first."""
+    shown = [r for k, r in enumerate(ranked) if k < MAX_RANKED or r.id in alike]
     figure = figure_of(0.8 + 0.24 * len(shown))
     panel = figure.subplots()
-    scores = np.array([r["score"] for r in shown], float)
+    scores = np.array([r.score for r in shown], float)
     for k, r in enumerate(shown):
-        sure = k == 0 or r["id"] in alike
+        tied = k == 0 or r.id in alike
         panel.plot(
             scores[k],
             k,
             "o",
-            ms=7.0 if sure else 5.5,
-            color=AFTER if sure else BAND,
-            mfc=AFTER if k == 0 else ("none" if sure else BAND),
+            ms=7.0 if tied else 5.5,
+            color=AFTER if tied else BAND,
+            mfc=AFTER if k == 0 else ("none" if tied else BAND),
             mew=1.6,
         )
         panel.annotate(
-            _explained(r.get("q2")),
+            _explained(r.q2),
             (1.0, k),
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),
@@ -98,18 +102,18 @@ def ranking(ranked: Sequence[Mapping[str, Any]], alike: Sequence[str]) -> "Figur
             va="center",
         )
     panel.locator_params(axis="x", nbins=5)
-    if scores.min() > 0.0 and scores.max() > WIDE_SPREAD * scores.min():
+    if scores.min() > 0.0 and scores.max() > LOG_SPREAD * scores.min():
         panel.set_xscale("log")
         plain_numbers(panel.xaxis)
     panel.margins(x=0.06)
-    panel.set_yticks(range(len(shown)), [str(r["id"]) for r in shown])
+    panel.set_yticks(range(len(shown)), [r.id for r in shown])
     panel.set_ylim(len(shown) - 0.5, -0.5)
     panel.set_xlabel("cross-validated loss [1], lower is better; right: explained")
     return figure
 
 
 def _explained(q2: float | None) -> str:
-    """A share as it stands beside a candidate; below zero, how far does not matter."""
+    """The share q2 beside a candidate; a negative one without its size, which means nothing."""
     if q2 is None:
         return ""
     return f"{100.0 * q2:.0f} %" if q2 >= 0.0 else "< 0 %"
@@ -119,8 +123,8 @@ def curve(c: Curve) -> "Figure":
     """A learned shape beside the nominal one."""
     figure = figure_of(3.3)
     panel = figure.subplots()
-    if c.seen is not None:
-        for low, high in ((c.x[0], c.seen[0]), (c.seen[1], c.x[-1])):
+    if c.covered is not None:
+        for low, high in ((c.x[0], c.covered[0]), (c.covered[1], c.x[-1])):
             if high > low:
                 panel.axvspan(low, high, color=BAND, alpha=0.25, lw=0.0)
     panel.axhline(0.0, color=INK, lw=0.6)

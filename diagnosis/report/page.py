@@ -1,92 +1,85 @@
-"""Puts the report together: what is in the JSON file in words and tables, and the figures."""
+"""The report: content of a JSON file as text and tables, with figures of the runs, in one HTML page."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from math import degrees
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 import cosim
 
-from ..evidence import Evidence
-from . import figures, tracks, words
-from .regions import QUANTITIES, regions
+from ..assessment.evaluation import Evaluation
+from ..progress import Advance, silent
+from . import figures, formatting, tracks
+from .profiles import QUANTITIES, binned_errors
+from .result_keys import Change, ComparisonContent, DiagnosisContent
 from .shape import Curve, curves
 from .svg import inline, style
 
-PROVENANCE = {
-    "files": "files",
-    "runs": "runs",
-    "model": "model",
-    "effects_file": "effects of the user",
-    "prior": "doubt of the coefficients",
-    "seed": "seed",
-    "versions": "versions",
-    "command": "command",
-}
+if TYPE_CHECKING:
+    from jinja2 import Template
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
 
 
 class Drawing(NamedTuple):
-    """A figure of the page: its ``<svg>`` element, and what is written below it."""
+    """A figure of the page: its ``<svg>`` element and its caption."""
 
-    svg: Any
+    svg: "Markup"
     caption: str
 
 
 def write_report(
     path: str | Path,
-    result: Mapping[str, Any],
-    evidence: Sequence[Evidence],
+    content: ComparisonContent | DiagnosisContent,
+    evaluations: Sequence[Evaluation],
     omega_std: Sequence[np.ndarray] | None = None,
-    shapes: Sequence[Curve] | None = None,
-    advance: Callable[[str], None] = lambda _: None,
+    advance: Advance = silent,
 ) -> Path:
-    """Write the report: one HTML file that needs nothing else.
+    """Write the report: one HTML file that needs no other.
 
     Args:
-        path: of the file; an older one is replaced when the new one is whole.
-        result: content of ``diagnosis.json``, or of ``comparison.json``; keys that are not there are
-            left out of the page.
-        evidence: of each run, in the order of ``result["errors"]``.
-        omega_std: standard deviation (K, 3) [N, N, N m] of each run's omega; None if not known.
-        shapes: learned shapes to draw; by default those of the effects that are one.
-        advance: told what is being done.
+        path: of the file; an older one is replaced when the new one is complete.
+        content: that of ``comparison.json`` or ``diagnosis.json``.
+        evaluations: one for each run, in the order of ``content.errors``.
+        omega_std: standard deviation (K, 3) [N, N, N m] of each run's model error; None if not known.
+        advance: receives the name of each step when it begins.
 
     Returns:
         The path.
     """
     path = Path(path)
-    learned = any(e.after is not e.before for e in evidence)
+    learned = any(e.after is not e.before for e in evaluations)
+    diagnosis = content if isinstance(content, DiagnosisContent) else None
     advance("report: figures")
-    if shapes is None:
-        shapes = curves(result.get("effects") or (), evidence)
     with style():
         drawn = {
-            "shapes": list(_shapes(shapes)),
-            "ranking": list(_ranking(result)),
-            "tracks": list(_tracks(evidence, learned)),
-            "growth": list(_growth(evidence, learned)),
-            "omega": list(_omega(evidence, omega_std, learned)),
-            "where": list(_where(evidence, omega_std, learned)),
+            "shapes": [] if diagnosis is None else list(_shapes(diagnosis, evaluations)),
+            "ranking": [] if diagnosis is None else list(_ranking(diagnosis)),
+            "tracks": list(_tracks(evaluations, learned)),
+            "growth": list(_growth(evaluations, learned)),
+            "omega": list(_omega(evaluations, omega_std, learned)),
+            "where": list(_profiles(evaluations, omega_std, learned)),
         }
     advance("report: page")
     text = _template().render(
-        r=result,
-        verdict=words.VERDICTS.get(result.get("verdict", ""), ""),
-        title="Diagnosis" if "verdict" in result else "Model against measurements",
+        content=content,
+        diagnosis=diagnosis,
+        verdict="" if diagnosis is None else formatting.VERDICTS[diagnosis.verdict],
+        title="Model against measurements" if diagnosis is None else "Diagnosis",
         learned=learned,
         figures=drawn,
-        tiles=list(_tiles(result, learned)),
-        runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evidence],
-        where=words.sentences(result.get("where")),
-        provenance=[(label, result[k]) for k, label in PROVENANCE.items() if result.get(k) is not None],
+        tiles=list(_tiles(content, learned)),
+        runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
+        provenance=[(label, value) for label, value in _provenance(content) if value is not None],
     )
-    with cosim.whole(path) as scratch:
+    with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
     return path
 
 
-def _template() -> Any:
+def _template() -> "Template":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
@@ -96,106 +89,120 @@ def _template() -> Any:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (words.number, words.unit, words.percent, words.plain)
+    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain)
     environment.filters |= {f.__name__: f for f in filters}
-    environment.globals["times"] = words.times
+    environment.globals["times"] = formatting.times
     return environment.get_template("page.html")
 
 
-def _draw(figure: Any, key: str, label: str, caption: str) -> Drawing:
+def _provenance(content: ComparisonContent | DiagnosisContent) -> Iterator[tuple[str, object]]:
+    """Label and value of all that the result was made with."""
+    yield "files", content.files
+    yield "runs", content.runs
+    yield "model", content.model
+    if isinstance(content, DiagnosisContent):
+        yield "prior of the coefficients", content.prior
+        yield "seed", content.seed
+    yield "versions", content.versions
+
+
+def _draw(figure: "Figure", key: str, label: str, caption: str) -> Drawing:
     from markupsafe import Markup
 
     return Drawing(Markup(inline(figure, key, label)), caption)
 
 
-def _part(e: Evidence) -> str:
-    return "held out" if e.held_out else "training"
+def _label(e: Evaluation, learned: bool) -> str:
+    part = "held out" if e.held_out else "training"
+    return f"{e.name} ({part})" if learned else e.name
 
 
-def _named(e: Evidence, learned: bool) -> str:
-    return f"{e.name} ({_part(e)})" if learned else e.name
-
-
-def _tracks(evidence: Sequence[Evidence], learned: bool) -> Iterator[Drawing]:
-    for k, e in enumerate(evidence):
-        name = _named(e, learned)
+def _tracks(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
+    for k, e in enumerate(evaluations):
+        name = _label(e, learned)
         yield _draw(tracks.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
-        closer = tracks.worst(e, learned)
-        if closer is not None:
+        worst = tracks.worst_window(e, learned)
+        if worst is not None:
             caption = f"{name}: the worst window."
-            yield _draw(closer, f"worst-{k}", f"The worst window of {e.name}", caption)
+            yield _draw(worst, f"worst-{k}", f"The worst window of {e.name}", caption)
 
 
-def _growth(evidence: Sequence[Evidence], learned: bool) -> Iterator[Drawing]:
+def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
     for held_out in (False, True):
-        runs = [e for e in evidence if e.held_out == held_out and e.windows is not None]
+        runs = [e for e in evaluations if e.held_out == held_out and e.windows is not None]
         if not runs:
             continue
         part = "held-out" if held_out else ("training" if learned else "all")
         caption = f"Error of prediction over time, {part} runs: median, and half of all samples."
-        figure = tracks.growth(runs, learned)
+        figure = tracks.error_growth(runs, learned)
         yield _draw(figure, f"growth-{part}", caption, caption)
 
 
 def _omega(
-    evidence: Sequence[Evidence], std: Sequence[np.ndarray] | None, learned: bool
+    evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
-    for k, e in enumerate(evidence):
+    for k, e in enumerate(evaluations):
         if not e.integrals.middle.size:
             continue
         figure = figures.model_error(e, None if std is None else std[k], learned)
-        yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_named(e, learned)}.")
+        yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_label(e, learned)}.")
 
 
-def _where(
-    evidence: Sequence[Evidence], std: Sequence[np.ndarray] | None, learned: bool
+def _profiles(
+    evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
-    if not any(e.integrals.middle.size for e in evidence):
+    if not any(e.integrals.middle.size for e in evaluations):
         return
     for k, quantity in enumerate(QUANTITIES):
-        figure = figures.where(quantity, regions(quantity, evidence, std), learned)
+        figure = figures.profile(quantity, binned_errors(quantity, evaluations, std), learned)
         caption = f"Model error by {quantity.name}."
         yield _draw(figure, f"where-{k}", caption, caption)
 
 
-def _ranking(result: Mapping[str, Any]) -> Iterator[Drawing]:
-    ranked = [r for r in result.get("ranking") or () if r.get("score") is not None]
+def _ranking(d: DiagnosisContent) -> Iterator[Drawing]:
+    ranked = [r for r in d.ranking if r.score is not None]
     if ranked:
-        first = (result.get("effects") or [{}])[0]
-        figure = figures.ranking(ranked, first.get("indistinguishable") or ())
+        first = d.effects[0] if d.effects else None
+        figure = figures.ranking(ranked, first.indistinguishable if first else ())
         caption = f"The best of {len(ranked)} candidates."
-        if first.get("confidence") is not None:
-            share = words.percent(first["confidence"])
-            caption += f" {first['id']} comes first in {share} of the data drawn again by chance."
+        if first is not None and first.confidence is not None:
+            share = formatting.percent(first.confidence)
+            caption += f" {first.id} comes first in {share} of the data drawn again by chance."
         yield _draw(figure, "ranking", "Candidates in the order of their loss", caption)
 
 
-def _shapes(shapes: Sequence[Curve]) -> Iterator[Drawing]:
+def _shapes(d: DiagnosisContent, evaluations: Sequence[Evaluation]) -> Iterator[Drawing]:
+    shapes: list[Curve] = curves([e.model_dump(mode="json") for e in d.effects], evaluations)
     for k, c in enumerate(shapes):
         caption = f"{c.id}: before and learned. Grey: hardly any data."
         yield _draw(figures.curve(c), f"curve-{k}", f"Learned shape of {c.id}", caption)
 
 
-def _tiles(result: Mapping[str, Any], learned: bool) -> Iterator[tuple[str, str, str]]:
-    """Label, number and remark of the numbers that come first: over held-out runs if there are any."""
-    errors = result.get("errors") or []
-    chosen = [e for e in errors if e.get("held_out")] or errors
-    part = (
-        "held-out" if any(e.get("held_out") for e in errors) else ("training" if learned else "measured")
-    )
-    for key, label, factor, unit in (
-        ("window_position_rmse", "position error of 8 s predictions", 1e3, "mm"),
-        ("window_heading_rmse", "heading error of 8 s predictions", float(np.degrees(1.0)), "°"),
-    ):
-        pairs = [e[key] for e in chosen if e.get(key) and e[key].get("before") is not None]
-        if not pairs:
-            continue
-        before = float(np.sqrt(np.mean([p["before"] ** 2 for p in pairs])))
-        after = [p.get("after") for p in pairs]
-        shown = words.number(before, factor=factor)
-        remark = f"{part} runs"
-        if learned and all(a is not None for a in after):
-            last = float(np.sqrt(np.mean(np.square(after))))
-            shown += f" → {words.number(last, factor=factor)}"
-            remark += f", {words.times(before, last)} less" if last <= before else ", more than before"
-        yield label, f"{shown} {unit}", remark
+def _tiles(
+    content: ComparisonContent | DiagnosisContent, learned: bool
+) -> Iterator[tuple[str, str, str]]:
+    """Label, number and remark of the main numbers: over held-out runs if there are any."""
+    held_out = [e for e in content.errors if e.held_out]
+    chosen = held_out or content.errors
+    part = "held-out" if held_out else ("training" if learned else "measured")
+    position = [e.window_position_rmse for e in chosen]
+    heading = [e.window_heading_rmse for e in chosen]
+    yield from _tile("position error of 8 s predictions", position, 1e3, "mm", part, learned)
+    yield from _tile("heading error of 8 s predictions", heading, degrees(1.0), "°", part, learned)
+
+
+def _tile(
+    label: str, changes: Sequence[Change], factor: float, unit: str, part: str, learned: bool
+) -> Iterator[tuple[str, str, str]]:
+    pairs = [(c.before, c.after) for c in changes if c.before is not None]
+    if not pairs:
+        return
+    before = float(np.sqrt(np.mean([b**2 for b, _ in pairs])))
+    after = [a for _, a in pairs if a is not None]
+    shown = formatting.number(before, factor=factor)
+    remark = f"{part} runs"
+    if learned and len(after) == len(pairs):
+        last = float(np.sqrt(np.mean(np.square(after))))
+        shown += f" → {formatting.number(last, factor=factor)}"
+        remark += f", {formatting.times(before, last)} less" if last <= before else ", more than before"
+    yield label, f"{shown} {unit}", remark

@@ -1,4 +1,4 @@
-"""What the figures of the report have in common."""
+"""Panels, legends and axes that the figures of the report share."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -16,13 +16,14 @@ FORCES = ("X [N]", "Y [N]", "N [N·m]")
 
 
 def figure_of(height: float) -> "Figure":
+    """An empty figure as wide as the page, so many inches high."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
 def stack(height: float, sharex: bool = True) -> "tuple[Figure, Sequence[Axes]]":
-    """Three panels over each other, one for each axis of the ship."""
+    """Three panels above each other, for X, Y and N of the model error."""
     figure = figure_of(height)
     panels = list(figure.subplots(3, 1, sharex=sharex))
     for panel, label in zip(panels, FORCES, strict=True):
@@ -32,6 +33,7 @@ def stack(height: float, sharex: bool = True) -> "tuple[Figure, Sequence[Axes]]"
 
 
 def legend(figure: "Figure", panel: "Axes", columns: int = 2) -> None:
+    """A legend of one panel above the figure."""
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, columnspacing=1.4)
 
@@ -49,5 +51,5 @@ def plain_numbers(axis: "Axis") -> None:
 
 
 def breaks(groups: np.ndarray) -> np.ndarray:
-    """Where a new group begins, as places to insert a gap."""
+    """Indices at which a new group begins, as places to insert a gap."""
     return np.flatnonzero(np.diff(groups)) + 1

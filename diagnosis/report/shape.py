@@ -6,18 +6,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.effects import EFFECTS, Effect
-from fmus.effects.registry import Running, Ship, Thrust
-from fmus.hull import Damping, damping_force
-from fmus.thrusters.chain import Plant
+from fmus.effects import Effect, Motion, Running, Thrust
+from fmus.effects.effect import Picture
+from fmus.hull import damping_force
 
-from ..evidence import Evidence
-from ..model import Model, shares
+from ..assessment.evaluation import Evaluation
+from ..model import Model
+from ..model.thrust import commanded_shares
 
 COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
 POINTS = 401
-FULL = Plant()
-Force = Callable[[np.ndarray, Callable[..., Any]], np.ndarray]
+Force = Callable[[np.ndarray, Callable[..., Any], Model], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +28,7 @@ class Curve:
         over, what: labels of the axes, with units.
         x, nominal, learned: (n,).
         sure: lower and upper bound (n,) of the learned one, 95 %; None if not known.
-        seen: range of x that the data cover; None if not known.
+        covered: range of x that the data cover; None if not known.
         points: name -> x and y of measurements that nothing was learned from.
     """
 
@@ -40,132 +39,160 @@ class Curve:
     nominal: np.ndarray
     learned: np.ndarray
     sure: tuple[np.ndarray, np.ndarray] | None = None
-    seen: tuple[float, float] | None = None
+    covered: tuple[float, float] | None = None
     points: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
 
 class Sweep(NamedTuple):
-    """How a shape is laid open: ``force(x, effect)`` over x, and where the data of a run lie on x."""
+    """How a shape is drawn.
+
+    Attributes:
+        over, what: labels of the axes, with units.
+        reach: ends of the horizontal axis, by the model.
+        force: the shape over x (n,), with an effect, of a model.
+        data: where the data of a run lie on the horizontal axis.
+    """
 
     over: str
     what: str
-    reach: tuple[float, float]
+    reach: Callable[[Model], tuple[float, float]]
     force: Force
-    data: Callable[[Evidence], np.ndarray]
+    data: Callable[[Evaluation, Model], np.ndarray]
 
 
-def surge_speed(e: Evidence) -> np.ndarray:
+def surge_speed(e: Evaluation, _: Model) -> np.ndarray:
     u = e.smoothed.nu[:, 0]
     return u[np.isfinite(u)]
 
 
-def surge_command(e: Evidence) -> np.ndarray:
-    return np.concatenate([each[:, 0] for each, _ in shares(e.integrals.run, Model())])
+def command(k: int) -> Callable[[Evaluation, Model], np.ndarray]:
+    """The k-th command of all sets of thrusters; the bow thruster is of the first."""
+    sets = slice(None) if k < 2 else slice(1)
+    return lambda e, m: commanded_shares(e.integrals.run, m)[:, sets, k].T.ravel()
 
 
-def sway_command(e: Evidence) -> np.ndarray:
-    return np.concatenate([each[:, 1] for each, _ in shares(e.integrals.run, Model())])
+def force_commanded(name: str, k: int) -> Callable[[Evaluation, Model], np.ndarray]:
+    return lambda e, m: m.value(name) * command(k)(e, m)
 
 
-def vsp_force(e: Evidence) -> np.ndarray:
-    return FULL.plant_F_vsp * surge_command(e)
+def hull(u: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
+    nominal = damping_force(u, 0.0, 0.0, m.hull.params.damping)[0]
+    return nominal + effect(Motion(u=u))[0]
 
 
-def bow_force(e: Evidence) -> np.ndarray:
-    return FULL.plant_F_bow * shares(e.integrals.run, Model())[0][0][:, 2]
+def vsp_surge(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
+    return effect(Thrust(vsp_x=m.value("plant_F_vsp") * c), Running(u_vsp_x=c)).vsp_x
 
 
-def hull(u: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
-    return damping_force(u, 0.0, 0.0, Damping())[0] + effect(Ship(u=u))[0]
+def vsp_sway(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
+    return effect(Thrust(vsp_y=m.value("plant_F_vsp") * c), Running(u_vsp_y=c)).vsp_y
 
 
-def vsp(c: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
-    return effect(Thrust(vsp_x=FULL.plant_F_vsp * c), Running(u_vsp_x=c)).vsp_x
-
-
-def vsp_aside(c: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
-    return effect(Thrust(vsp_y=FULL.plant_F_vsp * c), Running(u_vsp_y=c)).vsp_y
-
-
-def one_vsp(f: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
+def vsp_given(f: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
     return effect(Thrust(vsp_x=f), Running()).vsp_x
 
 
-def one_bow(f: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
+def bow_given(f: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
     return effect(Thrust(bow=f), Running()).bow
 
 
-def bow_share(u: np.ndarray, effect: Callable[..., Any]) -> np.ndarray:
+def bow_effectiveness(u: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
     return effect(Thrust(bow=1.0 + 0.0 * u), Running(u=u)).bow
 
 
-_HULL = Sweep("surge speed u [m/s]", "damping in surge [N]", (-0.6, 0.6), hull, surge_speed)
-_VSP = Sweep("VSP command in surge [1]", "VSP surge force [N]", (-1.0, 1.0), vsp, surge_command)
-_ASIDE = Sweep("VSP command in sway [1]", "VSP sway force [N]", (-1.0, 1.0), vsp_aside, sway_command)
-_BOW = Sweep(
-    "surge speed |u| [m/s]",
-    "bow effectiveness [1]",
-    (0.0, 0.6),
-    bow_share,
-    lambda e: np.abs(surge_speed(e)),
-)
-_VSP_FORCE = Sweep(
-    "VSP force asked [N]",
-    "VSP force given [N]",
-    (-FULL.plant_F_vsp, FULL.plant_F_vsp),
-    one_vsp,
-    vsp_force,
-)
-_BOW_FORCE = Sweep(
-    "bow force asked [N]",
-    "bow force given [N]",
-    (-FULL.plant_F_bow, FULL.plant_F_bow),
-    one_bow,
-    bow_force,
-)
-SWEEPS: dict[str, tuple[Sweep, ...]] = {
-    "curve_X(u)": (_HULL,),
-    "curve_vsp_x(c)": (_VSP,),
-    "curve_vsp_y(c)": (_ASIDE,),
-    "thrust_curve": (_VSP,),
-    "curve_bow(|u|)": (_BOW,),
-    "bow_speed_loss": (_BOW,),
-    "deadband": (_VSP_FORCE, _BOW_FORCE),
-    "saturation": (_VSP_FORCE, _BOW_FORCE),
+def full(name: str) -> Callable[[Model], tuple[float, float]]:
+    """From full force astern or to port to full force ahead or to starboard [N]."""
+    return lambda m: (-m.value(name), m.value(name))
+
+
+# m/s; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
+FASTEST = 0.6
+SWEEPS: dict[Picture, Sweep] = {
+    "hull surge force over surge speed": Sweep(
+        "surge speed u [m/s]",
+        "damping in surge [N]",
+        lambda _: (-FASTEST, FASTEST),
+        hull,
+        surge_speed,
+    ),
+    "VSP surge force over command": Sweep(
+        "VSP command in surge [1]",
+        "VSP surge force [N]",
+        lambda _: (-1.0, 1.0),
+        vsp_surge,
+        command(0),
+    ),
+    "VSP sway force over command": Sweep(
+        "VSP command in sway [1]",
+        "VSP sway force [N]",
+        lambda _: (-1.0, 1.0),
+        vsp_sway,
+        command(1),
+    ),
+    "bow effectiveness over surge speed": Sweep(
+        "surge speed |u| [m/s]",
+        "bow effectiveness [1]",
+        lambda _: (0.0, FASTEST),
+        bow_effectiveness,
+        lambda e, m: np.abs(surge_speed(e, m)),
+    ),
+    "VSP force given over commanded": Sweep(
+        "VSP force commanded [N]",
+        "VSP force given [N]",
+        full("plant_F_vsp"),
+        vsp_given,
+        force_commanded("plant_F_vsp", 0),
+    ),
+    "bow force given over commanded": Sweep(
+        "bow force commanded [N]",
+        "bow force given [N]",
+        full("plant_F_bow"),
+        bow_given,
+        force_commanded("plant_F_bow", 2),
+    ),
 }
 
 
-def curves(effects: Sequence[Mapping[str, Any]], evidence: Sequence[Evidence]) -> list[Curve]:
+def curves(
+    effects: Sequence[Mapping[str, Any]],
+    evaluations: Sequence[Evaluation],
+) -> list[Curve]:
     """The shapes among the effects of a diagnosis.
 
     Args:
         effects: as in ``diagnosis.json``.
-        evidence: the runs, for where their data lie.
+        evaluations: the runs, for where their data lie.
     """
+    model = evaluations[0].model
+    declared = model.ship.effects
     drawn = [
-        _curve(e, EFFECTS[e["id"]], sweep, evidence)
+        _curve(e, declared[e["id"]], SWEEPS[picture], evaluations, model)
         for e in effects
-        for sweep in SWEEPS.get(e["id"], ())
+        for picture in declared[e["id"]].wording.pictures
     ]
     return [c for c in drawn if not np.allclose(c.learned, c.nominal)]
 
 
 def _curve(
-    found: Mapping[str, Any], effect: Effect, sweep: Sweep, evidence: Sequence[Evidence]
+    found: Mapping[str, Any],
+    effect: Effect,
+    sweep: Sweep,
+    evaluations: Sequence[Evaluation],
+    model: Model,
 ) -> Curve:
     coefficients = found["coefficients"]
-    seen = np.concatenate([sweep.data(e) for e in evidence])
-    x = np.linspace(*sweep.reach, POINTS)
+    covered = np.concatenate([sweep.data(e, model) for e in evaluations])
+    x = np.linspace(*sweep.reach(model), POINTS)
 
     def by(value: Callable[[Mapping[str, Any]], float]) -> np.ndarray:
         given = {name: value(c) for name, c in coefficients.items()}
-        return np.broadcast_to(sweep.force(x, _with(effect, given)), x.shape)
+        return np.broadcast_to(sweep.force(x, _with(effect, given), model), x.shape)
 
     sure = None
     if effect.linear:  # in weights that are never negative
         sure = by(lambda c: _bound(c, 0)), by(lambda c: _bound(c, 1))
     nominal, learned = by(lambda _: 0.0), by(lambda c: c["value"])
-    low, high = np.quantile(seen, COMMON)
+    low, high = np.quantile(covered, COMMON)
     where = float(low), float(high)
     return Curve(effect.id, sweep.over, sweep.what, x, nominal, learned, sure, where)
 

@@ -1,4 +1,4 @@
-"""Matplotlib's figures as parts of a web page: real text, the page's colours, no two ids alike."""
+"""Matplotlib's figures as SVG elements of a web page: real text, the page's colours, unique ids."""
 
 import io
 import re
@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-WIDTH = 4.8  # in; as wide as a phone's page in CSS pixels, so that letters keep their size there
-# Okabe and Ito's colours, which people see apart who do not see all colours. The page has a variable of
-# each name, lighter ones for a dark screen.
+WIDTH = 4.8  # in; width of a phone's page in CSS pixels, so that letters keep their size there
+# Colours by Okabe and Ito, which are distinct with any colour vision. The page has a variable of each
+# name, lighter ones for a dark screen.
 INK, GRID, BAND = "#1f2328", "#dde1e6", "#8a919a"
 BEFORE, AFTER, THIRD = "#d55e00", "#0072b2", "#009e73"
 PALETTE = {INK: "ink", GRID: "grid", BAND: "band", BEFORE: "before", AFTER: "after", THIRD: "third"}
@@ -43,12 +43,15 @@ STYLE: dict[Any, Any] = {
 
 SVG, XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 HREF = f"{{{XLINK}}}href"
-LEFT_OUT = {f"{{{SVG}}}metadata", f"{{{SVG}}}style"}  # a date and maker; a style that would hit the page
+LEFT_OUT = {
+    f"{{{SVG}}}metadata",
+    f"{{{SVG}}}style",
+}  # date and maker; a style for the whole page
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Matplotlib as this page wants it, whatever the user has set."""
+    """Context with the style of the page, independent of the user's settings."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -58,12 +61,12 @@ def style() -> Iterator[None]:
 
 
 def inline(figure: "Figure", key: str, label: str) -> str:
-    """A figure as an ``<svg>`` element that may stand in a page.
+    """A figure as an ``<svg>`` element of a page.
 
     Args:
         figure: drawn within :func:`style`.
         key: letters and digits that no other figure of the page has.
-        label: what a reader who cannot see it is told.
+        label: its text for screen readers.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
@@ -87,7 +90,7 @@ def inline(figure: "Figure", key: str, label: str) -> str:
 
 
 def _prefix(root: ElementTree.Element, key: str) -> None:
-    """Give the ids that something refers to a name of their own, and take the others away."""
+    """Prefix the ids that something refers to with the key, and remove the others."""
     used = set()
     for element in root.iter():
         for name, value in list(element.attrib.items()):

@@ -1,12 +1,12 @@
-"""Where the ship went and where the models said it would go, window by window."""
+"""Figures of measured and predicted tracks, and of the growth of the prediction error."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..evidence import Evidence, Seen
-from ..windows import LENGTH
+from ..assessment.evaluation import Evaluation, PredictionError
+from ..assessment.windows import LENGTH
 from .panels import breaks, figure_of, legend, plain_numbers
 from .svg import AFTER, BEFORE, INK, WIDTH
 
@@ -14,24 +14,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_POINTS = 3000  # of a track
-MARGIN = 0.06  # around a track
-FARTHEST = 2.0  # times the way measured: a prediction that goes farther leaves the picture
+MAX_POINTS = 3000  # of a track; chosen, keeps a page below a megabyte or so
+MARGIN = 0.06  # of the reach, around a track; chosen
+MIN_ASPECT = 0.4  # shorter side of a map by its longer one; chosen
+MAX_REACH = 2.0  # times the measured extent, beyond which a prediction leaves the figure; chosen
 QUARTILES = (0.25, 0.5, 0.75)
-STRETCH = 0.25  # s of a window in which errors are counted together
+BIN = 0.25  # s, over which errors of a window are summarised; chosen
 
 
-def track(e: Evidence, learned: bool) -> "Figure":
-    """The measured track of a run, and what the models foretell from the start of each window."""
+def track(e: Evaluation, learned: bool) -> "Figure":
+    """The measured track of a run, and the predictions of the models from the start of each window."""
     eta = e.smoothed.eta
-    rows = np.arange(0, len(eta), max(1, len(eta) // MOST_POINTS))
+    rows = np.arange(0, len(eta), max(1, len(eta) // MAX_POINTS))
     figure, panel = _map(eta[:, :2])
     panel.plot(eta[rows, 1], eta[rows, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
     if e.windows is not None:
         window, measured = e.windows.sample_window, e.windows.measured
-        step = max(1, len(window) // MOST_POINTS)
-        for seen, colour, label in _models(e, learned):
-            predicted = _finite(measured - seen.off)[::step, :2]
+        step = max(1, len(window) // MAX_POINTS)
+        for prediction, colour, label in _models(e, learned):
+            predicted = _finite(measured - prediction.residuals)[::step, :2]
             north, east = np.insert(predicted, breaks(window[::step]), np.nan, axis=0).T
             panel.plot(east, north, color=colour, lw=1.0, alpha=0.85, label=label)
         starts = measured[np.r_[0, breaks(window)]]
@@ -40,16 +41,16 @@ def track(e: Evidence, learned: bool) -> "Figure":
     return figure
 
 
-def worst(e: Evidence, learned: bool) -> "Figure | None":
-    """The window whose position the model foretells worst; None where none runs its eight seconds."""
+def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
+    """The window with the largest position error of the initial model; None where there is no window."""
     if e.windows is None or e.before.errors is None:
         return None
     finite = np.where(np.isfinite(e.before.errors.position), e.before.errors.position, -1.0)
     inside = e.windows.sample_window == int(np.argmax(finite))
     measured = e.windows.measured[inside]
-    paths = [(_finite(measured - s.off[inside]), c, label) for s, c, label in _models(e, learned)]
+    paths = [(_finite(measured - p.residuals[inside]), c, label) for p, c, label in _models(e, learned)]
     low, high = measured.min(axis=0), measured.max(axis=0)
-    far = FARTHEST * (high - low).max()
+    far = MAX_REACH * (high - low).max()
     near = [np.clip(p, low - far, high + far) for p, _, _ in paths]
     figure, panel = _map(np.concatenate([measured, *near])[:, :2])
     panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
@@ -62,24 +63,24 @@ def worst(e: Evidence, learned: bool) -> "Figure | None":
     return figure
 
 
-def growth(evidence: Sequence[Evidence], learned: bool) -> "Figure":
-    """How far predictions of some runs are off, over the time since their windows began."""
+def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
+    """Quartiles of the prediction error of some runs over the time since their windows began."""
     figure = figure_of(3.6)
     panels = figure.subplots(2, 1, sharex=True)
-    known = [e for e in evidence if e.windows is not None]
+    known = [e for e in evaluations if e.windows is not None]
     since = np.concatenate([e.windows.since for e in known if e.windows is not None])
-    edges = np.arange(0.0, LENGTH + 1e-9, STRETCH)
+    edges = np.arange(0.0, LENGTH + 1e-9, BIN)
     place = np.clip(np.digitize(since, edges) - 1, 0, edges.size - 2)
     sides = [_models(e, learned) for e in known]
     for number in range(len(sides[0])):
-        off = np.concatenate([models[number][0].off for models in sides])
+        residuals = np.concatenate([models[number][0].residuals for models in sides])
         _, colour, label = sides[0][number]
-        errors = (1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2])))
+        errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
             bands = np.full((3, edges.size - 1), np.nan)
             for k in np.unique(place):
                 bands[:, k] = np.quantile(error[place == k], QUARTILES, method="nearest")
-            middle = edges[:-1] + 0.5 * STRETCH
+            middle = edges[:-1] + 0.5 * BIN
             panel.fill_between(middle, bands[0], bands[2], color=colour, alpha=0.2, lw=0.0)
             panel.plot(middle, bands[1], color=colour, label=label)
     for panel, label in zip(panels, ("position [mm]", "heading [°]"), strict=True):
@@ -94,8 +95,8 @@ def growth(evidence: Sequence[Evidence], learned: bool) -> "Figure":
     return figure
 
 
-def _models(e: Evidence, learned: bool) -> list[tuple[Seen, str, str]]:
-    """What each model makes of a run, its colour, and what it is called."""
+def _models(e: Evaluation, learned: bool) -> list[tuple[PredictionError, str, str]]:
+    """Prediction error, colour and label of each model of a run."""
     if not learned:
         return [(e.before, BEFORE, "predicted")]
     return [(e.before, BEFORE, "before"), (e.after, AFTER, "after")]
@@ -109,8 +110,7 @@ def _map(places: np.ndarray) -> "tuple[Figure, Axes]":
     """A panel with north up that holds all places (n, 2) [m], in the same scale both ways."""
     low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
     middle, reach = 0.5 * (low + high), 0.5 * (high - low)
-    # No picture is a thin strip.
-    half = np.maximum(reach + MARGIN * reach.max(), 0.4 * reach.max()) + 1e-3
+    half = np.maximum(reach + MARGIN * reach.max(), MIN_ASPECT * reach.max()) + 1e-3
     figure = figure_of(float(np.clip(0.75 + (WIDTH - 0.75) * half[0] / half[1], 2.4, 5.2)))
     panel = figure.subplots()
     panel.set_aspect("equal", adjustable="box")

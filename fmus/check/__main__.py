@@ -1,30 +1,12 @@
 """Start the command: ``python -m fmus.check``."""
 
-import signal
-import sys
-from typing import NoReturn
+if __name__ == "__main__":
+    from fmus.interruption import leave_on_interrupt
 
-from .command import BAD_INPUT, main
+    leave_on_interrupt()  # before all other imports, which take a while
 
-SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
-
-
-def _interrupt(*_: object) -> NoReturn:
-    """Once only: a second Ctrl-C must not keep the first from ending the trials."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
+from ..interruption import run_interruptible
+from .checking import main
 
 if __name__ == "__main__":
-    for number in SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN:  # as for nohup
-            signal.signal(number, _interrupt)
-    try:
-        sys.exit(main())
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        sys.exit(130)
-    except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(BAD_INPUT)
+    run_interruptible(main)

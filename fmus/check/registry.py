@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..docstring import docstring
+
 
 class NotApplicableError(Exception):
     """The rule does not concern this FMU, or cannot be checked here; the message says why."""
@@ -79,7 +81,7 @@ def _register(clause: str, runs: bool) -> Callable[[_Check], _Check]:
         name = check.__name__.replace("_", "-")
         if name in RULES:
             raise ValueError(f"two rules are called '{name}'")
-        demand = " ".join((check.__doc__ or "").split("\n\n")[0].split())
+        demand = " ".join(docstring(check).split("\n\n")[0].split())
         RULES[name] = Rule(name, clause, demand, check.__module__.rpartition(".")[2], check, runs)
         return check
 

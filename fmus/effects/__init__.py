@@ -1,21 +1,44 @@
-"""What the real ship may have and the nominal model lacks: one registry, see :mod:`.registry`."""
+"""What the real ship may have and the nominal model lacks: one declaration each, see :mod:`.effect`."""
 
-from . import actuator, environment, force, inertia, measurement
-from .registry import EFFECTS, Effect, Running, Ship, Thrust, effect, effects, find, load
+from . import (
+    actuator,
+    environment,
+    force,
+    inertia,
+    measurement,
+    thrust_curves,
+    thruster_dynamics,
+)
+from .effect import Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect_set import EffectSet, effects_of
+from .families import Family
 
 __all__ = [
-    "EFFECTS",
+    "STANDARD",
     "Effect",
+    "EffectSet",
+    "Family",
+    "Memory",
+    "Motion",
     "Running",
-    "Ship",
+    "Search",
     "Thrust",
-    "actuator",
+    "Wording",
     "effect",
-    "effects",
-    "environment",
-    "find",
-    "force",
-    "inertia",
-    "load",
-    "measurement",
+    "effects_of",
 ]
+
+# The effects of this project. Those of the thrusters act in this order.
+STANDARD = EffectSet(
+    e
+    for module in (
+        thrust_curves,
+        actuator,
+        thruster_dynamics,
+        environment,
+        force,
+        inertia,
+        measurement,
+    )
+    for e in effects_of(module)
+)

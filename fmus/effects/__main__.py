@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..declare import DeclarationError, Variable
-from .registry import EFFECTS, Effect, load
+from . import STANDARD
+from .effect import Effect
+from .effect_set import EffectSet
 
 HEAD = """# Model effects
 
@@ -36,8 +38,8 @@ def _one(p: Variable) -> str:
     return f"`{p.name}` [{p.unit}]" + (f" = {p.start:g}" if p.start else "")
 
 
-def table() -> str:
-    """The registry as a table in Markdown."""
+def table(effects: EffectSet = STANDARD) -> str:
+    """Effects as a table in Markdown."""
     rows = [
         " | ".join(
             [
@@ -51,7 +53,7 @@ def table() -> str:
                 _cell(e.source) + " |",
             ]
         )
-        for e in sorted(EFFECTS.values(), key=lambda e: ORDER.index(e.kind))
+        for e in sorted(effects.values(), key=lambda e: ORDER.index(e.kind))
     ]
     return HEAD + "\n".join(rows) + "\n"
 
@@ -67,13 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         epilog="example:  python -m fmus.effects my_effects.py",
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="effects of your own")
+    effects = STANDARD
     try:
         for file in parser.parse_args(arguments).files:
-            load(file)
+            effects = effects.plus_file(file)
     except DeclarationError as error:
         print("error:", error, file=sys.stderr)
         return 2
-    print(table(), end="")
+    print(table(effects), end="")
     return 0
 
 

@@ -1,79 +1,21 @@
-"""What the thrusters really do, as against what they are asked for."""
+"""What the thrusters lose of the force that they are commanded to give."""
 
-from collections.abc import Callable
 from typing import Annotated
 
-from ..declare import POSITIVE, Range, Variable
+from ..declare import POSITIVE, Range
 from ..ops import Number, clip, fmax, where
 from .curve import interpolate, node_parameters
-from .registry import Effect, Running, Thrust, add, effect
+from .effect import Running, Search, Thrust, Values, Wording, effect
+from .families import BOW_THRUSTER, PROPELLERS, SIDE_THRUST, SMALL_OR_LARGE
+from .text import Found, capital, lost, number, offset, peak, percent, reach
 
 SHARE = Range(-1.0, 1.0)
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
-
-
-@effect(
-    "thrust_curve",
-    "actuator",
-    "X",
-    formula="f = f_nominal(c') · (1 + ahead or astern), c' = c less its dead band",
-    symbol="ahead, astern, dead band",
-    sign="positive: more force than assumed",
-    source="(2.10)-(2.12)",
-    linear=False,
-)
-def thrust_curve(
-    f: Thrust,
-    now: Running,
-    thrust_curve_ahead: Annotated[float, "1", "relative change of the VSP force ahead", SHARE] = 0.0,
-    thrust_curve_astern: Annotated[float, "1", "relative change of the VSP force astern", SHARE] = 0.0,
-    thrust_curve_deadband: Annotated[
-        float, "1", "VSP surge command without effect", Range(0.0, 0.9)
-    ] = 0.0,
-) -> Thrust:
-    """VSP surge force asymmetric and with a dead band over the command."""
-    c = now.u_vsp_x
-    size = abs(c)
-    left = fmax(0.0, size - thrust_curve_deadband) / fmax(size, 1e-9)
-    gain = 1.0 + where(c > 0.0, thrust_curve_ahead, thrust_curve_astern)
-    return f._replace(vsp_x=f.vsp_x * left * gain)
-
-
-def vsp_surge_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
-    """A free addition to the VSP surge force over its command."""
-    *nodes, reach = values
-    return f._replace(vsp_x=f.vsp_x + interpolate(now.u_vsp_x, -reach, reach, nodes))
-
-
-def vsp_sway_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
-    """A free addition to the VSP sway force over its command."""
-    *nodes, reach = values
-    return f._replace(vsp_y=f.vsp_y + interpolate(now.u_vsp_y, -reach, reach, nodes))
-
-
-def _add_vsp_curve(axis: str, acts_on: str, way: str, function: Callable[..., Thrust]) -> None:
-    """Register a free curve of the VSP's force over the command in the same direction."""
-    prefix = f"curve_vsp_{axis}_c"
-    add(
-        Effect(
-            id=f"curve_vsp_{axis}(c)",
-            kind="actuator",
-            axis=acts_on,
-            description=f"free addition to the VSP {way} force over its command",
-            formula=f"f_{axis} + Σ c_k · hat_k(u_vsp_{axis}), 21 nodes over [-range, range]",
-            symbol="c_1 … c_21",
-            sign=f"positive pushes {'ahead' if axis == 'x' else 'to starboard'}",
-            source="(2.12); 3.2.3, on a triangle basis",
-            linear=True,
-            parameters=node_parameters(prefix, "N", f"VSP {way} force", "command, both ways", "1", 1.0),
-            function=function,
-            settings=frozenset({f"{prefix}_range"}),
-        )
-    )
-
-
-_add_vsp_curve("x", "X", "surge", vsp_surge_curve)
-_add_vsp_curve("y", "YN", "sway", vsp_sway_curve)
+# s/m to try: from an effect that is small at full speed to a bow thruster that is dead at 0.07 m/s.
+SPEED_LOSSES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 15.0)
+# N to try, up to a quarter of full force.
+DEADBANDS = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.13, 0.17, 0.22, 0.3)
+LIMITS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # shares of full force to try
 
 
 @effect(
@@ -84,6 +26,15 @@ _add_vsp_curve("y", "YN", "sway", vsp_sway_curve)
     symbol="δ",
     sign="positive: force is lost",
     source="(2.39), on one thruster",
+    needs=("vsp",),
+    wording=Wording(
+        lost(
+            "loss_vsp",
+            "The propellers give {} less force than the model believes.",
+            "The propellers give {} more force than the model believes.",
+        ),
+        PROPELLERS,
+    ),
 )
 def loss_vsp(
     f: Thrust, now: Running, loss_vsp: Annotated[float, "1", "share of VSP force lost", SHARE] = 0.0
@@ -100,6 +51,19 @@ def loss_vsp(
     symbol="δ",
     sign="positive: force is lost",
     source="(2.39), on one thruster",
+    needs=("bow",),
+    wording=Wording(
+        lost(
+            "loss_bow",
+            "The bow thruster gives {} less force than the model believes.",
+            "The bow thruster gives {} more force than the model believes.",
+        ),
+        BOW_THRUSTER,
+        {
+            "bow_speed_loss": "use the bow thruster at rest and at speed",
+            "bow_failure": "use the bow thruster from the very start of a run to its end",
+        },
+    ),
 )
 def loss_bow(
     f: Thrust, now: Running, loss_bow: Annotated[float, "1", "share of bow force lost", SHARE] = 0.0
@@ -117,6 +81,16 @@ def loss_bow(
     sign="positive: less force at speed",
     source="6.4.4, after Skjetne et al. 2004",
     linear=False,
+    needs=("bow",),
+    search=Search(tries=[{"bow_speed_loss": k} for k in SPEED_LOSSES]),
+    wording=Wording(
+        lambda f: (
+            "The bow thruster loses force with the speed: "
+            f"{percent(min(1.0, f['bow_speed_loss'] * f.speeds[0]))} of it at {f.speeds[0]:.2g} m/s."
+        ),
+        BOW_THRUSTER,
+        pictures=("bow effectiveness over surge speed",),
+    ),
 )
 def bow_speed_loss(
     f: Thrust,
@@ -127,30 +101,34 @@ def bow_speed_loss(
     return f._replace(bow=f.bow * fmax(0.0, 1.0 - bow_speed_loss * abs(now.u)))
 
 
-def bow_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
-    """A free change of the bow thruster's effectiveness over the surge speed."""
-    *nodes, reach = values
-    return f._replace(bow=f.bow * (1.0 + interpolate(abs(now.u), 0.0, reach, nodes)))
-
-
-add(
-    Effect(
-        id="curve_bow(|u|)",
-        kind="actuator",
-        axis="YN",
-        description="free change of the bow thruster's effectiveness over the surge speed",
-        formula="f_bow (1 + Σ c_k · hat_k(|u|)), 21 nodes over [0, range]",
-        symbol="c_1 … c_21",
-        sign="positive: more force than assumed",
-        source="6.4.4; 3.2.3, on a triangle basis",
-        linear=True,
-        parameters=node_parameters(
-            "curve_bow_u", "1", "change of bow effectiveness", "surge speed", "m/s", 0.6
+@effect(
+    "curve_bow(|u|)",
+    "actuator",
+    "YN",
+    formula="f_bow (1 + Σ c_k · hat_k(|u|)), 21 nodes over [0, range]",
+    symbol="c_1 … c_21",
+    sign="positive: more force than assumed",
+    source="6.4.4; 3.2.3, on a triangle basis",
+    settings=("curve_bow_u_range",),
+    needs=("bow",),
+    parameters=node_parameters(
+        "curve_bow_u", "1", "change of bow effectiveness", "surge speed", "m/s", 0.6
+    ),
+    search=Search(smooth=True),
+    wording=Wording(
+        lambda f: (
+            "The bow thruster's force changes with the speed: "
+            f"{percent(peak(f)[1])} {'less' if peak(f)[1] < 0.0 else 'more'} than the model believes "
+            f"at {peak(f)[0] * reach(f):.2g} m/s."
         ),
-        function=bow_curve,
-        settings=frozenset({"curve_bow_u_range"}),
-    )
+        BOW_THRUSTER,
+        pictures=("bow effectiveness over surge speed",),
+    ),
 )
+def bow_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
+    """free change of the bow thruster's effectiveness over the surge speed"""
+    *nodes, span = values
+    return f._replace(bow=f.bow * (1.0 + interpolate(abs(now.u), 0.0, span, nodes)))
 
 
 @effect(
@@ -162,6 +140,12 @@ add(
     sign="0: never",
     source="7.2.5",
     linear=False,
+    needs=("bow",),
+    search=Search(change_points=("bow_failure_time",)),
+    wording=Wording(
+        lambda f: f"The bow thruster is dead from t = {number(f['bow_failure_time'])} s on.",
+        BOW_THRUSTER,
+    ),
 )
 def bow_failure(
     f: Thrust,
@@ -187,6 +171,15 @@ def reduced(f: Number, d: Number) -> Number:
     sign="forces below d are lost, the rest is reduced by d",
     source="7.2.5; static tests of the ship",
     linear=False,
+    search=Search(tries=[{"deadband": d} for d in DEADBANDS]),
+    wording=Wording(
+        lambda f: (
+            f"Each thruster gives nothing below {number(f['deadband'])} N, "
+            f"and {number(f['deadband'])} N less above."
+        ),
+        SMALL_OR_LARGE,
+        pictures=("VSP force given over commanded", "bow force given over commanded"),
+    ),
 )
 def deadband(
     f: Thrust,
@@ -204,6 +197,18 @@ def limited(f: Number, limit: Number) -> Number:
     return where(limit > 0.0, clip(f, -limit, limit), f)
 
 
+def limits(nominal: Values) -> list[Values]:
+    """Limits [N] to try on one kind of thruster."""
+    full = {"saturation_vsp": nominal["plant_F_vsp"], "saturation_bow": nominal["plant_F_bow"]}
+    return [{name: share * force} for name, force in full.items() for share in LIMITS]
+
+
+def saturation_sentence(f: Found) -> str:
+    who = {"saturation_vsp": "propellers give", "saturation_bow": "bow thruster gives"}
+    parts = [f"the {who[name]} at most {number(x)} N" for name, x in f.values.items() if x]
+    return capital(f"{' and '.join(parts)}, whatever is commanded.")
+
+
 @effect(
     "saturation",
     "actuator",
@@ -213,6 +218,12 @@ def limited(f: Number, limit: Number) -> Number:
     sign="0: no limit",
     source="2.1.1",
     linear=False,
+    search=Search(tries=limits),
+    wording=Wording(
+        saturation_sentence,
+        SMALL_OR_LARGE,
+        pictures=("VSP force given over commanded", "bow force given over commanded"),
+    ),
 )
 def saturation(
     f: Thrust,
@@ -236,6 +247,15 @@ def saturation(
     symbol="δ",
     sign="positive: force is lost",
     source="(2.39), (7.3)-(7.6)",
+    wording=Wording(
+        lost(
+            "loss_surge",
+            "Of the commanded surge force {} do not arrive.",
+            "The surge force is {} larger than commanded.",
+        ),
+        PROPELLERS,
+        {"X_u": "pulse the speed instead of keeping it", "mass": "run steady and accelerating legs"},
+    ),
 )
 def loss_surge(
     f: Thrust, now: Running, loss_surge: Annotated[float, "1", "share of surge force lost", SHARE] = 0.0
@@ -252,6 +272,15 @@ def loss_surge(
     symbol="δ",
     sign="positive: force is lost",
     source="(2.39), (7.3)-(7.6)",
+    wording=Wording(
+        lost(
+            "loss_sway",
+            "Of the commanded sway force {} do not arrive.",
+            "The sway force is {} larger than commanded.",
+        ),
+        SIDE_THRUST,
+        {"Y_r": "crab to both sides with no turn"},
+    ),
 )
 def loss_sway(
     f: Thrust, now: Running, loss_sway: Annotated[float, "1", "share of sway force lost", SHARE] = 0.0
@@ -268,6 +297,15 @@ def loss_sway(
     symbol="δ",
     sign="positive: moment is lost",
     source="(2.39), (7.3)-(7.6)",
+    wording=Wording(
+        lost(
+            "loss_yaw",
+            "Of the commanded yaw moment {} do not arrive.",
+            "The yaw moment is {} larger than commanded.",
+        ),
+        SIDE_THRUST,
+        {"N_r": "turn on the spot, with starts and stops of the turn"},
+    ),
 )
 def loss_yaw(
     f: Thrust, now: Running, loss_yaw: Annotated[float, "1", "share of yaw moment lost", SHARE] = 0.0
@@ -284,6 +322,10 @@ def loss_yaw(
     symbol="dx, dy",
     sign="positive: ahead and to starboard of where it is assumed",
     source="(2.17)-(2.19)",
+    wording=Wording(
+        lambda f: f"The thrust acts {offset(f, 'attack_point')} of where the model believes.",
+        SIDE_THRUST,
+    ),
 )
 def attack_point(
     f: Thrust,
@@ -295,26 +337,3 @@ def attack_point(
 ) -> Thrust:
     """The force acts elsewhere than assumed."""
     return f._replace(dx=f.dx + attack_point_dx, dy=f.dy + attack_point_dy)
-
-
-def _add_dynamics(name: str, description: str, formula: str, symbol: str, most: float) -> None:
-    """Register an effect with a memory, which lives in the chain of the thrusters."""
-    add(
-        Effect(
-            id=name,
-            kind="actuator",
-            axis="XYN",
-            description=description,
-            formula=formula,
-            symbol=symbol,
-            sign="0: none",
-            source="6.4.5",
-            linear=False,
-            parameters=(Variable(name, "s", description, 0.0, Range(0.0, most), False),),
-            function=None,
-        )
-    )
-
-
-_add_dynamics("lag", "first-order lag of all thrusters", "T df/dt = f_asked - f", "T", 60.0)
-_add_dynamics("delay", "pure delay of all thrusters", "f(t) = f_asked(t - T)", "T", 60.0)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..declare import Range, Variable
-from ..ops import Number, clip, fmax
+from ..ops import Number, clip, fmax, is_series, series_between
 
 NODES = 21
 
@@ -17,6 +17,8 @@ def hats(x: Number, low: Number, high: Number, count: int) -> list[Any]:
 
 def interpolate(x: Number, low: Number, high: Number, values: Sequence[Any]) -> Any:
     """The piecewise linear curve through ``values`` at equally spaced nodes from low to high, at x."""
+    if is_series(x) and not any(map(is_series, values)):
+        return series_between(x, low, high, values)
     total = 0.0
     for weight, value in zip(hats(x, low, high, len(values)), values, strict=True):
         total = total + weight * value

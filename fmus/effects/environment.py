@@ -7,7 +7,9 @@ from ..declare import POSITIVE, Range
 from ..frames import rotate_to_body
 from ..hull import Triple
 from ..ops import Number, cos, sin
-from .registry import Ship, effect
+from .effect import Motion, Search, Wording, effect
+from .families import BODY_FIXED, EARTH_FIXED
+from .text import Found, compass, number, towards
 
 # Frequencies of the waves as shares of the peak; no two have a common period within an hour.
 _SHARES = tuple(0.72 + 0.0717 * k + 0.00113 * k * k for k in range(8))
@@ -22,9 +24,17 @@ _GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
     sign="F_n pushes north, F_e pushes east",
     source="(2.3), (2.33)",
     settings=("earth_force_swing",),
+    wording=Wording(
+        lambda f: (
+            f"A steady force of {number(math.hypot(f['F_n'], f['F_e']))} N pushes the ship towards "
+            f"{compass(f['F_n'], f['F_e'])}, as wind would."
+        ),
+        EARTH_FIXED,
+        {"body_bias": "run a full circle of headings"},
+    ),
 )
 def earth_force(
-    ship: Ship,
+    ship: Motion,
     F_n: Annotated[float, "N", "earth-fixed force to the north"] = 0.0,
     F_e: Annotated[float, "N", "earth-fixed force to the east"] = 0.0,
     earth_force_period: Annotated[float, "s", "period of its slow swing", Range(min=1.0)] = 100.0,
@@ -35,6 +45,12 @@ def earth_force(
     return *rotate_to_body(ship.psi, swing * F_n, swing * F_e), 0.0
 
 
+def bias_sentence(f: Found) -> str:
+    units = {"X": "N", "Y": "N", "N": "N m"}
+    parts = [towards(f[f"body_bias_{a}"], unit, a) for a, unit in units.items() if f[f"body_bias_{a}"]]
+    return f"A constant force goes with the ship: {', '.join(parts)}."
+
+
 @effect(
     "body_bias",
     "environment",
@@ -43,9 +59,10 @@ def earth_force(
     symbol="X, Y, N",
     sign="positive pushes ahead, to starboard, and turns to starboard",
     source="(2.33)",
+    wording=Wording(bias_sentence, BODY_FIXED),
 )
 def body_bias(
-    ship: Ship,
+    ship: Motion,
     body_bias_X: Annotated[float, "N", "constant surge force"] = 0.0,
     body_bias_Y: Annotated[float, "N", "constant sway force"] = 0.0,
     body_bias_N: Annotated[float, "N.m", "constant yaw moment"] = 0.0,
@@ -57,7 +74,7 @@ def body_bias(
 def surface(t: Number, peak: Number) -> Number:
     """A wave signal of unit variance around a peak frequency [rad/s] at time t [s].
 
-    Eight cosines with fixed phases: the sharp, narrow spectrum of a swell, the same in every run.
+    Eight cosines with fixed phases: a narrow spectrum as of waves from afar, the same in every run.
     """
     total = 0.0
     power = 0.0
@@ -66,6 +83,12 @@ def surface(t: Number, peak: Number) -> Number:
         power += 0.5 * amplitude * amplitude
         total = total + amplitude * cos(share * peak * t + _GOLDEN * (k + 1) * (k + 2))
     return total / math.sqrt(power)
+
+
+def waves_sentence(f: Found) -> str:
+    peak = f["wave_peak"]
+    often = f", with a peak at {number(peak)} rad/s" if peak else ""
+    return f"Waves shake the ship{often}."
 
 
 @effect(
@@ -77,9 +100,11 @@ def surface(t: Number, peak: Number) -> Number:
     sign="drift pushes towards where the waves run",
     source="(2.33), (7.15); Fossen 2011, 8.2",
     settings=("wave_direction",),
+    search=Search(by="spectrum"),
+    wording=Wording(waves_sentence, EARTH_FIXED),
 )
 def waves(
-    ship: Ship,
+    ship: Motion,
     wave_force: Annotated[float, "N", "standard deviation of the wave force", POSITIVE] = 0.0,
     wave_drift: Annotated[float, "N", "mean drift force of the waves"] = 0.0,
     wave_peak: Annotated[float, "rad/s", "peak frequency of the waves", Range(0.1, 50.0)] = 4.0,
@@ -100,9 +125,19 @@ def waves(
     sign="direction that the water moves towards",
     source="Fossen 2011, 8.3; irrotational",
     linear=False,
+    gives="water velocity",
+    search=Search(differentiable=True),
+    wording=Wording(
+        lambda f: (
+            f"The water moves at {number(math.hypot(f['V_n'], f['V_e']))} m/s "
+            f"towards {compass(f['V_n'], f['V_e'])}."
+        ),
+        EARTH_FIXED,
+        {"earth_force": "turn, and stop, on several headings"},
+    ),
 )
 def current(
-    ship: Ship,
+    ship: Motion,
     V_n: Annotated[float, "m/s", "the water's velocity to the north", Range(-2.0, 2.0)] = 0.0,
     V_e: Annotated[float, "m/s", "the water's velocity to the east", Range(-2.0, 2.0)] = 0.0,
 ) -> tuple[Any, Any]:

@@ -1,14 +1,57 @@
 """Forces by the ship's motion: a change of each damping coefficient, and a free curve over speed."""
 
 import re
+from math import degrees
 
 from ..declare import Range, Variable, packer, variables, width
 from ..hull import Damping, Triple, damping_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
-from .registry import EFFECTS, Effect, Ship, add
+from .effect import Effect, Motion, Search, Wording, effect
+from .families import (
+    SURGE_BY_TURNING,
+    SURGE_DRAG,
+    SWAY_AT_SPEED,
+    SWAY_BY_TURNING,
+    SWAY_DRAG,
+    YAW_AT_SPEED,
+    YAW_BY_DRIFT,
+    YAW_DRAG,
+    Family,
+)
+from .text import Found, number, peak, reach, towards
 
 _COUNT = width(Damping)
+
+_MEMBERS: dict[str, Family] = {
+    "X_u X_|u|u X_uuu X_uu": SURGE_DRAG,
+    "X_|u|r X_vr X_vv X_rr": SURGE_BY_TURNING,
+    "Y_v Y_|v|v Y_vvv": SWAY_DRAG,
+    "Y_r Y_|r|r Y_|r|v Y_|v|r": SWAY_BY_TURNING,
+    "Y_ur Y_uv": SWAY_AT_SPEED,
+    "N_r N_|r|r": YAW_DRAG,
+    "N_v N_|v|v N_|r|v N_|v|r": YAW_BY_DRIFT,
+    "N_ur N_uv": YAW_AT_SPEED,
+}
+FAMILY = {name: family for names, family in _MEMBERS.items() for name in names.split()}
+APART = {
+    "X_u": {
+        "X_|u|u": "run three or more speeds, from very slow to full",
+        "body_bias": "run astern as well",
+    },
+    "N_r": {"N_ur": "turn on the spot, and at speed"},
+    "N_v": {"N_uv": "drift purely sideways, with no speed ahead"},
+}
+# Of each axis the velocity along it, and what its damping is called.
+DRAG = {"X": ("u", "surge drag"), "Y": ("v", "sway drag"), "N": ("r", "resistance to turning")}
+MOTION = {
+    "u": "Going ahead",
+    "v": "Drifting sideways",
+    "r": "Turning",
+    "uv": "Drifting sideways while going ahead",
+    "ru": "Turning while going ahead",
+    "rv": "Turning while drifting sideways",
+}
 
 
 def product(field: str) -> str:
@@ -16,65 +59,87 @@ def product(field: str) -> str:
     return re.sub(r"abs(.)_?", r"|\1|", field.partition("_")[2])
 
 
-def change(k: int, ship: Ship, delta: Number) -> Triple:
+def change(k: int, ship: Motion, delta: Number) -> Triple:
     """Force [N, N, N m] of an addition to the k-th coefficient of :class:`~fmus.hull.Damping`."""
     only = [0.0] * _COUNT
     only[k] = delta
     return damping_force(ship.u, ship.v, ship.r, packer(Damping)(only))
 
 
-def _add_change(k: int, coefficient: Variable) -> None:
-    """Register the change of one damping coefficient."""
+def damping_sentence(f: Found) -> str:
+    """A damping-like term, as a force at the speeds that the ship reached."""
+    axis, _, term = f.effect.id.partition("_")
+    moved = "".join(sorted(set(term) - {"|"}))
+    u, v, r = f.speeds
+    force = float(f.effect(Motion(u=u, v=v, r=r), *f.values.values())["XYN".index(axis)])
+    unit = "N m" if axis == "N" else "N"
+    own, drag = DRAG[axis]
+    if moved == own and term != "uu":
+        sense = "more" if force < 0.0 else "less"
+        at = _at(moved, f.speeds)
+        return f"The ship has {sense} {drag} than the model believes: {number(force)} {unit} at {at}."
+    at = _at(moved, f.speeds, sides=True)
+    what = "a moment" if axis == "N" else "a force"
+    size = towards(force, unit, axis)
+    return f"{MOTION[moved]} gives {what} that the model does not know: {size} at {at}."
+
+
+def _at(moved: str, speeds: tuple[float, float, float], sides: bool = False) -> str:
+    """The speeds that count, such as ``0.1 m/s ahead and 6°/s to starboard``."""
+    u, v, r = speeds
+    parts = {"u": (f"{u:.2g} m/s", "ahead"), "v": (f"{v:.2g} m/s", "to starboard")}
+    parts["r"] = (f"{degrees(r):.2g}°/s", "to starboard")
+    return " and ".join(" ".join(parts[m][: 1 + sides]) for m in "uvr" if m in moved)
+
+
+def _change(k: int, coefficient: Variable) -> Effect:
+    """The effect that changes one damping coefficient."""
     axis, term = coefficient.name[0], product(coefficient.name)
-    symbol = f"Δ{axis}_{term}"
-    name = f"delta_{coefficient.name}"
-    add(
-        Effect(
-            id=f"{axis}_{term}",
-            kind="force",
-            axis=axis,
-            description=f"addition to {coefficient.name}: {coefficient.description}",
-            formula=f"{axis} = {symbol} · {term}",
-            symbol=symbol,
-            sign="an addition on the side of the forces",
-            source="(2.8)-(2.9), corrected",
-            linear=True,
-            parameters=(
-                Variable(name, coefficient.unit, f"addition to {coefficient.name}", 0.0, Range(), False),
-            ),
-            function=lambda ship, delta: change(k, ship, delta),
-        )
+    name = f"{axis}_{term}"
+    text = f"addition to {coefficient.name}"
+    delta = Variable(f"delta_{coefficient.name}", coefficient.unit, text, 0.0, Range(), False)
+    return effect(
+        name,
+        "force",
+        axis,
+        formula=f"{axis} = Δ{name} · {term}",
+        symbol=f"Δ{name}",
+        sign="an addition on the side of the forces",
+        source="(2.8)-(2.9), corrected",
+        description=f"addition to {coefficient.name}: {coefficient.description}",
+        parameters=(delta,),
+        gives=coefficient.name,
+        wording=Wording(damping_sentence, FAMILY[name], APART.get(name, {})),
+    )(lambda ship, delta: change(k, ship, delta))
+
+
+# In the order of Damping.
+CHANGES = tuple(_change(k, coefficient) for k, coefficient in enumerate(variables(Damping)))
+
+
+def surge_curve_sentence(f: Found) -> str:
+    place, value = peak(f)
+    at = (2.0 * place - 1.0) * reach(f)
+    return (
+        "The surge force follows another curve over the speed than the model's: "
+        f"{towards(value, 'N', 'X')} is missing at {at:.2g} m/s."
     )
 
 
-for _k, _coefficient in enumerate(variables(Damping)):
-    _add_change(_k, _coefficient)
-
-# Those that are changes of a coefficient, in the order of Damping.
-CHANGES = tuple(EFFECTS.values())[-_COUNT:]
-
-
-def surge_curve(ship: Ship, *values: Number) -> Triple:
-    """A free surge force over the surge speed."""
-    *nodes, reach = values
-    return interpolate(ship.u, -reach, reach, nodes), 0.0, 0.0
-
-
-add(
-    Effect(
-        id="curve_X(u)",
-        kind="force",
-        axis="X",
-        description="free surge force over the surge speed",
-        formula="X = Σ c_k · hat_k(u), 21 nodes over [-range, range]",
-        symbol="c_1 … c_21",
-        sign="positive pushes ahead",
-        source="3.2.3, on a triangle basis",
-        linear=True,
-        parameters=node_parameters(
-            "curve_X_u", "N", "surge force", "surge speed, both ways", "m/s", 0.6
-        ),
-        function=surge_curve,
-        settings=frozenset({"curve_X_u_range"}),
-    )
+@effect(
+    "curve_X(u)",
+    "force",
+    "X",
+    formula="X = Σ c_k · hat_k(u), 21 nodes over [-range, range]",
+    symbol="c_1 … c_21",
+    sign="positive pushes ahead",
+    source="3.2.3, on a triangle basis",
+    settings=("curve_X_u_range",),
+    parameters=node_parameters("curve_X_u", "N", "surge force", "surge speed, both ways", "m/s", 0.6),
+    search=Search(smooth=True),
+    wording=Wording(surge_curve_sentence, SURGE_DRAG, pictures=("hull surge force over surge speed",)),
 )
+def surge_force_curve(ship: Motion, *values: Number) -> Triple:
+    """free surge force over the surge speed"""
+    *nodes, span = values
+    return interpolate(ship.u, -span, span, nodes), 0.0, 0.0

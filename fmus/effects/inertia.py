@@ -1,12 +1,30 @@
 """A heavier ship, or more water that moves with it."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from ..declare import Range
 from ..hull import Inertia
-from .registry import effect
+from .effect import Search, Values, Wording, effect
+from .families import INERTIA
+from .text import Found, number
 
 _SIGN = "positive is heavier"
+_SOURCE = "(2.5)-(2.7), corrected"
+
+
+def half(name: str, moving: Callable[[Values], float]) -> Search:
+    """A much heavier ship is not a little heavier one many times: tried is half of what moves, too."""
+    return Search(differentiable=True, tries=lambda nominal: [{name: 0.5 * moving(nominal)}])
+
+
+def water_sentence(name: str, how: str, unit: str) -> Callable[[Found], str]:
+    def sentence(f: Found) -> str:
+        sense = "More" if f[name] > 0.0 else "Less"
+        size = f"{number(f[name])} {unit}"
+        return f"{sense} water moves with the ship in {how} than the model believes: {size}."
+
+    return sentence
 
 
 @effect(
@@ -16,7 +34,15 @@ _SIGN = "positive is heavier"
     formula="m + Δm, I_z (1 + Δm/m), in M and C(nu)",
     symbol="Δm",
     sign=_SIGN,
-    source="(2.5)-(2.7), corrected",
+    source=_SOURCE,
+    search=half("mass", lambda p: p["m"]),
+    wording=Wording(
+        lambda f: (
+            f"The ship has {number(f['mass'])} kg {'more' if f['mass'] > 0.0 else 'less'} mass "
+            "than the model believes."
+        ),
+        INERTIA,
+    ),
 )
 def mass(
     i: Inertia, mass: Annotated[float, "kg", "additional mass", Range(-10.0, 100.0)] = 0.0
@@ -32,7 +58,9 @@ def mass(
     formula="X_udot - Δ, in M and C(nu)",
     symbol="Δ",
     sign=_SIGN,
-    source="(2.5)-(2.7), corrected",
+    source=_SOURCE,
+    search=half("added_mass_X", lambda p: p["m"] - p["X_udot"]),
+    wording=Wording(water_sentence("added_mass_X", "surge", "kg"), INERTIA),
 )
 def added_mass_X(
     i: Inertia,
@@ -49,7 +77,9 @@ def added_mass_X(
     formula="Y_vdot - Δ, in M and C(nu)",
     symbol="Δ",
     sign=_SIGN,
-    source="(2.5)-(2.7), corrected",
+    source=_SOURCE,
+    search=half("added_mass_Y", lambda p: p["m"] - p["Y_vdot"]),
+    wording=Wording(water_sentence("added_mass_Y", "sway", "kg"), INERTIA),
 )
 def added_mass_Y(
     i: Inertia,
@@ -66,7 +96,9 @@ def added_mass_Y(
     formula="N_rdot - Δ, in M",
     symbol="Δ",
     sign=_SIGN,
-    source="(2.5)-(2.7), corrected",
+    source=_SOURCE,
+    search=half("added_mass_N", lambda p: p["I_z"] - p["N_rdot"]),
+    wording=Wording(water_sentence("added_mass_N", "yaw", "kg m2"), INERTIA),
 )
 def added_mass_N(
     i: Inertia,

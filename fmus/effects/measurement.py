@@ -1,13 +1,18 @@
 """Faults of the measurement chain that pass for physics."""
 
+from math import degrees
 from typing import Annotated, Any
 
-from ..declare import Range
+from ..declare import Range, Variable
 from ..frames import rotate_to_earth
-from .registry import Effect, add, effect
+from .effect import Effect, Search, Wording, effect
+from .families import CLOCK, MEASUREMENT
+from .text import Found, number, offset, towards
 
 Pose = tuple[Any, Any, Any]
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
+# Offsets of the clock to try [s]: some samples, and what a slow network gives.
+OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)
 
 
 @effect(
@@ -18,6 +23,11 @@ ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
     symbol="dx, dy",
     sign="positive: markers ahead and to starboard of where they are assumed",
     source="4.3.1, bias",
+    search=Search(differentiable=True),
+    wording=Wording(
+        lambda f: f"The position is measured {offset(f, 'marker_offset')} of where the model believes.",
+        MEASUREMENT,
+    ),
 )
 def marker_offset(
     pose: Pose,
@@ -30,6 +40,11 @@ def marker_offset(
     return x + dx, y + dy, psi
 
 
+def heading_sentence(f: Found) -> str:
+    off = towards(degrees(f["heading_offset"]), "°", "N").replace(" °", "°")
+    return f"The heading is measured {off} of the true one."
+
+
 @effect(
     "heading_offset",
     "measurement",
@@ -38,6 +53,8 @@ def marker_offset(
     symbol="δ",
     sign="positive: measured to starboard of the true heading",
     source="4.3.1, bias",
+    search=Search(differentiable=True),
+    wording=Wording(heading_sentence, MEASUREMENT),
 )
 def heading_offset(
     pose: Pose,
@@ -48,18 +65,26 @@ def heading_offset(
     return x, y, psi + heading_offset
 
 
-add(
-    Effect(
-        id="clock_offset",
-        kind="measurement",
-        axis="XYN",
-        description="the pose is older than its stamp: the fault 'delay' of a scenario",
-        formula="(x, y, psi)_m(t) = (x, y, psi)(t - δ)",
-        symbol="δ",
-        sign="positive: the pose is older than its stamp",
-        source="4.3.1",
-        linear=False,
-        parameters=(),
-        function=None,
-    )
+def clock_sentence(f: Found) -> str:
+    sense = "older" if f["clock_offset"] > 0.0 else "younger"
+    return f"The measured pose is {number(f['clock_offset'])} s {sense} than its time stamp."
+
+
+# No FMU has the clock of the measurement system: in a scenario it is the fault 'delay'.
+CLOCK_OFFSET = Effect(
+    id="clock_offset",
+    kind="measurement",
+    axis="XYN",
+    description="the pose is older than its stamp: the fault 'delay' of a scenario",
+    formula="(x, y, psi)_m(t) = (x, y, psi)(t - δ)",
+    symbol="δ",
+    sign="positive: the pose is older than its stamp",
+    source="4.3.1",
+    linear=False,
+    parameters=(
+        Variable("clock_offset", "s", "age of the pose at its time stamp", 0.0, Range(), False),
+    ),
+    function=None,
+    search=Search(tries=[{"clock_offset": d} for d in OFFSETS]),
+    wording=Wording(clock_sentence, CLOCK),
 )

@@ -30,7 +30,9 @@ class Learning(NamedTuple):
 
     change_time: Annotated[float, "s", "for which a disturbance goes on changing", Range(0.1)] = 8.0
     memory_time: Annotated[float, "s", "over which its slope is remembered", Range(0.1)] = 2.0
-    alert: Annotated[float, "1/s", "growth of the covariance in doubt", Range(0.0, 100.0)] = 20.0
+    alert: Annotated[
+        float, "1/s", "growth of the covariance while samples are rejected", Range(0.0, 100.0)
+    ] = 20.0
     alert_time: Annotated[float, "s", "over which innovations are averaged", Range(0.01)] = 0.3
 
 

@@ -36,7 +36,7 @@ class Noise(NamedTuple):
     drift_r: Annotated[float, "rad/s3", "growth in 1 s of the slope in yaw", STD] = 0.000048
 
 
-class Doubt(NamedTuple):
+class Rejection(NamedTuple):
     """What is not believed, and what is done without measurements."""
 
     gate: Annotated[float, "1", "standard deviations beyond which a sample is a spike", Range(1.0)] = 5.0
@@ -49,7 +49,7 @@ class Doubt(NamedTuple):
 class Params(NamedTuple):
     noise: Noise = Noise()
     learning: Learning = Learning()
-    doubt: Doubt = Doubt()
+    rejection: Rejection = Rejection()
     screening: Screening = Screening()
     inertia: Inertia = Inertia()
     damping: Damping = Damping()
@@ -113,7 +113,7 @@ def believed(s: State, ahead: Motion, keep: Number, p: Params, k: Rates, h: Numb
 
 def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number]:
     """The belief after a sample, and whether the sample fits to what was believed."""
-    m, n, doubt = b.motion, p.noise, p.doubt
+    m, n, rejection = b.motion, p.noise, p.rejection
     ahead, aside = rotate_to_body(m.psi, s.x - m.x, s.y - m.y)
     turn = s.psi - m.psi
     position, heading = n.position_std * n.position_std, n.heading_std * n.heading_std
@@ -129,13 +129,15 @@ def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number
         clip(m.v + dv, -MOST, MOST),
         clip(m.r + dr, -MOST, MOST),
     )
-    slack = position + doubt.position_slack * doubt.position_slack
+    slack = position + rejection.position_slack * rejection.position_slack
     distance = (
         ahead * ahead / (slack + b.surge.covariance.pp)
         + aside * aside / (slack + b.sway.covariance.pp)
-        + turn * turn / (heading + doubt.heading_slack * doubt.heading_slack + b.yaw.covariance.pp)
+        + turn
+        * turn
+        / (heading + rejection.heading_slack * rejection.heading_slack + b.yaw.covariance.pp)
     )
-    return Belief(after, surge, sway, yaw), distance <= doubt.gate * doubt.gate
+    return Belief(after, surge, sway, yaw), distance <= rejection.gate * rejection.gate
 
 
 def init(i: Inputs, p: Params) -> State:
@@ -148,7 +150,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
     period = p.screening.measurement_period
     k = rates(p.learning, period, h)
-    keep = where(s.seen.age > p.screening.rest_time, exp(-h / p.doubt.fade_time), 1.0)
+    keep = where(s.seen.age > p.screening.rest_time, exp(-h / p.rejection.fade_time), 1.0)
     ahead, model = predicted(s, tau, hull, keep, h)
     before = believed(s, ahead, keep, p, k, h)
     seen, sample = look(s.seen, i.measurement, before.motion.psi, p.screening, h)
@@ -157,7 +159,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     after, fitting = corrected(before, sample, p, k)
     fits = new & fitting
     refused = where(fits, 0.0, where(new, s.refused + fmax(h, period), s.refused))
-    elsewhere = sample.first | (refused > p.doubt.jump_time)
+    elsewhere = sample.first | (refused > p.rejection.jump_time)
     belief = when(
         elsewhere,
         lambda: Belief(Motion(sample.x, sample.y, finite(sample.psi, 0.0))),

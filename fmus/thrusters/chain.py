@@ -2,25 +2,24 @@
 
 A thruster model is a characteristic: which share of its full force each thruster gives for a command.
 All else is the same for every model and stands here; :func:`thrusters` makes an FMU of a characteristic.
+
+Commands pass the effects with a memory of commands (a delay), the limit of their rate, the
+characteristic, the effects with a memory of forces (a lag), and then the effects without a memory. The
+functions run on floats, step by step in an FMU, and on arrays, which is how a diagnosis computes whole
+series with them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Component, bundle
-from ..effects import registry
-from ..effects.registry import Running, Thrust
+from ..effects import STANDARD, EffectSet, Memory, Running, Thrust
+from ..effects.group import Group, Member, group
 from ..hull import Triple
-from ..ops import Number, clip, exp, finite, fmax, pick, when, where
+from ..ops import Number, clip, finite, when
 from ..signals import Force, Velocity
 from .allocation import Allocation, allocate, moments, thrust
-
-IN_THRUSTERS = registry.group(
-    "ThrusterEffects", [e for e in registry.effects("actuator") if e.function is not None]
-)
-Dynamics = registry.group("Dynamics", [registry.find("delay"), registry.find("lag")]).params
-# Commands that a delay keeps; a longer one is remembered in coarser steps.
-SLOTS = 64
 
 
 class Plant(NamedTuple):
@@ -45,14 +44,48 @@ class Rate(NamedTuple):
     plant_rate: Annotated[float, "1/s", "limit of a command's rate; 0: none", POSITIVE] = 0.0
 
 
-class Past(NamedTuple):
-    """What the thrusters remember: time, past commands, the limited command, the lagged shares."""
+class ThrusterEffects(NamedTuple):
+    """The effects of a set that act on thrusters.
 
-    t: Any = 0.0
-    since: Any = 0.0
-    commands: tuple[Triple, ...] = ((0.0, 0.0, 0.0),) * SLOTS
-    limited: Triple = (0.0, 0.0, 0.0)
-    lagged: Triple = (0.0, 0.0, 0.0)
+    Attributes:
+        dynamics: those with a memory.
+        forces: those without.
+        remembering: of dynamics, those with a memory of commands and those with one of forces, each with
+            its place among the memories.
+    """
+
+    dynamics: Group
+    forces: Group
+    remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
+
+
+@cache
+def thruster_effects(effects: EffectSet) -> ThrusterEffects:
+    """The groups of a set of effects; those with a memory of commands come first."""
+    actuator = [e for e in effects.of_kind("actuator") if e.function is not None]
+    slow = [e for of in ("command", "force") for e in actuator if e.memory and e.memory.of == of]
+    dynamics = group("Dynamics", slow)
+    remembering: dict[str, list[tuple[int, Member, Memory]]] = {"command": [], "force": []}
+    for k, member in enumerate(dynamics.members):
+        memory = member.effect.memory
+        assert memory is not None
+        remembering[memory.of].append((k, member, memory))
+    forces = group("ThrusterEffects", [e for e in actuator if e.memory is None])
+    return ThrusterEffects(dynamics, forces, remembering)
+
+
+class Past(NamedTuple):
+    """What the thrusters remember: time [s], the memory of each slow effect, the last command."""
+
+    t: Any
+    memories: tuple[Any, ...]
+    limited: Triple
+
+
+def at_rest(effects: ThrusterEffects) -> Past:
+    """The past of thrusters that were never at work."""
+    memories = [member.effect.memory for member in effects.dynamics.members]
+    return Past(0.0, tuple([m.initial for m in memories if m is not None]), (0.0, 0.0, 0.0))
 
 
 class Inputs(NamedTuple):
@@ -72,23 +105,56 @@ class Outputs(NamedTuple):
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
 
 
-def between(delay: Number, h: Number) -> Number:
-    """Time between two remembered commands [s]: a step, or more where the delay is long."""
-    return fmax(fmax(h, delay / (SLOTS - 1.0)), 1e-9)
+class Prepared(NamedTuple):
+    """What follows from the parameters alone: which effects act.
+
+    Attributes:
+        params: of the thrusters.
+        effects: of the thrusters.
+        slow: for each effect with a memory, whether it acts.
+        acting: for each effect without, whether it acts.
+        any_acts: whether any of these acts.
+    """
+
+    params: Any
+    effects: ThrusterEffects
+    slow: tuple[Any, ...]
+    acting: tuple[Any, ...]
+    any_acts: Any
 
 
-def remember(s: Past, command: Triple, delay: Number, h: Number) -> Past:
-    """The memory with one more command, kept so that it reaches back by the delay [s]."""
-    since = s.since + h
-    tick = between(delay, h)
-    due = (h > 0.0) & (since >= tick - 1e-9)
-    commands = when(due, lambda: (command, *s.commands[:-1]), lambda: s.commands)
-    return s._replace(since=where(due, since - tick, since), commands=commands)
+def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
+    """Everything that a step needs of the parameters."""
+    return Prepared(
+        p,
+        effects,
+        effects.dynamics.acting(p.dynamics),
+        effects.forces.acting(p.wrong),
+        effects.forces.any_acts(p.wrong),
+    )
 
 
-def delayed(s: Past, delay: Number, h: Number) -> Triple:
-    """The command of ``delay`` [s] ago, to the nearest that is kept."""
-    return pick(s.commands, delay / between(delay, h))
+def remember(
+    memories: tuple[Any, ...], signals: Triple, of: str, b: Prepared, h: Number
+) -> tuple[tuple[Any, ...], Triple]:
+    """The memories a step later, and what they make of commands or of shares of full force.
+
+    Args:
+        memories: of all effects that have one.
+        signals: three commands, or three shares.
+        of: which of the two, "command" or "force".
+        b: the thrusters.
+        h: step [s].
+    """
+    found = list(memories)
+    for k, member, memory in b.effects.remembering[of]:
+        idle = found[k] if memory.idle is None else memory.idle(found[k], signals)
+        if b.slow[k] is False:
+            found[k] = idle
+            continue
+        otherwise = idle, signals
+        found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
+    return tuple(found), signals
 
 
 def rate_limited(before: Triple, wanted: Triple, rate: Number, h: Number) -> Triple:
@@ -98,34 +164,34 @@ def rate_limited(before: Triple, wanted: Triple, rate: Number, h: Number) -> Tri
     return a, b, c
 
 
-def lagged(before: Triple, wanted: Triple, T: Number, h: Number) -> Triple:
-    """First-order lag with time constant T [s], exact for a constant input."""
-    share = 1.0 - exp(-h / fmax(T, 1e-9))
-    a, b, c = (x + share * (w - x) for x, w in zip(before, wanted, strict=True))
-    return a, b, c
+def command_response(s: Past, commands: Triple, b: Prepared, h: Number) -> tuple[Past, Triple]:
+    """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
+    memories, given = remember(s.memories, commands, "command", b, h)
+    rate = b.params.rate.plant_rate
+    given = when(rate > 0.0, lambda: rate_limited(s.limited, given, rate, h), lambda: given)
+    return Past(s.t + h, memories, given), given
 
 
-FULL_POWER = Power()
+def force_response(s: Past, shares: Triple, b: Prepared, h: Number) -> tuple[Past, Triple]:
+    """The shares of full force that act after a step of h [s], for those of the characteristic."""
+    memories, shares = remember(s.memories, shares, "force", b, h)
+    return s._replace(memories=memories), shares
 
 
-def act(
-    shares: Triple, now: Running, plant: Plant, acting: Any, wrong: Any, power: Any = FULL_POWER
-) -> Triple:
+def act(shares: Triple, now: Running, b: Prepared) -> Triple:
     """tau [N, N, N m] of thrusters that give these shares of their full force, effects included.
 
     Args:
         shares: of the VSP's surge and sway force and of the bow thruster's.
         now: time, velocity and commands.
-        plant: the real thrusters.
-        acting: for each effect, whether it acts.
-        wrong: parameters of the effects.
-        power: of the VSP and of the bow thruster.
+        b: the thrusters.
     """
-    F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = plant
+    p = b.params
+    F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
     f = Thrust(F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2])
-    for member, acts in zip(IN_THRUSTERS.members, acting, strict=True):
-        f = member.apply(acts, wrong, f, f, now)
-    vsp, bow = power
+    for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
+        f = member.apply(acts, p.wrong, f, f, now)
+    vsp, bow = p.power
     X, Y, N = moments(vsp * f.vsp_x, vsp * f.vsp_y, bow * f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
 
@@ -136,8 +202,8 @@ def thrusters(
     model: type[Any],
     characteristic: Callable[[Running, Any], Triple],
     command: Callable[[Number], Number],
-) -> Component:
-    """The FMU of a thruster model.
+) -> Callable[..., Component]:
+    """The factory of a thruster model's FMU.
 
     Args:
         name, description: of the FMU.
@@ -146,9 +212,24 @@ def thrusters(
         command: the command that the allocation gives for a share of full force.
 
     Returns:
-        The component; a request that is NaN or infinite counts as zero.
+        ``make(effects)``, which gives the component with some effects, those of this project by default;
+        a request that is NaN or infinite counts as zero.
     """
 
+    def make(effects: EffectSet = STANDARD) -> Component:
+        return _thrusters(name, description, model, characteristic, command, thruster_effects(effects))
+
+    return make
+
+
+def _thrusters(
+    name: str,
+    description: str,
+    model: type[Any],
+    characteristic: Callable[[Running, Any], Triple],
+    command: Callable[[Number], Number],
+    effects: ThrusterEffects,
+) -> Component:
     params = bundle(
         "Params",
         allocation=Allocation(),
@@ -156,46 +237,36 @@ def thrusters(
         model=model(),
         power=Power(),
         rate=Rate(),
-        dynamics=Dynamics(),
-        wrong=IN_THRUSTERS.params(),
+        dynamics=effects.dynamics.params(),
+        wrong=effects.forces.params(),
     )
 
-    def prepare(p: Any) -> Any:
-        acting = tuple([member.acting(p.wrong) for member in IN_THRUSTERS.members])
-        return p, acting, IN_THRUSTERS.acting(p.wrong)
+    def prepare(p: Any) -> Prepared:
+        return prepared(p, effects)
 
     def init(i: Inputs, p: Any) -> Past:
-        return Past()
+        return at_rest(effects)
 
-    def prepared_step(s: Past, i: Inputs, prepared: Any, h: Number) -> tuple[Past, Outputs]:
-        p, acting, any_acts = prepared
+    def prepared_step(s: Past, i: Inputs, b: Prepared, h: Number) -> tuple[Past, Outputs]:
+        p = b.params
         X, Y, N = i.request
         raw = allocate(finite(X, 0.0), finite(Y, 0.0), finite(N, 0.0), p.allocation)
         s_x, s_y, s_bow = clip(raw[0], -1.0, 1.0), clip(raw[1], -1.0, 1.0), clip(raw[2], -1.0, 1.0)
-        asked = command(s_x), command(s_y), command(s_bow)
-        delay, lag = p.dynamics
-        past = when(delay > 0.0, lambda: remember(s, asked, delay, h), lambda: s)
-        given = when(delay > 0.0, lambda: delayed(past, delay, h), lambda: asked)
-        rate = p.rate.plant_rate
-        given = when(rate > 0.0, lambda: rate_limited(s.limited, given, rate, h), lambda: given)
+        commands = command(s_x), command(s_y), command(s_bow)
+        past, given = command_response(s, commands, b, h)
         u, v, r = i.velocity
         now = Running._make((s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), *given))
-        wanted = characteristic(now, p.model)
-        shares = when(lag > 0.0, lambda: lagged(s.lagged, wanted, lag, h), lambda: wanted)
+        past, shares = force_response(past, characteristic(now, p.model), b, h)
         vsp, bow = p.power
         tau = when(
-            any_acts,
-            lambda: act(shares, now, p.plant, acting, p.wrong, p.power),
+            b.any_acts,
+            lambda: act(shares, now, b),
             lambda: thrust(vsp * shares[0], vsp * shares[1], bow * shares[2], p.plant),
         )
         possible = thrust(s_x, s_y, s_bow, p.allocation)
         # At h = 0 nothing has had time to change.
-        after = when(
-            h > 0.0,
-            lambda: past._replace(t=s.t + h, limited=given, lagged=shares),
-            lambda: s,
-        )
-        return after, Outputs._make((*asked, *possible, *tau))
+        after = when(h > 0.0, lambda: past, lambda: s)
+        return after, Outputs._make((*commands, *possible, *tau))
 
     def step(s: Past, i: Inputs, p: Any, h: Number) -> tuple[Past, Outputs]:
         return prepared_step(s, i, prepare(p), h)

@@ -6,7 +6,7 @@ F |u| u. The allocation knows and takes the root.
 
 from typing import Any
 
-from ..effects.registry import Running
+from ..effects import Running
 from ..hull import Triple
 from ..ops import Number, sqrt, where
 from .chain import thrusters
@@ -25,10 +25,11 @@ def root(share: Number) -> Number:
     return where(share < 0.0, -size, size)
 
 
-COMPONENT = thrusters(
+make = thrusters(
     "thrusters_propeller",
     "Thrust allocation, and thrusters whose force grows with the square of the command",
     Line,
     squared,
     root,
 )
+COMPONENT = make()

@@ -9,8 +9,8 @@ believes.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range, vector
+from ..effects import Running
 from ..effects.curve import hats
-from ..effects.registry import Running
 from ..hull import Triple
 from ..ops import Number
 from .chain import thrusters
@@ -68,10 +68,11 @@ def tabulated(now: Running, p: Table) -> Triple:
     )
 
 
-COMPONENT = thrusters(
+make = thrusters(
     "thrusters_table",
     "Thrust allocation, and thrusters by tables over command and inflow speed",
     Table,
     tabulated,
     same,
 )
+COMPONENT = make()

@@ -1,8 +1,8 @@
-"""Thrusters whose force is straight in the command, (2.10)."""
+"""Thrusters whose force is linear in the command, (2.10)."""
 
 from typing import Any, NamedTuple
 
-from ..effects.registry import Running
+from ..effects import Running
 from ..hull import Triple
 from ..ops import Number
 from .chain import thrusters
@@ -12,7 +12,7 @@ class Line(NamedTuple):
     """A straight line needs no parameters."""
 
 
-def straight(now: Running, p: Any) -> Triple:
+def linear(now: Running, p: Any) -> Triple:
     """Shares of full force: the commands themselves, (2.10)."""
     return now.u_vsp_x, now.u_vsp_y, now.u_bow
 
@@ -21,10 +21,11 @@ def same(share: Number) -> Number:
     return share
 
 
-COMPONENT = thrusters(
+make = thrusters(
     "thrusters",
     "Thrust allocation and thrusters of CyberShip Enterprise 1",
     Line,
-    straight,
+    linear,
     same,
 )
+COMPONENT = make()

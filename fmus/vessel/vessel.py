@@ -8,9 +8,8 @@ model effect on the hull, from outside, or in the measurement is off until a par
 from operator import add
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component
-from ..effects.environment import current
-from ..effects.registry import Ship
+from ..declare import FIXED, Component, bundle
+from ..effects import STANDARD, EffectSet, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
@@ -29,19 +28,7 @@ from ..hull import (
 )
 from ..ops import Number, finite, when, wrap
 from ..signals import Force, Measurement, Velocity
-from .model_errors import (
-    CALM,
-    CHANGES,
-    IN_MEASUREMENT,
-    INERTIA,
-    NONE,
-    OUTSIDE,
-    UNCHANGED,
-    WATER,
-    ChangeForces,
-    OutsideForces,
-    forces_of,
-)
+from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 _TOWED = len(TowedDamping._fields)
 _ROTATIONAL = _TOWED + len(RotationalDamping._fields)
@@ -58,19 +45,8 @@ class Start(NamedTuple):
     r_0: Annotated[float, "rad/s", "initial yaw rate", FIXED] = 0.0
 
 
-class Params(NamedTuple):
-    inertia: Inertia = Inertia()
-    damping: Damping = Damping()
-    change: Any = CHANGES.params()
-    outside: Any = OUTSIDE.params()
-    water: Any = WATER.params()
-    heavier: Any = INERTIA.params()
-    seen: Any = IN_MEASUREMENT.params()
-    start: Start = Start()
-
-
 # eta, nu over ground, and time.
-State = Ship
+State = Motion
 
 
 class Pose(NamedTuple):
@@ -80,6 +56,8 @@ class Pose(NamedTuple):
 
 
 class Outputs(NamedTuple):
+    """Outputs of every vessel; behind them come the forces of its effects."""
+
     pose: Pose = Pose()
     velocity: Velocity = Velocity()
     u_dot: Annotated[float, "m/s2", "surge acceleration"] = 0.0
@@ -92,14 +70,12 @@ class Outputs(NamedTuple):
     omega_star_X: Annotated[float, "N", "what control model (2.27) lacks in surge"] = 0.0
     omega_star_Y: Annotated[float, "N", "what control model (2.27) lacks in sway"] = 0.0
     omega_star_N: Annotated[float, "N.m", "what control model (2.27) lacks in yaw"] = 0.0
-    change: Any = UNCHANGED
-    outside: Any = CALM
 
 
-def hull(p: Params) -> Hull:
+def hull(p: Any, effects: VesselEffects) -> Hull:
     """The hull with the changes of its damping and inertia applied."""
     inertia = p.inertia
-    for member in INERTIA.members:
+    for member in effects.inertia.members:
         inertia = member.apply(member.acting(p.heavier), p.heavier, inertia, inertia)
     nominal, change = p.damping, p.change
     damping = Damping(
@@ -111,48 +87,63 @@ def hull(p: Params) -> Hull:
 
 
 class Prepared(NamedTuple):
-    """What follows from the parameters alone: the hull, and which effects act."""
+    """What follows from the parameters alone: the hull, and which effects act.
 
-    params: Params
+    Attributes:
+        params: the vessel's parameters.
+        effects: of the vessel.
+        hull: with all changes applied.
+        changes, outside, measurement: for each effect of the group, whether it acts.
+        changed, disturbed, heavier: whether a damping coefficient is changed, anything from outside or a
+            current acts, the inertia is changed.
+    """
+
+    params: Any
+    effects: VesselEffects
     hull: Hull
     changes: tuple[Any, ...]
     outside: tuple[Any, ...]
-    seen: tuple[Any, ...]
+    measurement: tuple[Any, ...]
     changed: Any
-    stirred: Any
+    disturbed: Any
     heavier: Any
 
 
-def prepare(p: Params) -> Prepared:
+def prepared(p: Any, effects: VesselEffects) -> Prepared:
     """Everything that a step needs of the parameters."""
     return Prepared(
         p,
-        hull(p),
-        tuple([member.acting(p.change) for member in CHANGES.members]),
-        tuple([member.acting(p.outside) for member in OUTSIDE.members]),
-        tuple([member.acting(p.seen) for member in IN_MEASUREMENT.members]),
-        CHANGES.acting(p.change),
-        OUTSIDE.acting(p.outside) | WATER.acting(p.water),
-        INERTIA.acting(p.heavier),
+        effects,
+        hull(p, effects),
+        effects.changes.acting(p.change),
+        effects.outside.acting(p.outside),
+        effects.measurement.acting(p.measurement),
+        effects.changes.any_acts(p.change),
+        effects.outside.any_acts(p.outside) | effects.water.any_acts(p.water),
+        effects.inertia.any_acts(p.heavier),
     )
 
 
-def through_water(s: State, p: Params) -> tuple[Ship, Any, Any]:
+def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
     """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
-    u_c, v_c = current(s, *p.water)
+    u_c: Any = 0.0
+    v_c: Any = 0.0
+    for member in b.effects.water.members:
+        du, dv = member.effect(s, *b.params.water[member.parameters])
+        u_c, v_c = u_c + du, v_c + dv
     return s._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
 
 
-def calm(s: State, tau: Force, b: Hull) -> Triple:
+def nominal(s: State, tau: Force, b: Hull) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] where nothing acts but the thrusters and still water."""
     return motion(s[3], s[4], s[5], tau, b)
 
 
-def stirred(s: State, tau: Force, b: Prepared) -> Triple:
+def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] with every effect, in a current that the hull sees as nu_r."""
-    ship, u_c, v_c = through_water(s, b.params)
+    ship, u_c, v_c = through_water(s, b)
     X, Y, N = tau
-    for member, acts in zip(OUTSIDE.members, b.outside, strict=True):
+    for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
         dX, dY, dN = member.apply(acts, b.params.outside, NONE, ship)
         X, Y, N = X + dX, Y + dY, N + dN
     u_dot, v_dot, r_dot = motion(ship.u, ship.v, ship.r, Force(X, Y, N), b.hull)
@@ -160,11 +151,11 @@ def stirred(s: State, tau: Force, b: Prepared) -> Triple:
     return u_dot + s.r * v_c, v_dot - s.r * u_c, r_dot
 
 
-def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = calm) -> State:
+def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = nominal) -> State:
     """State after h [s] of constant force by one step of the classical Runge-Kutta method.
 
-    The law gives nu_dot from state, force and b: :func:`calm` with b a Hull, :func:`stirred` with b
-    a Prepared.
+    The law gives nu_dot from state, force and b: :func:`nominal` with b a Hull, :func:`disturbed` with
+    b a Prepared.
     """
     x, y, psi, u, v, r, t = s
     half = 0.5 * h
@@ -193,17 +184,19 @@ def integrate(s: State, tau: Force, b: Any, h: Number, law: Any = calm) -> State
 
 def change_forces(s: State, b: Prepared) -> Any:
     """The force of each change of a damping coefficient."""
-    ship, _, _ = through_water(s, b.params)
-    return ChangeForces._make(forces_of(CHANGES, b.changes, b.params.change, ship))
+    ship, _, _ = through_water(s, b)
+    forces = forces_of(b.effects.changes, b.changes, b.params.change, ship)
+    return b.effects.change_forces._make(forces)
 
 
 def outside_forces(s: State, b: Prepared) -> Any:
     """The force of each other effect on the hull."""
-    ship, _, _ = through_water(s, b.params)
-    return OutsideForces._make(forces_of(OUTSIDE, b.outside, b.params.outside, ship))
+    ship, _, _ = through_water(s, b)
+    forces = forces_of(b.effects.outside, b.outside, b.params.outside, ship)
+    return b.effects.outside_forces._make(forces)
 
 
-def model_error(s: State, nu_dot: Triple, tau: Force, p: Params) -> Triple:
+def model_error(s: State, nu_dot: Triple, tau: Force, p: Any) -> Triple:
     """omega [N, N, N m]: what the nominal model lacks of the force on the hull, (2.36)."""
     MX, MY, MN = inertia_force(*nu_dot, p.inertia)
     CX, CY, CN = coriolis_force(s.u, s.v, s.r, p.inertia)
@@ -214,44 +207,9 @@ def model_error(s: State, nu_dot: Triple, tau: Force, p: Params) -> Triple:
 def measured(s: State, b: Prepared) -> Measurement:
     """The pose as the measurement system sees it."""
     pose = (s.x, s.y, s.psi)
-    for member, acts in zip(IN_MEASUREMENT.members, b.seen, strict=True):
-        pose = member.apply(acts, b.params.seen, pose, pose)
+    for member, acts in zip(b.effects.measurement.members, b.measurement, strict=True):
+        pose = member.apply(acts, b.params.measurement, pose, pose)
     return Measurement(pose[0], pose[1], wrap(pose[2]))
-
-
-def init(i: Force, p: Params) -> State:
-    return State(*p.start, 0.0)
-
-
-def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Outputs]:
-    p = b.params
-    tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
-    after, nu_dot = when(
-        b.stirred, lambda: moved(s, tau, b, h, stirred), lambda: moved(s, tau, b.hull, h, calm)
-    )
-    wrong = b.changed | b.stirred | b.heavier
-    omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
-    change = when(b.changed, lambda: change_forces(after, b), lambda: UNCHANGED)
-    outside = when(b.stirred, lambda: outside_forces(after, b), lambda: CALM)
-    _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
-    u_dot, v_dot, r_dot = nu_dot
-    omega_X, omega_Y, omega_N = omega
-    return after, Outputs(
-        Pose(after.x, after.y, after.psi),
-        Velocity(after.u, after.v, after.r),
-        u_dot,
-        v_dot,
-        r_dot,
-        measured(after, b),
-        omega_X,
-        omega_Y,
-        omega_N,
-        omega_X,
-        omega_Y + phi_Y,
-        omega_N + phi_N,
-        change,
-        outside,
-    )
 
 
 def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Triple]:
@@ -260,22 +218,79 @@ def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Tri
     return after, law(after, tau, b)
 
 
-def step(s: State, i: Force, p: Params, h: Number) -> tuple[State, Outputs]:
-    return prepared_step(s, i, prepare(p), h)
+def make(effects: EffectSet = STANDARD) -> Component:
+    """The FMU of the vessel with some effects, each off until a parameter says otherwise."""
+    groups = vessel_effects(effects)
+    unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
+    params = bundle(
+        "Params",
+        inertia=Inertia(),
+        damping=Damping(),
+        change=groups.changes.params(),
+        outside=groups.outside.params(),
+        water=groups.water.params(),
+        heavier=groups.inertia.params(),
+        measurement=groups.measurement.params(),
+        start=Start(),
+    )
+    outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
+
+    def init(i: Force, p: Any) -> State:
+        return State(*p.start)
+
+    def prepare(p: Any) -> Prepared:
+        return prepared(p, groups)
+
+    def prepared_step(s: State, i: Force, b: Prepared, h: Number) -> tuple[State, Any]:
+        p = b.params
+        tau = Force(finite(i.tau_X, 0.0), finite(i.tau_Y, 0.0), finite(i.tau_N, 0.0))
+        after, nu_dot = when(
+            b.disturbed,
+            lambda: moved(s, tau, b, h, disturbed),
+            lambda: moved(s, tau, b.hull, h, nominal),
+        )
+        wrong = b.changed | b.disturbed | b.heavier
+        omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
+        change = when(b.changed, lambda: change_forces(after, b), lambda: unchanged)
+        outside = when(b.disturbed, lambda: outside_forces(after, b), lambda: undisturbed)
+        _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
+        u_dot, v_dot, r_dot = nu_dot
+        omega_X, omega_Y, omega_N = omega
+        return after, outputs(
+            Pose(after.x, after.y, after.psi),
+            Velocity(after.u, after.v, after.r),
+            u_dot,
+            v_dot,
+            r_dot,
+            measured(after, b),
+            omega_X,
+            omega_Y,
+            omega_N,
+            omega_X,
+            omega_Y + phi_Y,
+            omega_N + phi_N,
+            change,
+            outside,
+        )
+
+    def step(s: State, i: Force, p: Any, h: Number) -> tuple[State, Any]:
+        return prepared_step(s, i, prepare(p), h)
+
+    return Component(
+        name="vessel",
+        description="Hull of CyberShip Enterprise 1 in surge, sway and yaw",
+        params=params,
+        state=State,
+        inputs=Force,
+        outputs=outputs,
+        init=init,
+        step=step,
+        sampled=False,
+        max_step=0.02,
+        hold_nonfinite=False,
+        prepare=prepare,
+        prepared_step=prepared_step,
+    )
 
 
-COMPONENT = Component(
-    name="vessel",
-    description="Hull of CyberShip Enterprise 1 in surge, sway and yaw",
-    params=Params,
-    state=State,
-    inputs=Force,
-    outputs=Outputs,
-    init=init,
-    step=step,
-    sampled=False,
-    max_step=0.02,
-    hold_nonfinite=False,
-    prepare=prepare,
-    prepared_step=prepared_step,
-)
+COMPONENT = make()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from ...units import base_exponents
+from ...base_units import base_exponents
 from ..description import number, whole
 from ..fmu import Fmu
 from ..registry import rule

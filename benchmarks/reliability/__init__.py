@@ -1,0 +1,6 @@
+"""Whether a run that ends, however it ends, says so: ``python -m benchmarks.reliability``.
+
+``mutations`` breaks scenarios and files and reads them in this process; ``endings`` starts commands and
+kills them, interrupts them, leaves them no room on the disk, and runs an FMU that dies in every way in
+every function of FMI; ``verdict`` says what was wrong with an ending.
+"""

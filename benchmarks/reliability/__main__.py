@@ -1,0 +1,81 @@
+"""Run the campaign: ``python -m benchmarks.reliability``; exit code 1 if anything misbehaves."""
+
+import argparse
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from . import __doc__ as about
+from . import endings, mutations
+
+Part = tuple[str, int, Callable[[Path, Callable[[], None]], list[str]]]
+
+
+def parts(options: argparse.Namespace) -> list[Part]:
+    """Name, number of cases and work of each part."""
+    seed, chosen = options.seed, options.deaths
+    numbered = {
+        "broken scenarios": (options.scenarios, mutations.broken_scenarios),
+        "broken files": (options.files, mutations.broken_files),
+        "kills": (options.kills, endings.kills),
+        "signals": (options.signals, endings.signals),
+        "short of disk": (options.disk, endings.short_of_disk),
+    }
+    found: list[Part] = [
+        (name, count, partial(do, count, seed)) for name, (count, do) in numbered.items() if count
+    ]
+    if count := len(endings.cases(chosen, seed)):
+        found.append(("deaths of an FMU", count, partial(endings.deaths, chosen, seed)))
+    return found
+
+
+COUNTS = {"scenarios": 1000, "files": 300, "kills": 100, "signals": 100, "disk": 30}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.reliability", description=about)
+    for name, count in (
+        ("scenarios", 1000),
+        ("files", 300),
+        ("kills", 100),
+        ("signals", 100),
+        ("disk", 30),
+    ):
+        parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"({count})")
+    parser.add_argument(
+        "--deaths", type=int, metavar="N", help="of an FMU (every way in every function)"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of all random choices (1)")
+    options = parser.parse_args(arguments)
+    if (
+        signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    ):  # in the background of a shell; commands inherit it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    console, table, wrong = Console(), Table("part", "cases", "misbehaved", "minutes"), []
+    with (
+        tempfile.TemporaryDirectory(prefix="reliability_") as work,
+        Progress(console=Console(stderr=True), transient=True) as bar,
+    ):
+        for name, count, do in parts(options):
+            task, begun = bar.add_task(name, total=count), time.perf_counter()
+            found = do(Path(work), lambda task=task: bar.advance(task))
+            wrong += found
+            cases = len({text.partition(":")[0] for text in found})
+            table.add_row(name, str(count), str(cases), f"{(time.perf_counter() - begun) / 60:.1f}")
+    for text in wrong:
+        console.print(ascii(text)[1:-1][:300], markup=False, highlight=False)
+    console.print(table)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,90 @@
+"""Export a scenario to other tools: ``python -m cosim.export SCENARIO --ssp FILE.ssp``."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from ..command import BAD_INPUT, complain, printable, run_command
+from ..errors import InputError
+from ..formats.ssv import read_parameters
+from ..scenario.load import load_scenario
+from ..system.preparation import prepare
+from ..system.system import System
+from .writing import export_fmu, export_osp, export_ssp
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    try:
+        overrides = [(path, read_parameters(path)) for path in options.parameters]
+        system = prepare(load_scenario(options.scenario), overrides)
+        try:
+            with console.status("exporting"):
+                notes = _export(system, options)
+        finally:
+            system.close()
+    except InputError as error:
+        complain(error)
+        return BAD_INPUT
+    for warning in system.warnings:
+        complain(warning, "warning: ")
+    for note in notes:
+        complain(note, "note: ")
+    print(printable(str(options.ssp or options.osp or options.fmu)))
+    return 0
+
+
+def _export(system: System, options: argparse.Namespace) -> list[str]:
+    drop = options.drop_faults
+    if options.ssp is not None:
+        return export_ssp(system, options.ssp, drop)
+    if options.osp is not None:
+        return export_osp(system, options.osp, drop)
+    return export_fmu(system, options.fmu, drop)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m cosim.export",
+        description="Write a scenario as other tools read it: an SSP archive, an OSP directory, or one "
+        "FMU of the whole system. Parameters are baked into the project's own FMUs.",
+        epilog="examples:  python -m cosim.export scenarios/setpoint.json --ssp setpoint.ssp\n"
+        "           python -m cosim.export scenarios/hidden_drag.json --osp hidden_drag --drop-faults\n"
+        "           python -m cosim.export scenarios/ellipse.json --fmu ellipse.fmu --drop-faults\n"
+        "exit codes: 0 done, 2 bad input, or something that the format cannot hold",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
+    target = parser.add_mutually_exclusive_group(required=True)
+    target.add_argument("--ssp", type=Path, metavar="FILE.ssp", help="for FMPy, Ecos, libcosim")
+    target.add_argument(
+        "--osp", type=Path, metavar="DIR", help="for libcosim, cosim-cli and the OSP demo app"
+    )
+    target.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="for whatever runs FMUs")
+    parser.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE.ssv",
+        action="append",
+        default=[],
+        help="SSP parameter set whose values override the scenario's; may be given several times",
+    )
+    parser.add_argument(
+        "--drop-faults",
+        action="store_true",
+        help="leave out what the format cannot hold: faults, isolation, events (OSP keeps them)",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    run_command(main)

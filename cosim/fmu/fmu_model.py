@@ -1,0 +1,180 @@
+"""An FMI 2.0 co-simulation FMU: its archive and its description."""
+
+import hashlib
+import io
+import math
+import os
+import sys
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fmpy.model_description import ModelDescription, read_model_description
+
+from ..conversion import BASE_UNITS, Unit
+from ..errors import InputError
+from ..process.scratch import Scratch
+from . import archive_check
+
+DESCRIPTION = "modelDescription.xml"
+NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
+# fmi2Integer has 32 bits.
+INT_LIMIT = 2**31
+
+# What a variable can be set to.
+Value = bool | int | float | str
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of an FMU.
+
+    Attributes:
+        name, description, causality, variability: as in the model description.
+        type: ``Real``, ``Integer``, ``Boolean``, ``Enumeration`` or ``String``.
+        reference: value reference.
+        unit: None where the description has none.
+        min, max: limits [unit]; None where there are none.
+        start: start value as written; None where there is none.
+    """
+
+    name: str
+    type: str
+    reference: int
+    causality: str
+    variability: str
+    unit: Unit | None
+    description: str
+    min: float | None
+    max: float | None
+    start: str | None
+
+
+class Model:
+    """An FMU file, checked and described.
+
+    Args:
+        path: the ``.fmu`` file.
+        folder: where it is unpacked already, and removed by the caller.
+
+    Raises:
+        InputError: not there, not an FMU, or not one for FMI 2.0 co-simulation.
+    """
+
+    def __init__(self, path: Path, folder: Path | None = None) -> None:
+        self.path = path
+        if not os.path.isfile(path):  # Path.is_file raises for names that are too long
+            raise InputError(f"no such FMU: '{path}'")
+        entries = {entry.filename for entry in archive_check.check_archive(path)}
+        if DESCRIPTION not in entries:
+            raise InputError(f"'{path}' is not an FMU: it has no {DESCRIPTION}")
+        try:
+            with zipfile.ZipFile(path) as opened:
+                xml = opened.read(DESCRIPTION)
+            archive_check.check_xml(xml, path, "an FMU")
+            _, root = next(ElementTree.iterparse(io.BytesIO(xml), ["start"]))
+            version = root.get("fmiVersion")
+            if version != "2.0":
+                raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
+            self.description: ModelDescription = read_model_description(str(path), validate=False)
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
+        if self.description.coSimulation is None:
+            raise InputError(f"'{path}' is for model exchange only; this master runs co-simulation")
+        library = self.description.coSimulation.modelIdentifier
+        if not library or any(c in "/\\:" or not c.isprintable() for c in library):
+            raise InputError(f"'{path}' is refused: its modelIdentifier {library!r} is no identifier")
+        self.name: str = self.description.modelName or path.stem
+        try:
+            self.variables = self._read_variables()
+        except Exception as error:
+            raise InputError(f"'{path}' cannot be read as an FMU: {error}") from error
+        self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        self._folder = folder
+        self._scratch: Scratch | None = None
+
+    def _read_variables(self) -> dict[str, Variable]:
+        """All variables by name, in the order of the description."""
+        units = {
+            u.name: Unit(str(u.name))
+            if (b := u.baseUnit) is None
+            else Unit(
+                str(u.name), tuple(getattr(b, n) for n in BASE_UNITS), b.factor or math.nan, b.offset
+            )
+            for u in self.description.unitDefinitions
+        }
+        found: dict[str, Variable] = {}
+        for v in self.description.modelVariables:
+            declared = v.declaredType
+            unit = v.unit or (declared.unit if declared is not None else None)
+            low, high = v.min, v.max
+            if declared is not None:
+                low = declared.min if low is None else low
+                high = declared.max if high is None else high
+            if v.name in found:
+                raise ValueError(f"two variables are called '{v.name}'")
+            found[v.name] = Variable(
+                v.name,
+                v.type,
+                int(v.valueReference),
+                v.causality or "local",
+                v.variability or "continuous",
+                None if not unit else units.get(unit, Unit(unit)),
+                v.description or "",
+                None if low is None else float(low),
+                None if high is None else float(high),
+                v.start,
+            )
+        return found
+
+    @cached_property
+    def feedthrough(self) -> dict[str, list[str]]:
+        """Input -> outputs that depend on it at the same instant; all where the FMU lists none."""
+        inputs = [v.name for v in self.variables.values() if v.causality == "input"]
+        feeds: dict[str, list[str]] = {name: [] for name in inputs}
+        listed: dict[str, list[str]] = {}
+        for unknown in self.description.outputs:
+            if unknown.variable is None:
+                continue
+            known = unknown.dependencies
+            listed[unknown.variable.name] = inputs if known is None else [k.name for k in known]
+        for v in self.variables.values():
+            if v.causality == "output":
+                for name in listed.get(v.name, inputs):
+                    if name in feeds:
+                        feeds[name].append(v.name)
+        return feeds
+
+    def unpack(self) -> Path:
+        """Folder with the unpacked archive; made at the first call."""
+        if self._folder is None:
+            self._scratch = Scratch()
+            self._folder = self._scratch.path
+            try:
+                archive_check.unpack(self.path, self._folder)
+            except BaseException:
+                self.close()
+                raise
+        return self._folder
+
+    def forget_modules(self) -> None:
+        """Remove this FMU's modules, so that the next Python FMU imports its own of the same names."""
+        folder = str(self._folder)
+        for name, module in list(sys.modules.items()):
+            if (getattr(module, "__file__", None) or "").startswith(folder):
+                del sys.modules[name]
+        sys.path[:] = [entry for entry in sys.path if not entry.startswith(folder)]
+        for entry in [entry for entry in sys.path_importer_cache if entry.startswith(folder)]:
+            del sys.path_importer_cache[entry]
+
+    def close(self) -> None:
+        """Remove the unpacked archive."""
+        if self._folder is not None:
+            self.forget_modules()
+            if self._scratch is not None:
+                self._scratch.remove()
+            self._folder = self._scratch = None

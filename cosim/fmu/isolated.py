@@ -1,0 +1,264 @@
+"""An FMU in a process of its own: the master's end.
+
+Whatever the FMU does to its process, each call ends with an answer or a SimulationError. In a step, one
+request carries the inputs and one answer the outputs.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
+
+from ..errors import InputError, SimulationError
+from .channel import CALL, DONE, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel, GarbledError
+from .component import WARNING
+from .fmu_model import Model, Value, Variable
+from .instance import Access, OnMessage
+from .memory import Memory, Port
+
+# Longest wall time of one call [s] where the scenario gives none. Instantiation, for which a process is
+# started, may always take that long. Chosen: loading a large tool may take tens of seconds.
+TIMEOUT = 60.0
+# Wall time that an idle process may take to exit [s]; chosen: far beyond the clean-up of any library.
+EXIT_TIMEOUT = 5.0
+# Wall time between two looks at a call that is under way [s], at most; chosen: short beside TIMEOUT.
+WATCH_INTERVAL = 0.5
+START = "its instantiation"
+
+
+class IsolatedInstance:
+    """A running FMU in a process of its own; see :class:`cosim.fmu.instance.Instance` for its calls.
+
+    Args:
+        name: instance name.
+        model: what to run.
+        on_message: receives the messages that the FMU logs.
+        timeout: longest wall time that one call may take [s].
+
+    Raises:
+        InputError: the archive cannot be unpacked. An FMU that cannot be instantiated raises it in the
+            first call: processes start side by side.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        model: Model,
+        on_message: OnMessage,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        self.name = name
+        self.model = model
+        self._on_message = on_message
+        self._timeout = timeout
+        folder = model.unpack()
+        try:
+            # A session of its own: Ctrl-C reaches the master only, and children end with their parent.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "cosim.fmu.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise SimulationError(f"{name}: its process cannot be started: {error}") from None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._channel = Channel(self._process.stdout, self._process.stdin)
+        self._lost = ""  # why the process has ended
+        self._asked = ""  # the call whose answer is due
+        self._in_frame = False  # an exception inside a frame makes the channel unusable
+        self._waiting_since: float | None = None
+        self._is_late = False
+        self._closed = threading.Event()
+        threading.Thread(target=self._watch, name=f"watch {name}", daemon=True).start()
+        path = str(model.path.resolve())
+        self._send(START, CALL, json.dumps(["start", name, path, str(folder)]).encode())
+
+    def _watch(self) -> None:
+        """End the process when an answer takes too long; the thread that waits for it notices."""
+        while not self._closed.wait(min(WATCH_INTERVAL, self._timeout / 4)):
+            since, allowed = self._waiting_since, self._allowed()
+            if since is not None and time.monotonic() - since > allowed:
+                self._is_late = True
+                self._kill()
+
+    def _allowed(self) -> float:
+        return max(self._timeout, TIMEOUT) if self._asked == START else self._timeout
+
+    def _kill(self) -> None:
+        with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(
+                    self._process.pid, signal.SIGKILL
+                )  # including the processes that the FMU started
+            else:
+                self._process.kill()
+
+    def _send(self, what: str, kind: int, body: bytes) -> None:
+        """Send a request, after the answer to the one before."""
+        if self._asked:
+            self._answer()
+        if self._lost:
+            raise SimulationError(self._lost)
+        self._asked, self._in_frame = what, True
+        try:
+            self._channel.send(kind, body)
+        except OSError:
+            self._give_up()
+        self._in_frame = False
+
+    def _answer(self, length: int | None = None) -> bytes:
+        """Wait for the answer that is due, and pass on what the FMU logs meanwhile.
+
+        Args:
+            length: of the answer [bytes]; None accepts any.
+        """
+        if self._lost:
+            raise SimulationError(self._lost)
+        self._in_frame = True
+        self._waiting_since = time.monotonic()
+        try:
+            kind, body = self._channel.receive()
+            while kind == LOG:
+                status, text = json.loads(body)
+                self._on_message(self.name, status, text)
+                kind, body = self._channel.receive()
+            complaint = "" if kind == DONE else body.decode()
+            if kind == DONE and length not in (None, len(body)):
+                raise GarbledError
+        except EOFError:
+            self._give_up()
+        except (GarbledError, ValueError, TypeError):
+            self._give_up(is_garbled=True)
+        self._waiting_since = None
+        what, self._in_frame, self._asked = self._asked, False, ""
+        if kind == DONE:
+            return body
+        if what == START:
+            self._lost = complaint  # there is nothing to terminate or free
+        raise (InputError if kind == REFUSED else SimulationError)(complaint)
+
+    def _give_up(self, is_garbled: bool = False) -> NoReturn:
+        """The process has ended, or its answers are no frames: raise the reason.
+
+        Raises:
+            SimulationError: always.
+        """
+        self._waiting_since = None
+        self._closed.set()
+        if is_garbled:
+            self._kill()
+        try:
+            code = self._process.wait(EXIT_TIMEOUT)
+        except subprocess.TimeoutExpired:  # it closed its pipes and runs on
+            self._kill()
+            code = self._process.wait()
+        self._kill()
+        if self._is_late:
+            how = f"{self._asked} took longer than {self._allowed():g} s; its process was ended"
+        elif is_garbled:
+            how = f"it wrote into the pipe to the master in {self._asked}; its process was ended"
+        else:
+            how = f"its process died in {self._asked} ({_reason(code)})"
+        self._lost = f"{self.name}: {how}"
+        raise SimulationError(self._lost)
+
+    def _call(self, what: str, name: str, *arguments: Any) -> Any:
+        self._send(what, CALL, json.dumps([name, *arguments]).encode())
+        answer = self._answer()
+        try:
+            return json.loads(answer)
+        except ValueError:
+            self._asked = what
+            self._give_up(is_garbled=True)
+
+    def set_value(self, variable: Variable, value: Value) -> None:
+        self._call(f"setting {variable.name} = {value}", "set_value", variable.name, value)
+
+    def get_value(self, variable: Variable) -> float:
+        return float(self._call(f"getting {variable.name}", "get_value", variable.name))
+
+    def set_up(self, stop: float) -> None:
+        self._call("fmi2SetupExperiment", "set_up", stop)
+
+    def enter_initialization(self) -> None:
+        self._call("fmi2EnterInitializationMode", "enter_initialization")
+
+    def exit_initialization(self) -> None:
+        self._call("fmi2ExitInitializationMode", "exit_initialization")
+
+    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+        names = [[port.variable.name for port in ports] for ports in (inputs, outputs)]
+        self._call("the choice of its variables", "bind", *names, h)
+        own_inputs, own_outputs = _part(inputs, memory), _part(outputs, memory)
+        pending = 0
+
+        def move(what: str, actions: int, t: float) -> None:
+            nonlocal pending
+            actions |= pending
+            pending = 0
+            body = MOVE_HEAD.pack(actions, t)
+            self._send(what, MOVE, body + own_inputs if actions & PUT else body)
+
+        def put() -> None:
+            # The inputs are sent with the next request.
+            nonlocal pending
+            pending = PUT
+
+        def get() -> None:
+            move("getting its outputs", GET, 0.0)
+            own_outputs[:] = self._answer(len(own_outputs))
+
+        def begin(t: float) -> None:
+            move(f"the step from t = {t} s", STEP, t)
+
+        def step(t: float) -> None:
+            if not self._asked:
+                begin(t)
+            own_outputs[:] = self._answer(len(own_outputs))
+
+        return Access(put, get, step, begin)
+
+    def terminate(self) -> None:
+        if not self._lost and not self._in_frame:
+            self._call("fmi2Terminate", "terminate")
+
+    def free(self) -> None:
+        if self._in_frame:  # interrupted during a call
+            self._kill()
+        elif not self._lost:
+            try:
+                self._call("fmi2FreeInstance", "free")
+            except (SimulationError, InputError) as error:
+                self._on_message(self.name, WARNING, str(error))
+        self._closed.set()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                if pipe is not None:
+                    pipe.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(EXIT_TIMEOUT)
+        self._kill()  # also for the processes that the FMU started
+        self._process.wait()
+
+
+def _part(ports: Sequence[Port], memory: Memory) -> memoryview:
+    """The part of a memory that holds some variables."""
+    first = ports[0].slot if ports else 0
+    return memory.octets[8 * first : 8 * (first + len(ports))]
+
+
+def _reason(code: int) -> str:
+    """How a process ended, as text."""
+    if code < 0:
+        with suppress(ValueError):
+            return f"signal {-code}, {signal.Signals(-code).name}"
+        return f"signal {-code}"
+    return f"exit code {code}"

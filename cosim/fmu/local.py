@@ -1,0 +1,103 @@
+"""An FMU that runs in this process."""
+
+from collections.abc import Callable, Sequence
+
+from fmpy.fmi1 import FMICallException
+
+from ..errors import SimulationError
+from ..process.run_state import STATE
+from . import calls
+from .component import ERROR, Component
+from .fmu_model import Model, Value, Variable
+from .instance import Access, OnMessage
+from .memory import Memory, Port
+
+
+class LocalInstance:
+    """A running FMU in this process; see :class:`cosim.fmu.instance.Instance` for its calls.
+
+    Args:
+        name: instance name.
+        model: what to run.
+        on_message: receives the messages that the FMU logs.
+
+    Raises:
+        InputError: no binary for this platform, or instantiation refused.
+    """
+
+    def __init__(self, name: str, model: Model, on_message: OnMessage) -> None:
+        self.name = name
+        self.model = model
+        self.component = Component(name, model, on_message)
+        self._slave = self.component.slave
+
+    def bind(self, inputs: Sequence[Port], outputs: Sequence[Port], memory: Memory, h: float) -> Access:
+        return calls.bind(self.component, inputs, outputs, memory, h)
+
+    def _call(self, what: str, action: Callable[[], object]) -> None:
+        """Make a call of the life cycle; an FMU that refuses it ends the run."""
+        component = self.component
+        component.complaint = ""
+        STATE.calls(self.name, what)
+        try:
+            action()
+            STATE.calls_nothing()
+        except Exception as error:
+            status = error.status if isinstance(error, FMICallException) else ERROR
+            component.worst_status = max(component.worst_status, status)
+            why = f": {component.complaint}" if component.complaint else ""
+            raise SimulationError(
+                f"{self.name} ({self.model.path.name}): {what} failed: {error}{why}"
+            ) from error
+
+    def set_up(self, stop: float) -> None:
+        suggested = self.model.description.defaultExperiment
+        tolerance = None if suggested is None else suggested.tolerance
+        self._call(
+            "fmi2SetupExperiment",
+            lambda: self._slave.setupExperiment(
+                tolerance=None if tolerance is None else float(tolerance), startTime=0.0, stopTime=stop
+            ),
+        )
+
+    def set_value(self, variable: Variable, value: Value) -> None:
+        def action() -> None:
+            references = [variable.reference]
+            if variable.type == "Real":
+                self._slave.setReal(references, [float(value)])
+            elif variable.type == "Boolean":
+                self._slave.setBoolean(references, [bool(value)])
+            elif variable.type == "String":
+                self._slave.setString(references, [str(value)])
+            else:
+                self._slave.setInteger(references, [int(value)])
+
+        self._call(f"setting {variable.name} = {value}", action)
+
+    def get_value(self, variable: Variable) -> float:
+        references = [variable.reference]
+        values: list[float] = []
+
+        def action() -> None:
+            if variable.type == "Real":
+                values.extend(self._slave.getReal(references))
+            elif variable.type == "Boolean":
+                values.extend(self._slave.getBoolean(references))
+            else:
+                values.extend(self._slave.getInteger(references))
+
+        self._call(f"getting {variable.name}", action)
+        return float(values[0])
+
+    def enter_initialization(self) -> None:
+        self._call("fmi2EnterInitializationMode", self._slave.enterInitializationMode)
+
+    def exit_initialization(self) -> None:
+        self._call("fmi2ExitInitializationMode", self._slave.exitInitializationMode)
+
+    def terminate(self) -> None:
+        if self.component.worst_status < ERROR:
+            self._call("fmi2Terminate", self._slave.terminate)
+
+    def free(self) -> None:
+        self.component.free()

@@ -1,0 +1,119 @@
+"""The process of one isolated FMU: ``python -m cosim.fmu.worker``, started by the master only.
+
+It carries out the frames on its standard input with the same code that runs an FMU inside the master,
+and ends when the master does, also when that is killed.
+"""
+
+import ctypes
+import io
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+from ..errors import InputError, SimulationError
+from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
+from .fmu_model import Model, Value
+from .local import LocalInstance
+from .memory import Memory, Port
+
+PR_SET_PDEATHSIG = 1  # of Linux' prctl(2)
+
+
+class Worker:
+    """Answers one request after the other."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._calls = {
+            "start": self._start,
+            "bind": self._bind,
+            "set_value": self._set_value,
+            "get_value": self._get_value,
+            "free": self._free,
+        }
+
+    def serve(self) -> None:
+        """Answer until the master closes its end."""
+        while True:
+            try:
+                kind, body = self._channel.receive()
+            except EOFError:
+                return
+            try:
+                answer = self._move(body) if kind == MOVE else self._call(body)
+            except InputError as error:
+                self._channel.send(REFUSED, str(error).encode())
+            except SimulationError as error:
+                self._channel.send(FAILED, str(error).encode())
+            else:
+                self._channel.send(DONE, answer)
+
+    def _call(self, body: bytes) -> bytes:
+        name, *arguments = json.loads(body)
+        action = self._calls.get(name) or getattr(self._instance, name)
+        return json.dumps(action(*arguments)).encode()
+
+    def _start(self, name: str, path: str, folder: str) -> None:
+        self._model = Model(Path(path), Path(folder))
+        self._instance = LocalInstance(name, self._model, self._log)
+
+    def _log(self, _: str, status: int, text: str) -> None:
+        self._channel.send_json(LOG, [status, text])
+
+    def _set_value(self, name: str, value: Value) -> None:
+        self._instance.set_value(self._model.variables[name], value)
+
+    def _get_value(self, name: str) -> float:
+        return self._instance.get_value(self._model.variables[name])
+
+    def _bind(self, inputs: list[str], outputs: list[str], h: float) -> None:
+        """Lay out a memory: the inputs, then the outputs."""
+        known = self._model.variables
+        ports = [Port(known[name], k) for k, name in enumerate([*inputs, *outputs])]
+        memory, middle = Memory(len(ports)), len(inputs)
+        self._access = self._instance.bind(ports[:middle], ports[middle:], memory, h)
+        self._inputs = memory.octets[: 8 * middle]
+        self._outputs = memory.octets[8 * middle : 8 * len(ports)]
+
+    def _move(self, body: bytes) -> bytes:
+        actions, t = MOVE_HEAD.unpack_from(body)
+        if actions & PUT:
+            self._inputs[:] = body[MOVE_HEAD.size :]
+            self._access.put()
+        if actions & STEP:
+            self._access.step(t)
+        elif actions & GET:
+            self._access.get()
+        return bytes(self._outputs)
+
+    def _free(self) -> None:
+        self._instance.free()
+
+
+def main() -> None:
+    """Serve the master, over pipes of its own: whatever the FMU prints goes to standard error."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the master handles Ctrl-C
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None)
+        # Without it, an FMU that hangs would outlive a master that was killed.
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        libc.setlinebuf(ctypes.c_void_p.in_dll(libc, "stdout"))  # as below, for FMUs in C
+    channel = Channel(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # a crash must not lose what was printed before
+    try:
+        Worker(channel).serve()
+    except OSError:
+        os._exit(1)  # the master has ended, or the FMU has closed the pipes
+    sys.stdout.flush()
+    # Libraries of FMUs sometimes crash in their clean-up at the end of a process.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+"""When Ctrl-C, a request to terminate and a closed terminal take effect.
+
+A signal handler of Python runs between any two steps of the program, also between the creation of a
+folder and the statement that remembers it. So a command leaves at once while it has nothing to clean up
+(:func:`leave_on_interrupt`), and interrupts wait while it makes, moves or removes files (:class:`Held`).
+
+Under ``python -m cosim.run`` a second process watches the run (:mod:`cosim.watch`). A terminal sends
+signals to both, and the watching process passes on its own: what it has counted is a request of the
+user, what it knows nothing of was sent to the simulating process alone, and ends it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+from .process.run_state import REQUESTS, STATE
+
+TYPE_CHECKING = False  # typing itself takes a while to import
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from types import FrameType
+    from typing import Any, ClassVar
+
+__all__ = [
+    "INTERRUPTED",
+    "SIGNALS",
+    "Held",
+    "UninterruptedProcesses",
+    "ignore_interrupts",
+    "leave_on_interrupt",
+    "on_interrupt",
+    "raise_if_interrupted",
+    "raise_on_interrupt",
+]
+
+INTERRUPTED = 130  # exit code: 128 + SIGINT, as shells have it
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+SIGNALS = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
+
+# Longest wall time until the watching process has counted a request that reached both processes, and in
+# which the same request may reach this one again [s]; chosen: enough on a busy machine.
+SETTLED = 1.0
+# Wall time between two looks at that count [s]; chosen: not noticeable.
+LOOK = 0.002
+
+
+class _Requests:
+    """Which signals are requests of the user."""
+
+    def __init__(self) -> None:
+        self._handled, self._last = 0, -SETTLED
+
+    def is_new(self, number: int) -> bool:
+        """Whether a signal is a request that has not been handled; ends the process if it is none."""
+        if not STATE.watched:
+            return True
+        until = time.monotonic() + SETTLED
+        while STATE.numbers[REQUESTS] == self._handled:
+            now = time.monotonic()
+            if now - self._last < SETTLED:
+                return False
+            if now > until:
+                signal.signal(number, signal.SIG_DFL)
+                os.kill(os.getpid(), number)
+            time.sleep(LOOK)
+        self._handled, self._last = STATE.numbers[REQUESTS], time.monotonic()
+        return True
+
+
+_requests = _Requests()
+
+
+def on_interrupt(action: Callable[[], object]) -> dict[int, Any]:
+    """From now on an interrupt does something.
+
+    Args:
+        action: what to do.
+
+    Returns:
+        The handlers until now, for :func:`restore`.
+    """
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if _requests.is_new(number):
+            action()
+
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    _install(dict.fromkeys(SIGNALS, handle))
+    return before
+
+
+def restore(handlers: Mapping[int, Any]) -> None:
+    """Have interrupts do again what they did."""
+    _install(handlers)
+
+
+def leave_on_interrupt() -> None:
+    """From now on an interrupt ends the process at once: for imports, which leave nothing."""
+    on_interrupt(_leave)
+
+
+def _leave() -> None:
+    os.write(2, b"interrupted\n")
+    STATE.end(INTERRUPTED)
+    os._exit(INTERRUPTED)
+
+
+_interrupted = False  # whether an interrupt has raised since raise_on_interrupt
+
+
+def raise_on_interrupt() -> None:
+    """From now on an interrupt raises KeyboardInterrupt, and is remembered."""
+    global _interrupted
+    _interrupted = False
+    on_interrupt(_raise)
+
+
+def _raise() -> None:
+    global _interrupted
+    _interrupted = True
+    raise KeyboardInterrupt
+
+
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt again if an interrupt was lost.
+
+    Where Python runs a callback of C, as in some imports and destructors, an exception goes nowhere.
+    """
+    if _interrupted:
+        raise KeyboardInterrupt
+
+
+def ignore_interrupts() -> None:
+    """From now on Ctrl-C does nothing: the command has ended but for its exit code."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
+
+
+class Held:
+    """Interrupts that arrive inside wait, but where :meth:`allow` lets them act.
+
+    At the end a waiting one acts, unless :meth:`finish` was called: then it came too late, and the
+    enclosing ``Held``, if there is one, holds from there on. In another thread than the main one, which
+    signals do not interrupt, nothing happens.
+    """
+
+    _innermost: ClassVar[Held | None] = None
+
+    def __init__(self) -> None:
+        self._waiting: list[int] = []
+        self._finished = False
+        self._before: dict[int, Any] = {}
+        self._acting: Mapping[int, Any] = {}
+        self._outer: Held | None = None
+
+    def __enter__(self) -> Held:
+        import threading
+
+        if threading.current_thread() is threading.main_thread():
+            self._before = {number: signal.getsignal(number) for number in SIGNALS}
+            self._outer = Held._innermost
+            self._acting = self._outer._acting if self._outer else self._before
+            Held._innermost = self
+            self.hold()
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if not self._before:
+            return
+        self.hold()
+        Held._innermost = self._outer
+        if self._finished and self._outer:
+            self._outer.hold()
+            return
+        _install(self._before)
+        if not self._finished and error is None:
+            self.act()
+
+    def hold(self) -> None:
+        """Interrupts wait."""
+        _install(dict.fromkeys(self._before, self._wait))
+
+    def allow(self) -> None:
+        """Interrupts act, those that waited at once."""
+        _install(self._acting)
+        self.act()
+
+    def act(self) -> None:
+        """Raise KeyboardInterrupt if an interrupt waits, or was lost."""
+        raise_if_interrupted()
+        if self._waiting:
+            self._waiting.clear()
+            raise KeyboardInterrupt
+
+    def finish(self) -> None:
+        """What was to be done is done: interrupts come too late."""
+        self._finished = True
+
+    def _wait(self, number: int, frame: FrameType | None) -> None:
+        self._waiting.append(number)
+
+
+def _install(handlers: Mapping[int, Any]) -> None:
+    for number, handler in handlers.items():
+        if handler is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+class UninterruptedProcesses:
+    """Processes that are started inside never see SIGINT, which a terminal sends to all of a command.
+
+    They inherit the mask of this thread. Windows has no such masks.
+    """
+
+    def __enter__(self) -> None:
+        if hasattr(signal, "pthread_sigmask"):
+            self._mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_SETMASK, self._mask)

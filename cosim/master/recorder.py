@@ -1,0 +1,78 @@
+"""Recording of the value table after every step."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SimulationError
+from ..results.log import CSV, LogWriter
+from ..results.pending_rows import PendingRows
+from ..results.performance import needed
+from ..system.system import System
+from .algorithm import Master
+from .value_table import ValueTable
+
+
+class Recorder:
+    """Writes the logged columns in blocks, and keeps the columns of metrics and pictures, logged or not.
+
+    Args:
+        system: what runs.
+        master: its master.
+        folder: for the log.
+
+    Attributes:
+        take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
+    """
+
+    def __init__(self, system: System, master: Master, folder: Path) -> None:
+        self.columns = ["time", *system.logged]
+        table = master.table
+        self._writer = LogWriter(folder / CSV, self.columns)
+        self._names = [s.name for s in table.signals]
+        self._outputs = self._slots(table, master.outputs)
+        self._kept_names = needed(self._names, system.scenario.roles)
+        self._kept_slots = self._slots(table, self._kept_names)
+        self._kept: list[np.ndarray] = []
+        logged = self._slots(table, system.logged)
+        self._pending = PendingRows(table.row, logged, system.scenario.log.every)
+        self.take = self._pending.take
+
+    @staticmethod
+    def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:
+        return np.array([table.slots[name] for name in names], dtype=np.intp)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows in the log."""
+        return self._writer.rows
+
+    def flush(self) -> None:
+        """Write the rows taken so far.
+
+        Raises:
+            SimulationError: an output is not finite; the rows up to there are written.
+            OSError: not all could be written; then none can follow.
+        """
+        times, taken = self._pending.all()
+        wrong = ~np.isfinite(taken[:, self._outputs])
+        message = ""
+        if wrong.any():
+            k = int(np.argmax(wrong.any(axis=1)))
+            name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
+            message = f"{name} is not finite at t = {times[k]:g} s"
+            times, taken = times[: k + 1], taken[: k + 1]
+        self._writer.write(self._pending.logged(len(times)))
+        self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
+        self._pending.clear()
+        if message:
+            raise SimulationError(message)
+
+    def close(self) -> None:
+        self._writer.close()
+
+    def kept(self) -> dict[str, np.ndarray]:
+        """The columns for metrics and pictures, at every step."""
+        table = np.concatenate(self._kept) if self._kept else np.empty((0, 1 + len(self._kept_names)))
+        return {name: table[:, k] for k, name in enumerate(["time", *self._kept_names])}

@@ -1,0 +1,285 @@
+"""The run of a scenario: prepare, step, record, and write metrics and pictures."""
+
+import gc
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, SimulationError
+from ..files import update_json, write_json, write_roomy_json
+from ..formats.ssv import read_parameters
+from ..process.run_state import LOGGING, STATE, Owner
+from ..process.scratch import sweep
+from ..results import drawing, performance
+from ..results import log as logs
+from ..results.result_files import clear_results
+from ..scenario.schema import Scenario
+from ..system.preparation import prepare
+from ..system.system import System
+from .algorithm import Master
+from .loop_surroundings import interruptible, quiet_collector
+from .real_time import Pace
+from .recorder import Recorder
+from .run_record import describe
+
+# Wall time between two updates of progress and log [s]; chosen: smooth, and cheap beside the steps.
+UPDATE_INTERVAL = 0.2
+
+
+@dataclass
+class Result:
+    """How a run ended, and its results.
+
+    Attributes:
+        status: ``done``, ``failed`` or ``interrupted``.
+        folder: where log, metrics and pictures are.
+        rows: number of logged rows.
+        message: why it failed; empty otherwise.
+        metrics: as in metrics.json; empty if the system lacks the signals for them.
+        warnings: oddities that were no reason to refuse.
+        pace: with ``realtime``: lateness and missed deadlines.
+    """
+
+    status: str
+    folder: Path
+    rows: int = 0
+    message: str = ""
+    metrics: dict[str, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    pace: dict[str, float] = field(default_factory=dict)
+
+
+def simulate(
+    scenario: Scenario,
+    out: str | Path | None = None,
+    parameters: Sequence[str | Path] = (),
+    realtime: float | None = None,
+    pictures: bool = False,
+    native: bool = True,
+    show: Callable[[str], None] = lambda _: None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Result:
+    """Run a scenario and write its log, metrics and pictures.
+
+    Args:
+        scenario: from :func:`cosim.load_scenario`.
+        out: result folder; default ``results/<name>`` in the working directory.
+        parameters: SSP parameter sets whose values override the scenario's.
+        realtime: simulated seconds per second of wall time; None runs as fast as it can.
+        pictures: whether to draw.
+        native: whether FMUs may hold programs that were not built on this computer.
+        show: receives warnings and messages, a line each.
+        progress: receives the simulated time [s] several times a second.
+
+    Returns:
+        How it ended. A failed or interrupted run keeps its log.
+
+    Raises:
+        InputError: the scenario cannot be run; nothing has been written.
+    """
+    if realtime is not None and not 0.0 < realtime < math.inf:
+        raise InputError(f"realtime is a positive factor, not {realtime:g}")
+    overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
+    # FMUs may change the working directory.
+    here = os.getcwd()
+    given = Path(out) if out is not None else Path("results") / scenario.name
+    folder = Path(os.path.abspath(given))
+    owner = Owner()
+    sweep()
+    try:
+        system = prepare(scenario, overrides, native)
+        try:
+            result, recorder = _run(system, folder, realtime, show, progress)
+        finally:
+            owner.leave_copies()
+            system.close()
+            os.chdir(here)
+        if recorder is not None:
+            _finish(system, result, recorder, pictures, show)
+    finally:
+        STATE.finish()
+    result.folder = given
+    return result
+
+
+def _run(
+    system: System,
+    folder: Path,
+    realtime: float | None,
+    show: Callable[[str], None],
+    progress: Callable[[float], None],
+) -> tuple[Result, Recorder | None]:
+    """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log."""
+    scenario, owner = system.scenario, Owner()
+    for note in scenario.notes:
+        show(f"note: {note}")
+    for warning in system.warnings:
+        show(f"warning: {warning}")
+    if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
+        raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
+    description = describe(system)
+    STATE.begin(str(folder), json.dumps(description), system.order)
+    with interruptible() as interrupted:
+        try:
+            master = Master(system, lambda text: show(f"warning: {text}"), interrupted)
+        except (SimulationError, InputError) as error:
+            if interrupted():  # an FMU may report the interrupt as an error of its own
+                raise KeyboardInterrupt from None
+            if isinstance(error, InputError):
+                raise
+            _clear(folder, show)
+            told = {"status": "failed", "rows": 0, "message": str(error)}
+            write_json(folder / logs.SIDECAR, {**description, **told})
+            return Result("failed", folder, message=str(error), warnings=system.warnings), None
+        try:
+            owner.leave_copies()
+            _clear(folder, show)
+            return _record(system, master, folder, realtime, progress, description, interrupted)
+        finally:
+            master.close()
+
+
+def _clear(folder: Path, show: Callable[[str], None]) -> None:
+    """Make the result folder, without what an earlier run left there."""
+    try:
+        if (folder / logs.SIDECAR).exists():
+            show(f"note: replaces the earlier run in '{folder}'")
+        clear_results(folder)
+    except OSError as error:
+        raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+
+
+def _record(
+    system: System,
+    master: Master,
+    folder: Path,
+    realtime: float | None,
+    progress: Callable[[float], None],
+    sidecar: dict[str, Any],
+    interrupted: Callable[[], bool],
+) -> tuple[Result, Recorder]:
+    """Run to the end; returns how it ended, and the recorder."""
+    result = Result("running", folder, warnings=system.warnings)
+    try:
+        write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
+        recorder = Recorder(system, master, folder)
+    except OSError as error:
+        raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+    STATE.numbers[LOGGING] = 1
+    pace: Pace | None = None
+    result.status = "failed"  # until the loop has ended otherwise
+    try:
+        try:
+            with quiet_collector():
+                # Starts here: the collection before takes the time of several steps.
+                pace = None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
+                stopped = _loop(system, master, recorder, pace, interrupted, progress)
+            result.status = "interrupted" if stopped else "done"
+        except (SimulationError, OSError, KeyboardInterrupt) as error:
+            # A second request may interrupt an FMU in the middle of its step.
+            result.status = "interrupted" if interrupted() else "failed"
+            result.message = str(error)
+    finally:
+        STATE.calls_nothing()
+        try:
+            recorder.flush()
+        except SimulationError as error:
+            result.message = result.message or str(error)
+        except OSError as error:
+            result.status = "failed"
+            result.message = _not_written(folder, error)
+        recorder.close()
+        result.rows = recorder.rows
+        told: dict[str, Any] = {"rows": result.rows}
+        if pace is not None:
+            result.pace = told["realtime"] = pace.summary()
+        told["messages"] = [
+            {"instance": m.instance, "status": m.status, "text": m.text} for m in master.messages.kept
+        ]
+        if result.message:
+            told["message"] = result.message
+        told["status"] = result.status
+        with _disk(result):
+            update_json(folder / logs.SIDECAR, sidecar, told)
+    return result, recorder
+
+
+@contextmanager
+def _disk(result: Result) -> Iterator[None]:
+    """A file that cannot be written makes the run a failed one; what was written is kept."""
+    try:
+        yield
+    except OSError as error:
+        result.status = "failed"
+        result.message = result.message or _not_written(result.folder, error)
+
+
+def _not_written(folder: Path, error: OSError) -> str:
+    return f"cannot write to '{folder}': {error.strerror}"
+
+
+def _loop(
+    system: System,
+    master: Master,
+    recorder: Recorder,
+    pace: Pace | None,
+    interrupted: Callable[[], bool],
+    progress: Callable[[float], None],
+) -> bool:
+    """Step and record, with updates of progress and log; returns whether the user stopped it."""
+    recorder.take(0.0)
+    take, clock = recorder.take, time.perf_counter
+    due = clock() + UPDATE_INTERVAL
+    for t in master.run():
+        full = take(t)
+        if pace is not None:
+            pace.wait(t)
+        if interrupted():
+            recorder.flush()
+            return True
+        # At every step: the next may be a slow one, and the last of its process.
+        if full or clock() > due:
+            STATE.calls_nothing()
+            recorder.flush()
+            gc.collect()
+            progress(t)
+            due = clock() + UPDATE_INTERVAL
+    recorder.flush()
+    progress(system.scenario.stop)
+    return False
+
+
+def _finish(
+    system: System,
+    result: Result,
+    recorder: Recorder,
+    draw: bool,
+    show: Callable[[str], None],
+) -> None:
+    """Write metrics, pictures and the log's final format."""
+    window, roles = system.scenario.metrics, system.scenario.roles
+    columns = recorder.kept()
+    try:
+        result.metrics = performance.compute(columns, window.start, window.stop, roles)
+        with _disk(result):
+            write_json(result.folder / logs.METRICS, result.metrics)
+    except performance.MetricsError as error:
+        show(f"note: no metrics: {error}")
+    if draw and result.status != "interrupted":
+        with _disk(result):
+            runs = {system.scenario.name: columns}
+            used = {system.scenario.name: roles}
+            drawn = drawing.draw(runs, result.folder, window.start, window.stop, used)
+            missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
+            if missing:
+                show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
+    if system.scenario.log.format == "parquet" and result.status == "done":
+        with _disk(result):
+            logs.to_parquet(result.folder)

@@ -1,0 +1,141 @@
+"""Panels, lines over time and legends, common to all pictures.
+
+Matplotlib is imported only when a picture is drawn, and without pyplot: that needs no display and leaves
+no global state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from ..files import atomic_write
+from .log import Log
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ..scenario.roles import Roles
+
+DPI = 150  # chosen
+WIDTH = 8.0  # of a picture [in], chosen
+MAX_POINTS = 2000  # of a line over time: more than the pixels of its panel (WIDTH times DPI)
+LETTERS_PER_INCH = 12  # of a legend, in the default font
+
+
+class Run(NamedTuple):
+    """One run in a picture.
+
+    Attributes:
+        label: in legends.
+        log: the columns that the picture needs, without rows that cannot be drawn.
+        line: matplotlib's properties of its lines.
+        roles: names of the columns.
+        start, stop: the part of the run that metrics cover [s]; None is unbounded.
+    """
+
+    label: str
+    log: Log
+    line: dict[str, Any]
+    roles: Roles
+    start: float | None = None
+    stop: float | None = None
+
+
+Runs = Sequence[Run]
+
+
+def thin(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At most MAX_POINTS samples of a line, among them every peak.
+
+    Args:
+        time, values: samples in order of time.
+
+    Returns:
+        Lowest and highest sample of each of equally long stretches, in order of time.
+    """
+    n = values.size
+    if n <= MAX_POINTS:
+        return time, values
+    length = -(-n // (MAX_POINTS // 2))
+    padded = np.pad(values, (0, -n % length), mode="edge").reshape(-1, length)
+    start = np.arange(0, n, length)
+    ends = np.stack([start + padded.argmin(axis=1), start + padded.argmax(axis=1)])
+    chosen = np.minimum(np.sort(ends, axis=0).T.ravel(), n - 1)
+    return time[chosen], values[chosen]
+
+
+def blank(width: float, height: float) -> Figure:
+    """An empty figure, width by height [in]."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06)  # in
+    return Figure(figsize=(width, height), dpi=DPI, layout=layout)
+
+
+def stacked(
+    rows: int, columns: int, height: float, width: float = WIDTH, sharey: bool | Literal["row"] = False
+) -> tuple[Figure, np.ndarray]:
+    """A figure with a grid of panels over a common time axis."""
+    figure = blank(width, height)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False)
+    for panel in panels.flat:
+        grid(panel)
+        panel.margins(x=0.01)
+    for panel in panels[-1]:
+        panel.set_xlabel("time [s]")
+    return figure, panels
+
+
+def grid(panel: Axes) -> None:
+    """Pale grid lines behind the data, and no frame at the sides without a scale."""
+    panel.grid(visible=True, color="0.88", linewidth=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
+
+
+def legend(figure: Figure, panel: Axes, entries: int) -> None:
+    """A legend above the panels, for all of them, in as many columns as its labels leave room for."""
+    handles, labels = panel.get_legend_handles_labels()
+    widest = max(map(len, labels), default=0) + 6
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper center",
+        ncols=max(1, min(entries, int(figure.get_figwidth() * LETTERS_PER_INCH / widest))),
+        columnspacing=1.5,
+        frameon=False,
+    )
+
+
+def plot(panel: Axes, run: Run, values: np.ndarray, **line: Any) -> None:
+    """Draw one value of a run over time; ``line`` overrides properties of the run's lines."""
+    time, values = thin(run.log["time"], values)
+    panel.plot(time, values, **{"label": run.label, **run.line, **line})
+
+
+def finish(figure: Figure, panels: np.ndarray, runs: Runs, least: float = 0.0) -> Figure:
+    """Align the labels, name the runs, and give a flat line at least the range ``least``."""
+    for panel in panels.flat:
+        low, high = panel.get_ylim()
+        if high - low < least:
+            middle = 0.5 * (low + high)
+            panel.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+    figure.align_ylabels(panels)
+    if len(runs) > 1:
+        legend(figure, panels[0, 0], len(runs))
+    return figure
+
+
+def save(figure: Figure, file: Path) -> None:
+    """Write a figure, completely or not at all."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    with atomic_write(file) as scratch:
+        figure.savefig(scratch, format="png", dpi=DPI)

@@ -1,0 +1,118 @@
+"""Pictures of one run, or of several laid over each other: the five of the thesis, 5.1."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..scenario.roles import DEFAULT_ROLES, Roles
+from .canvas import Run, Runs, save
+from .lines import errors, forces, metrics, model_error
+from .log import Log
+from .performance import MetricsError
+from .track import trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Values beyond are left out, as those that are not finite; chosen: matplotlib's ticks fail far above.
+LARGEST = 1e9
+
+# The thesis' lines, 5.3, then matplotlib's colours.
+LINES = (("blue", "-"), ("green", "--"), ("red", "--"), ("magenta", "-."))
+MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple", "tab:gray")
+
+
+class Picture(NamedTuple):
+    """A picture.
+
+    Attributes:
+        choices: roles of the columns that it needs; the first whose columns are all there counts.
+        figure: draws the runs.
+    """
+
+    choices: Sequence[Sequence[str]]
+    figure: Callable[[Runs], "Figure"]
+
+
+# By file name.
+PICTURES = {
+    "trajectory": Picture((("pose", "target"), ("pose",)), trajectory),
+    "errors": Picture((("pose", "target"),), errors),
+    "metrics": Picture(
+        (
+            ("pose", "velocity", "target", "force"),
+            ("pose", "velocity", "target", "requested_force"),
+        ),
+        metrics,
+    ),
+    "forces": Picture((("linear_force", "nonlinear_force", "requested_force"),), forces),
+    "model_error": Picture((("model_error", "estimate"),), model_error),
+}
+
+
+def draw(
+    runs: Mapping[str, Log],
+    folder: str | Path,
+    start: float | None = None,
+    stop: float | None = None,
+    roles: Mapping[str, Roles] | None = None,
+) -> list[Path]:
+    """Draw every picture for which at least one log has the columns.
+
+    Args:
+        runs: label -> log; several logs are laid over each other.
+        folder: for the PNG files, made when missing.
+        start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
+        roles: label -> columns to use, where they are not the default ones.
+
+    Returns:
+        The files written, among trajectory.png, errors.png, metrics.png, forces.png and
+        model_error.png.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, picture in PICTURES.items():
+        able: list[Run] = []
+        for k, (label, log) in enumerate(runs.items()):
+            own = (roles or {}).get(label, DEFAULT_ROLES)
+            part = _usable(log, picture.choices, own)
+            if part is not None:
+                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, start, stop))
+        if not able:
+            continue
+        file = folder / f"{name}.png"
+        try:
+            figure = picture.figure(able)
+        except MetricsError:  # fewer than two rows in the window
+            continue
+        save(figure, file)
+        written.append(file)
+    return written
+
+
+def _line(k: int) -> dict[str, Any]:
+    """Properties of the lines of the k-th run."""
+    if k < len(LINES):
+        color, style = LINES[k]
+        return {"color": color, "linestyle": style, "linewidth": 1.2}
+    return {
+        "color": MORE_COLORS[(k - len(LINES)) % len(MORE_COLORS)],
+        "linestyle": "-",
+        "linewidth": 1.2,
+    }
+
+
+def _usable(log: Log, choices: Sequence[Sequence[str]], roles: Roles) -> Log | None:
+    """The columns of the first choice that the log has, without rows that cannot be drawn."""
+    for choice in choices:
+        columns = roles.of(*choice)
+        if all(name in log for name in columns):
+            part = {name: np.asarray(log[name], float) for name in ("time", *columns)}
+            good = np.all([np.abs(values) < LARGEST for values in part.values()], axis=0)
+            if np.count_nonzero(good) < 2:
+                return None
+            return part if good.all() else {name: values[good] for name, values in part.items()}
+    return None

@@ -1,0 +1,93 @@
+"""Pictures over time: errors, metrics, forces, model error."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .canvas import WIDTH, Runs, finish, legend, plot, stacked
+from .log import Log
+from .performance import AXES, cross_track, over_time, wrap
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def _norm(log: Log, names: Sequence[str]) -> np.ndarray:
+    return np.sqrt(sum((log[name] ** 2 for name in names), np.zeros_like(log["time"])))
+
+
+def errors(runs: Runs) -> "Figure":
+    """Heading error and cross-track error over time."""
+    figure, panels = stacked(2, 1, 5.0)
+    for run in runs:
+        x, y, psi = (run.log[name] for name in run.roles.pose)
+        target = [run.log[name] for name in run.roles.target]
+        plot(panels[0, 0], run, np.degrees(wrap(psi - target[2])))
+        plot(panels[1, 0], run, cross_track(x, y, target))
+    panels[0, 0].set_ylabel("heading error [deg]")
+    panels[1, 0].set_ylabel("cross-track error e [m]")
+    for panel in panels.flat:
+        panel.axhline(0.0, color="0.4", linewidth=0.6, zorder=1)
+    return finish(figure, panels, runs, least=1e-4)
+
+
+GROWING = (
+    ("ISE", "ISE [m² s]"),
+    ("IAE", "IAE [m s]"),
+    ("W", "W [J]"),
+    ("I_tau_dot", r"$I_{\dot\tau}$ [N]"),
+    ("IAEW", "IAEW [m s J]"),
+    ("IAEWWT", "IAEWWT [m s J N]"),
+)
+
+
+def metrics(runs: Runs) -> "Figure":
+    """The integral metrics over time."""
+    figure, panels = stacked(3, 2, 6.5)
+    for run in runs:
+        grown = over_time(run.log, run.start, run.stop, run.roles)
+        for panel, (name, _) in zip(panels.flat, GROWING, strict=True):
+            plot(panel, run._replace(log=grown), grown[name])
+    for panel, (_, label) in zip(panels.flat, GROWING, strict=True):
+        panel.set_ylabel(label)
+        panel.set_ylim(bottom=0.0)
+    return finish(figure, panels, runs)
+
+
+def forces(runs: Runs) -> "Figure":
+    """Norms of the controller's linear, nonlinear and total force, (5.1)."""
+    figure, panels = stacked(3, 1, 6.5)
+    parts = (
+        ("linear", "linear_force"),
+        ("nonlinear", "nonlinear_force"),
+        ("total", "requested_force"),
+    )
+    for panel, (title, role) in zip(panels.flat, parts, strict=True):
+        for run in runs:
+            plot(panel, run, _norm(run.log, run.roles.of(role)))
+        panel.set_ylabel(f"{title} ‖τ‖ [N]")
+        panel.set_ylim(bottom=0.0)
+    return finish(figure, panels, runs)
+
+
+def model_error(runs: Runs) -> "Figure":
+    """Model error and its estimate on each axis, one column of panels for each run."""
+    figure, panels = stacked(3, len(runs), 6.5, max(WIDTH, 3.5 * len(runs)), sharey="row")
+    for column, run in zip(panels.T, runs, strict=True):
+        if len(runs) > 1:
+            column[0].set_title(run.label, fontsize=10)
+        for panel, true, estimate in zip(column, run.roles.model_error, run.roles.estimate, strict=True):
+            # The thin black line stays visible on the estimate, and the estimate around it.
+            plot(panel, run, run.log[true], color="black", linestyle="-", linewidth=0.9, zorder=3)
+            plot(panel, run, run.log[estimate], linestyle="-", linewidth=1.8)
+    for panel, axis in zip(panels[:, 0], AXES, strict=True):
+        panel.set_ylabel(f"ω in {axis} [{'N m' if axis == 'N' else 'N'}]")
+    # The estimates have the colours of their runs; the legend distinguishes the two lines.
+    true, estimate = panels[0, 0].lines
+    true.set_label("model error ω")
+    estimate.set_label(None if len(runs) > 1 else "estimate ω̂")
+    if len(runs) > 1:
+        panels[0, 0].plot([], [], color="0.5", linewidth=1.8, label="estimate ω̂")
+    legend(figure, panels[0, 0], 2)
+    return finish(figure, panels, (), least=1e-4)

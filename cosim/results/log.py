@@ -1,0 +1,224 @@
+"""The log of a run: written during the run, so that the file is readable whatever ends the run."""
+
+import errno
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import orjson
+
+from ..errors import InputError, nearest
+from ..files import atomic_write, write_all
+from ..process.run_state import Owner
+
+CSV = "log.csv"
+PARQUET = "log.parquet"
+SIDECAR = "log.json"
+METRICS = "metrics.json"
+CHUNK = 2**20  # bytes read at once; chosen
+
+# Column name, as in the header of ``log.csv``, -> values, shape (rows,).
+Log = Mapping[str, np.ndarray]
+
+
+class LogWriter:
+    """A CSV file that grows by blocks of rows, each written in one call.
+
+    Whatever happens the file is a beginning of the log in whole rows, unless the process is killed
+    inside of a call.
+
+    Args:
+        path: file to write; an older one is replaced.
+        columns: names for the header line, ``time`` first.
+
+    Attributes:
+        rows: number of rows in the file.
+
+    Raises:
+        OSError: the file cannot be made; then there is none.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self.rows = 0
+        self._owner = Owner()
+        self._failure: OSError | None = None
+        self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
+        self._identity = self._identify()
+        try:
+            write_all(self._file, (",".join(_quoted(c) for c in columns) + "\n").encode())
+        except OSError:
+            self._file.close()
+            path.unlink(missing_ok=True)
+            raise
+
+    def _identify(self) -> tuple[int, int]:
+        """Device and number of the file behind the descriptor: an FMU may close it, and open another."""
+        info = os.fstat(self._file.fileno())
+        return info.st_dev, info.st_ino
+
+    def write(self, block: np.ndarray) -> None:
+        """Append rows.
+
+        Args:
+            block: (rows, columns), float64, C-contiguous.
+
+        Raises:
+            OSError: not all could be written; ``rows`` tells how many were, and none can follow.
+        """
+        self._owner.leave_copies()
+        if self._failure:
+            raise self._failure
+        if not len(block):
+            return
+        lines = format_rows(block)
+        try:
+            if self._identify() != self._identity:
+                raise OSError(errno.EBADF, "its file was closed by something else")
+            begun = self._file.tell()
+            try:
+                write_all(self._file, b"\n".join(lines) + b"\n")
+            except OSError:
+                self._cut(begun, lines)
+                raise
+        except OSError as error:
+            self._failure = error
+            raise
+        self.rows += len(lines)
+
+    def _cut(self, begun: int, lines: Sequence[bytes]) -> None:
+        """Keep the rows of a block that are whole.
+
+        Args:
+            begun: position at which the block begins [bytes].
+            lines: its rows.
+        """
+        ends = begun + np.cumsum([len(line) + 1 for line in lines])
+        whole = int(np.searchsorted(ends, self._file.tell(), side="right"))
+        self._file.truncate(int(ends[whole - 1]) if whole else begun)
+        self.rows += whole
+
+    def close(self) -> None:
+        with suppress(OSError):  # closed by something else
+            self._file.close()
+
+
+def format_rows(block: np.ndarray) -> list[bytes]:
+    """Rows of a log as text, without the ends of lines.
+
+    Args:
+        block: (rows, columns), float64, C-contiguous.
+    """
+    if not len(block):
+        return []
+    lines = orjson.dumps(block, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2].split(b"],[")
+    # JSON has neither NaN nor infinity; all other numbers must look the same in every row.
+    for k in np.flatnonzero(~np.isfinite(block).all(axis=1)):
+        cells = lines[k].split(b",")
+        for j in np.flatnonzero(~np.isfinite(block[k])):
+            cells[j] = repr(float(block[k, j])).encode()
+        lines[k] = b",".join(cells)
+    return lines
+
+
+def cut_to_rows(path: Path) -> int:
+    """Remove what a process that was killed has left of a row at the end of a CSV log.
+
+    Returns:
+        The number of rows that remain.
+    """
+    if not path.is_file():
+        return 0
+    whole = lines = read = 0
+    with open(path, "rb") as file:
+        while chunk := file.read(CHUNK):
+            if last := chunk.rfind(b"\n") + 1:
+                whole = read + last
+            lines += chunk.count(b"\n")
+            read += len(chunk)
+    if whole < read:
+        os.truncate(path, whole)
+    return max(0, lines - 1)
+
+
+def _quoted(name: str) -> str:
+    """A column name in CSV: FMI allows commas, as in ``M[1,2]``, and even line breaks."""
+    name = " ".join(name.split())
+    return '"' + name.replace('"', '""') + '"' if "," in name or '"' in name else name
+
+
+def _header(line: str) -> list[str]:
+    import csv
+
+    return next(csv.reader([line]))
+
+
+def to_parquet(folder: Path) -> Path:
+    """Replace the CSV log of a folder by Parquet; the CSV is removed when the new file is complete."""
+    from pyarrow import csv, parquet
+
+    with atomic_write(folder / PARQUET) as scratch:
+        parquet.write_table(csv.read_csv(folder / CSV), scratch)
+    (folder / CSV).unlink()
+    return folder / PARQUET
+
+
+def read_log(folder: str | Path, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:
+    """Columns of a log, CSV or Parquet, complete or cut off.
+
+    Args:
+        folder: results of a run.
+        columns: names to read; None reads all. ``time`` is always read.
+
+    Returns:
+        Name -> values, shape (rows,).
+
+    Raises:
+        InputError: no log there, or a column that it does not have.
+    """
+    folder = Path(folder)
+    if (folder / PARQUET).is_file() and not (folder / CSV).is_file():
+        return _read_parquet(folder / PARQUET, columns)
+    path = folder / CSV
+    try:
+        with open(path, encoding="utf-8") as file:
+            names = _header(file.readline().rstrip("\n"))
+            if "time" not in names:
+                raise InputError(f"'{path}' is not a log: it has no column 'time'")
+            wanted = _wanted(names, columns, path)
+            places = [names.index(name) for name in wanted]
+            # A run that was killed may leave part of a line at the end.
+            lines = (line for line in file if line.endswith("\n"))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # a log without rows is a log
+                table = np.loadtxt(lines, delimiter=",", usecols=places, ndmin=2)
+    except FileNotFoundError:
+        raise InputError(f"no log in '{folder}': {CSV} is missing") from None
+    except (OSError, ValueError, UnicodeDecodeError, StopIteration) as error:
+        raise InputError(f"'{path}' cannot be read as a log: {error}") from error
+    table = table.reshape(-1, len(wanted))
+    return {name: table[:, k] for k, name in enumerate(wanted)}
+
+
+def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.ndarray]:
+    try:
+        from pyarrow import parquet
+    except ImportError:
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+    try:
+        wanted = _wanted(parquet.read_schema(path).names, columns, path)
+        table = parquet.read_table(path, columns=wanted)
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as a log: {error}") from error
+    return {name: table[name].to_numpy() for name in wanted}
+
+
+def _wanted(names: Sequence[str], columns: Sequence[str] | None, path: Path) -> list[str]:
+    if columns is None:
+        return list(names)
+    for column in columns:
+        if column not in names:
+            raise InputError(f"'{path}' has no column '{column}'{nearest(column, names)}")
+    return ["time", *(c for c in columns if c != "time")]

@@ -1,0 +1,122 @@
+"""The rows of a run that are not in its log yet.
+
+They lie where a watching process finds them (:mod:`cosim.process.run_state`), which writes them if the
+simulating one dies: nothing that was computed is lost.
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..files import write_all
+from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
+from .log import cut_to_rows, format_rows
+
+# Rows that are written together; chosen: the cost of a call is small beside that of the rows.
+BLOCK = 256
+
+
+class PendingRows:
+    """The value table after each of the last steps.
+
+    Args:
+        row: the value table, shape (signals,).
+        slots: places in it of the logged signals.
+        every: steps from one row of the log to the next.
+
+    Attributes:
+        take: ``take(t)`` copies the table as it is at t [s]; returns whether there is room for no more.
+    """
+
+    def __init__(self, row: np.ndarray, slots: np.ndarray, every: int) -> None:
+        width = len(row)
+        memory, self._counts = STATE.pending(8 * BLOCK * (1 + width))
+        self._times, self._taken = _parts(memory, width)
+        self._instants = memory[: 8 * BLOCK].cast("d")
+        self._slots, self._every = slots, every
+        layout = {"width": width, "slots": slots.tolist(), "every": every}
+        STATE.write(LAYOUT, json.dumps(layout))
+        self.take = self._make_take(row)
+
+    def _make_take(self, row: np.ndarray) -> Callable[[float], bool]:
+        # What runs every step keeps what it needs in its own scope, where Python finds it fastest.
+        times, taken, counts = self._instants, self._taken, self._counts
+
+        def take(t: float) -> bool:
+            count = counts[TAKEN]
+            taken[count] = row
+            times[count] = t
+            counts[TAKEN] = count + 1
+            return count == BLOCK - 1
+
+        return take
+
+    def all(self) -> tuple[np.ndarray, np.ndarray]:
+        """The times [s] of the rows, and the rows, shape (rows, signals)."""
+        count = self._counts[TAKEN]
+        return self._times[:count], self._taken[:count]
+
+    def logged(self, count: int) -> np.ndarray:
+        """What belongs into the log of the first rows: times and logged signals."""
+        return _logged(
+            self._times[:count], self._taken[:count], self._slots, self._every, self._counts[STEPS]
+        )
+
+    def clear(self) -> None:
+        """The rows are in the log."""
+        count, self._counts[TAKEN] = self._counts[TAKEN], 0
+        self._counts[STEPS] += count
+
+
+def _parts(memory: memoryview, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Times, shape (BLOCK,), and rows, shape (BLOCK, width)."""
+    numbers = np.frombuffer(memory, count=BLOCK * (1 + width))
+    return numbers[:BLOCK], numbers[BLOCK:].reshape(BLOCK, width)
+
+
+def _logged(
+    times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int
+) -> np.ndarray:
+    """What belongs into the log: shape (rows, 1 + slots), C-contiguous.
+
+    Args:
+        times: of the rows [s].
+        taken: rows, at every step.
+        slots: places of the logged signals.
+        every: steps from one row of the log to the next.
+        before: steps before the first row.
+    """
+    chosen = slice(-before % every, None, every)
+    block = np.empty((len(times[chosen]), 1 + len(slots)))
+    block[:, 0] = times[chosen]
+    block[:, 1:] = taken[chosen, slots]
+    return block
+
+
+def rescue(path: Path) -> int:
+    """Write the pending rows of a process that has died to its CSV log.
+
+    Returns:
+        The number of rows of the log, all whole.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    rows = cut_to_rows(path)
+    layout = json.loads(STATE.read(LAYOUT) or "null")
+    memory, counts = STATE.pending(0)
+    if layout is None or not counts[TAKEN] or not path.is_file():
+        return rows
+    times, taken = _parts(memory, layout["width"])
+    count, before, every = counts[TAKEN], counts[STEPS], layout["every"]
+    block = _logged(times[:count], taken[:count], np.array(layout["slots"], np.intp), every, before)
+    # It may have died while it wrote them.
+    block = block[rows + before // -every :]
+    try:
+        with open(path, "ab", buffering=0) as file:
+            write_all(file, b"".join(line + b"\n" for line in format_rows(block)))
+    finally:
+        rows = cut_to_rows(path)
+    return rows

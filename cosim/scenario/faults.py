@@ -1,0 +1,266 @@
+"""Measurement faults.
+
+A fault is a class that declares its options; bound to slots of the value table, it returns a function
+that is called each time the values have been set. A new fault is a new class, here or in a module of the
+user: it registers itself by its ``kind``. Faults on the same signal act in the order of their ``stage``,
+as along a real measurement chain, whatever their order in the scenario.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, ClassVar, Literal, Protocol
+
+import numpy as np
+from pydantic import Field, PositiveFloat, model_validator
+
+from .strict import Strict
+
+
+class Values(Protocol):
+    """The value table: a number at each slot."""
+
+    def __getitem__(self, slot: int, /) -> float: ...
+
+    def __setitem__(self, slot: int, value: float, /) -> None: ...
+
+
+Effect = Callable[[Values, float], None]
+Times = Annotated[float, Field(ge=0.0)]
+Span = tuple[Times, Times]
+
+# Tolerance of time comparisons [s]: rounding must not move an instant by a step, and no step is shorter
+# than 1e-6 s.
+TIME_TOLERANCE = 1e-9
+# Samples of noise that are drawn at once; chosen: many, because the call of the generator is what costs.
+DRAWN = 1024
+
+KINDS: dict[str, type["Fault"]] = {}
+
+
+class Fault(Strict):
+    """A fault, with the signals on which it acts together."""
+
+    stage: ClassVar[int]
+
+    signals: list[str] = Field(min_length=1, description="inputs, as instance.variable")
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if "kind" in cls.__annotations__:
+            for kind in cls.__annotations__["kind"].__args__:
+                KINDS[kind] = cls
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        """The fault as a function of the value table.
+
+        Args:
+            slots: where the signals stand in the table.
+            step: time between two calls [s].
+            rng: random numbers of this fault alone.
+
+        Returns:
+            ``effect(values, t)``, which changes the values at the slots.
+        """
+        raise NotImplementedError
+
+
+class Timed(Fault):
+    """A fault that acts at times, given or random."""
+
+    at: list[Times] | None = Field(None, description="times at which it starts [s]")
+    rate: PositiveFloat | None = Field(None, description="how often it starts at random [1/s]")
+    duration: Times | Span | None = Field(
+        None, description="how long it lasts [s], or [shortest, longest]; one sample if not given"
+    )
+
+    @model_validator(mode="after")
+    def _check_times(self) -> "Timed":
+        if (self.at is None) == (self.rate is None):
+            raise ValueError("give either 'at' (times) or 'rate' (random)")
+        if isinstance(self.duration, tuple) and self.duration[0] > self.duration[1]:
+            raise ValueError("the shortest duration comes first")
+        return self
+
+    def windows(self, step: float, rng: np.random.Generator) -> Callable[[float], bool]:
+        """A function of t [s]: whether the fault is active then; t must not decrease."""
+        pending = sorted(self.at or [])
+        rate = self.rate
+        start = pending.pop(0) if pending else math.inf
+        if rate is not None:
+            start = rng.exponential(1.0 / rate)
+        stop = -math.inf
+
+        def active(t: float) -> bool:
+            nonlocal start, stop
+            while t >= start - TIME_TOLERANCE:
+                stop = max(stop, start + self._draw_duration(step, rng))
+                if rate is None:
+                    start = pending.pop(0) if pending else math.inf
+                else:
+                    start = stop + rng.exponential(1.0 / rate)
+            return t < stop - TIME_TOLERANCE
+
+        return active
+
+    def _draw_duration(self, step: float, rng: np.random.Generator) -> float:
+        """How long the fault lasts this time [s]: at least a sample."""
+        if isinstance(self.duration, tuple):
+            return max(step, rng.uniform(*self.duration))
+        return max(step, self.duration or 0.0)
+
+
+def _each(value: float | list[float], count: int) -> list[float]:
+    return list(value) if isinstance(value, list) else [value] * count
+
+
+def _one_per_signal(value: float | list[float], signals: list[str], name: str) -> None:
+    if isinstance(value, list) and len(value) != len(signals):
+        raise ValueError(f"'{name}' needs one number, or one for each of the {len(signals)} signals")
+
+
+class Bias(Fault):
+    """A constant added to each signal."""
+
+    kind: Literal["bias"]
+    stage = 1
+    value: float | list[float] = Field(description="what is added, in the signal's unit")
+
+    @model_validator(mode="after")
+    def _check(self) -> "Bias":
+        _one_per_signal(self.value, self.signals, "value")
+        return self
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        pairs = list(zip(slots, _each(self.value, len(slots)), strict=True))
+
+        def effect(values: Values, t: float) -> None:
+            for slot, value in pairs:
+                values[slot] += value
+
+        return effect
+
+
+class Noise(Fault):
+    """White Gaussian noise, drawn for each signal and sample."""
+
+    kind: Literal["noise"]
+    stage = 2
+    std: Annotated[float, Field(ge=0.0)] | list[Annotated[float, Field(ge=0.0)]] = Field(
+        description="standard deviation, in the signal's unit"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "Noise":
+        _one_per_signal(self.std, self.signals, "std")
+        return self
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        std = np.array(_each(self.std, len(slots)))
+        drawn: list[list[float]] = []
+
+        def effect(values: Values, t: float) -> None:
+            if not drawn:
+                drawn.extend((std * rng.standard_normal((DRAWN, len(slots)))).tolist())
+            for slot, error in zip(slots, drawn.pop(), strict=True):
+                values[slot] += error
+
+        return effect
+
+
+class Spikes(Timed):
+    """Single samples far off: plus or minus ``size``, on all signals at once."""
+
+    kind: Literal["spikes"]
+    stage = 3
+    size: float | list[float] = Field(description="how far off, in the signal's unit")
+
+    @model_validator(mode="after")
+    def _check(self) -> "Spikes":
+        _one_per_signal(self.size, self.signals, "size")
+        return self
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        pairs = list(zip(slots, _each(self.size, len(slots)), strict=True))
+        active = self.windows(step, rng)
+
+        def effect(values: Values, t: float) -> None:
+            if active(t):
+                for slot, size in pairs:
+                    values[slot] += size if rng.random() < 0.5 else -size
+
+        return effect
+
+
+class Wrap(Fault):
+    """An angle reported in (-pi, pi]."""
+
+    kind: Literal["wrap"]
+    stage = 4
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        def effect(values: Values, t: float) -> None:
+            for slot in slots:
+                angle = values[slot]
+                values[slot] = angle + 2.0 * math.pi * ((math.pi - angle) / (2.0 * math.pi) // 1.0)
+
+        return effect
+
+
+class Delay(Fault):
+    """Values arrive late, by a whole number of samples."""
+
+    kind: Literal["delay"]
+    stage = 5
+    time: float = Field(ge=0.0, le=1e6, description="how late [s], rounded to samples")
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        samples = int(self.time / step + 0.5)
+        queue: deque[list[float]] = deque()
+
+        def effect(values: Values, t: float) -> None:
+            queue.append([values[slot] for slot in slots])
+            late = queue.popleft() if len(queue) > samples else queue[0]
+            for slot, value in zip(slots, late, strict=True):
+                values[slot] = value
+
+        return effect
+
+
+class Freeze(Timed):
+    """All signals keep the values they had before, to the bit."""
+
+    kind: Literal["freeze"]
+    stage = 6
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        active = self.windows(step, rng)
+        held: list[float] = []
+
+        def effect(values: Values, t: float) -> None:
+            if active(t) and held:
+                for slot, value in zip(slots, held, strict=True):
+                    values[slot] = value
+            else:
+                held[:] = [values[slot] for slot in slots]
+
+        return effect
+
+
+class Dropout(Timed):
+    """All signals are lost: NaN, or zero."""
+
+    kind: Literal["dropout"]
+    stage = 7
+    value: Literal["nan", "zero"] = Field("nan", description="what is reported instead")
+
+    def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
+        active = self.windows(step, rng)
+        lost = math.nan if self.value == "nan" else 0.0
+
+        def effect(values: Values, t: float) -> None:
+            if active(t):
+                for slot in slots:
+                    values[slot] = lost
+
+        return effect

@@ -1,0 +1,120 @@
+"""Scenarios from JSON, or from the formats of other tools, with messages for mistakes."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import InputError, nearest
+from ..formats.systems import is_system, read_system
+from . import faults
+from .roles import Roles
+from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Scenario, Transformation
+
+# Parts of pydantic's error locations that name a validator or a type, not a place in the file.
+INTERNAL = ("function-", "constrained-", "bool", "int", "float", "str", "tuple", "list[")
+
+
+def load_scenario(
+    source: str | Path | dict[str, Any], changes: Mapping[str, Any] | None = None
+) -> Scenario:
+    """A scenario from a JSON file or from the same content as a dict, or a system of other tools.
+
+    Args:
+        source: path of the file; a dict is read as if it lay in the working directory. An SSP archive,
+            an OSP directory or its OspSystemStructure.xml is a scenario as well.
+        changes: keys that override those of the file, unless None.
+
+    Raises:
+        InputError: missing file, no JSON, unknown key, wrong type or value; names the place.
+    """
+    chosen = {key: value for key, value in (changes or {}).items() if value is not None}
+    if isinstance(source, dict):
+        return _validate(source | chosen, "scenario", Path.cwd())
+    path = Path(source)
+    if is_system(path):
+        system = read_system(path)
+        for key in ("step", "stop"):
+            if key not in system.content | chosen:
+                raise InputError(f"'{path}' does not say its {key}; give it by --{key} SECONDS")
+        scenario = _validate(system.content | chosen, f"'{path}'", system.folder)
+        scenario.set_origin(system.folder, system.notes, system.unpacked)
+        return scenario
+    try:
+        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
+        json.dumps(content, ensure_ascii=False).encode()
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
+        raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"'{path}' is not JSON: {error}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}") from None
+    if isinstance(content, dict):
+        content |= chosen
+    return _validate(content, f"'{path}'", path.parent)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; of a key that occurs twice, Python's json would silently drop the first."""
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the key '{name}' stands twice in one object")
+    return dict(pairs)
+
+
+def _validate(content: Any, name: str, folder: Path) -> Scenario:
+    try:
+        # As JSON, where "0.01" is no number and true no time; in Python a list would be no tuple either.
+        scenario = Scenario.model_validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        raise InputError(_message(error, name)) from None
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{name} cannot be written as JSON: {error}") from None
+    scenario.set_origin(folder)
+    return scenario
+
+
+def _message(error: ValidationError, name: str) -> str:
+    """The first error in one line, with the number of further ones."""
+    problems = error.errors()
+    first = problems[0]
+    place = ""
+    for part in first["loc"]:
+        if isinstance(part, int):
+            place += f"[{part}]"
+        elif part not in faults.KINDS and not str(part).startswith(INTERNAL):
+            place += f".{part}" if place else str(part)
+    text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        text = f"unknown key{nearest(str(first['loc'][-1]), _keys(first['loc']))}"
+    elif first["type"] == "union_tag_invalid":
+        wrong = first.get("ctx", {}).get("tag", "")
+        text = f"unknown kind '{wrong}'{nearest(str(wrong), faults.KINDS)}"
+    elif first["type"] == "union_tag_not_found":
+        text = "needs a 'kind'" + nearest("", faults.KINDS)
+    elif first["type"] == "missing":
+        text = "is missing"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"{name}: {place or 'the content'}: {text}{more}"
+
+
+def _keys(location: tuple[int | str, ...]) -> list[str]:
+    """The keys that are allowed in the place of an unknown one."""
+    first = location[0] if len(location) > 1 else ""
+    classes: dict[int | str, type[BaseModel]] = {
+        "fmus": FmuEntry,
+        "events": Event,
+        "log": LogOptions,
+        "metrics": MetricsOptions,
+        "roles": Roles,
+        "transformations": Transformation,
+        "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),
+    }
+    fields = classes.get(first, Scenario).model_fields
+    return [field.alias or name for name, field in fields.items()]

@@ -1,0 +1,192 @@
+"""The content of a scenario file."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    PrivateAttr,
+    TypeAdapter,
+    model_validator,
+)
+
+from ..formats.imported import Unpacked
+from . import faults
+from .roles import Roles
+from .strict import Strict
+
+if TYPE_CHECKING:
+    AnyFault = faults.Fault
+else:
+    AnyFault = Annotated[
+        Union[tuple(faults.KINDS.values())],  # noqa: UP007 - made from the registry
+        Field(discriminator="kind"),
+    ]
+# Integers that a double represents exactly.
+ExactInt = Annotated[int, Field(ge=-(2**53), le=2**53)]
+StartValue = bool | ExactInt | float | str
+# Step [s]; below a microsecond, rounding exceeds the tolerance of time comparisons in long runs.
+Step = Annotated[float, Field(ge=1e-6)]
+
+
+def _folder_name(name: str) -> str:
+    if name in (".", "..") or any(c in name for c in "/\\\x00"):
+        raise ValueError("cannot be the name of a folder")
+    return name
+
+
+def _instance_name(name: str) -> str:
+    if not name.strip() or not name.isprintable() or any(c in name for c in '.*,"'):
+        raise ValueError(f"{name!r} cannot be an instance: no dot, *, comma or quote in its name")
+    return name
+
+
+def _fmu_path(path: str) -> str:
+    if not path.isprintable() or not path.endswith(".fmu") or len(path) > 1000:
+        raise ValueError(f"{path[:100]!r} is not the name of an .fmu file")
+    return path
+
+
+def _table_path(path: str) -> str:
+    if not path.isprintable() or not path.endswith(".csv") or len(path) > 1000:
+        raise ValueError(f"{path[:100]!r} is not the name of a .csv file")
+    return path
+
+
+class FmuEntry(Strict):
+    """One instance: which FMU, how often it steps, with what parameters."""
+
+    path: Annotated[str, AfterValidator(_fmu_path)] = Field(
+        description="the project's FMU by bare name, or a path relative to the scenario"
+    )
+    step: Step | None = Field(None, description="own step [s], a multiple of the base step")
+    parameters: dict[str, StartValue] = Field(default_factory=dict, description="start values by name")
+    table: Annotated[str, AfterValidator(_table_path)] | None = Field(
+        None,
+        description="CSV file, relative to the scenario; column c holds the parameters c_1, c_2, ...",
+    )
+    isolate: bool = Field(False, description="run it in a process of its own")
+    timeout: PositiveFloat | None = Field(
+        None, description="with isolate: longest time [s] that one call may take (60)"
+    )
+
+    @model_validator(mode="after")
+    def _timeout_needs_a_process(self) -> "FmuEntry":
+        if self.timeout is not None and not self.isolate:
+            raise ValueError('timeout needs "isolate": true')
+        return self
+
+
+class Event(Strict):
+    """A change during the run, with the keys of an OSP scenario file."""
+
+    time: Annotated[float, Field(ge=0.0)] = Field(description="when [s]")
+    model: str = Field(description="instance")
+    variable: str
+    action: Literal["override", "bias", "reset", "hold"] = Field(
+        description="give it a value, add to it, end all that, or keep the value it has"
+    )
+    value: bool | ExactInt | float | None = Field(None, description="for override and bias")
+
+
+class LogOptions(Strict):
+    """What is logged, and how often."""
+
+    signals: Literal["all"] | list[str] = Field(
+        "all", description="all inputs and outputs, or names as instance.variable, * as wildcard"
+    )
+    every: PositiveInt = Field(1, description="log every n-th base step")
+    format: Literal["csv", "parquet"] = "csv"
+
+
+class Transformation(Strict):
+    """The transformation of a value on its way to an input: factor * value + offset."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+class MetricsOptions(Strict):
+    """The part of the run that the metrics cover."""
+
+    start: float | None = Field(None, alias="from", ge=0.0, description="first time [s]")
+    stop: float | None = Field(None, alias="to", gt=0.0, description="last time [s]")
+
+    model_config = ConfigDict(populate_by_name=True)
+
+
+class Scenario(Strict):
+    """A co-simulation: instances, connections, faults, events, log."""
+
+    name: Annotated[str, AfterValidator(_folder_name)] = Field(
+        min_length=1, description="also the name of the result folder"
+    )
+    description: str = ""
+    step: Step = Field(description="base step [s]")
+    stop: PositiveFloat = Field(
+        le=1e9, description="end of the simulation [s], a multiple of the base step"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="of all random faults")
+    algorithm: Literal["gauss_seidel", "jacobi"] = Field(
+        "gauss_seidel",
+        description="one after the other with the newest values, or all at once with those of before",
+    )
+    fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
+        min_length=1, description="instances by name"
+    )
+    connections: list[tuple[str, str]] = Field(
+        default_factory=list,
+        description="[output, input] as instance.variable; a * on both sides connects all variables "
+        "whose names agree there",
+    )
+    transformations: dict[str, Transformation] = Field(
+        default_factory=dict,
+        description="connected input -> what becomes of values on their way there, in place of a "
+        "conversion of units",
+    )
+    faults: list[AnyFault] = Field(default_factory=list)
+    events: list[Event] = Field(default_factory=list)
+    log: LogOptions = Field(default_factory=lambda: LogOptions.model_validate({}))
+    metrics: MetricsOptions = Field(default_factory=lambda: MetricsOptions.model_validate({}))
+    roles: Roles = Field(
+        default_factory=Roles, description="columns that metrics and pictures read, by role"
+    )
+
+    _folder: Path = PrivateAttr(default_factory=Path.cwd)
+    _notes: list[str] = PrivateAttr(default_factory=list)
+    _unpacked: Unpacked | None = PrivateAttr(None)
+
+    @property
+    def folder(self) -> Path:
+        """The folder to which paths in the scenario are relative."""
+        return self._folder
+
+    @property
+    def notes(self) -> list[str]:
+        """Assumptions and omissions in reading it from the format of another tool."""
+        return self._notes
+
+    def set_origin(
+        self, folder: Path, notes: Sequence[str] = (), unpacked: Unpacked | None = None
+    ) -> None:
+        """State where the scenario comes from.
+
+        Args:
+            folder: to which its paths are relative.
+            notes: assumptions and omissions, for the user.
+            unpacked: scratch folder to keep for as long as the scenario.
+        """
+        self._folder, self._notes, self._unpacked = folder.resolve(), list(notes), unpacked
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of a scenario file, as published in docs/scenario.schema.json."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **TypeAdapter(Scenario).json_schema(by_alias=True),
+    }

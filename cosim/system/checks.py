@@ -1,0 +1,101 @@
+"""Checks of a scenario against its FMUs: processes, the metrics' window and roles, faults, events."""
+
+from ..errors import InputError
+from ..fmu.fmu_model import NUMERIC
+from ..scenario.schema import Event, Scenario
+from .start_values import check_value
+from .system import Signal, System, causality_of
+
+
+def check_processes(system: System) -> None:
+    """Refuse two instances in one process of an FMU that allows only one."""
+    together: dict[str, str] = {}
+    for name, model in system.models.items():
+        capabilities = model.description.coSimulation
+        if system.scenario.fmus[name].isolate or capabilities is None:
+            continue
+        other = together.setdefault(model.sha256, name)
+        if other != name and capabilities.canBeInstantiatedOnlyOncePerProcess:
+            raise InputError(
+                f"fmus.{name}: '{model.path}' can be instantiated only once per process, and "
+                f'{other} does; give one of them "isolate": true'
+            )
+
+
+def check_window(scenario: Scenario) -> None:
+    start, stop = scenario.metrics.start or 0.0, scenario.metrics.stop or scenario.stop
+    if not start < min(stop, scenario.stop):
+        raise InputError(
+            f"metrics: there is no time from {start} to {stop} s in a run of {scenario.stop} s"
+        )
+
+
+def check_roles(system: System) -> None:
+    for role, name in system.scenario.roles.given():
+        signal = system.find(name, f"roles.{role}")
+        if signal.variable.type not in NUMERIC:
+            raise InputError(f"roles.{role}: {name} is of type {signal.variable.type}, not a number")
+
+
+def check_faults(system: System) -> None:
+    connected = {c.target.name for c in system.connections}
+    for k, fault in enumerate(system.scenario.faults):
+        where = f"faults[{k}] ({type(fault).__name__.lower()})"
+        found = [system.find(name, where) for name in fault.signals]
+        for signal in found:
+            if signal.variable.causality not in ("input", "output"):
+                raise InputError(
+                    f"{where}: {signal.name} is {causality_of(signal)}, not an input or output"
+                )
+            if signal.variable.causality == "input" and signal.name not in connected:
+                raise InputError(
+                    f"{where}: {signal.name} is not connected, so nothing can go wrong there"
+                )
+            if signal.variable.type != "Real":
+                raise InputError(f"{where}: {signal.name} is of type {signal.variable.type}, not Real")
+        if len({(s.instance, s.variable.causality) for s in found}) > 1:
+            raise InputError(
+                f"{where}: signals of one fault must be inputs, or outputs, of one instance"
+            )
+
+
+def check_events(system: System) -> None:
+    for k, event in enumerate(system.scenario.events):
+        where = f"events[{k}]"
+        signal = system.find(f"{event.model}.{event.variable}", where)
+        v = signal.variable
+        if v.type == "String":
+            raise InputError(f"{where}: {signal.name} is of type String; events need a number")
+        if v.causality not in ("input", "output") and v.variability != "tunable":
+            raise InputError(
+                f"{where}: {signal.name} is {causality_of(signal)} that cannot change during a run"
+            )
+        _check_event_value(system, event, signal, where)
+        if event.time >= system.scenario.stop:
+            system.warnings.append(f"{where}: no step starts at or after t = {event.time} s: no effect")
+
+
+def _check_event_value(system: System, event: Event, signal: Signal, where: str) -> None:
+    flowing = signal.variable.causality in ("input", "output")
+    if event.action not in ("override", "bias"):
+        if event.value is not None:
+            raise InputError(f"{where}: {event.action} takes no 'value'")
+        if event.action == "hold" and not flowing:
+            raise InputError(
+                f"{where}: {signal.name} is {causality_of(signal)}, which holds its value anyway"
+            )
+        return
+    value = event.value
+    if value is None:
+        raise InputError(f"{where}: {event.action} needs a 'value'")
+    if event.action == "bias":
+        if flowing:
+            return
+        value += _start_of(system, signal)
+    check_value(signal.variable, value, f"{where}: {signal.name}")
+
+
+def _start_of(system: System, signal: Signal) -> float:
+    """The value that a parameter has before the first event [in its unit]."""
+    given = [value for v, value in system.parameters[signal.instance] if v == signal.variable]
+    return float(given[-1] if given else signal.variable.start or 0.0)

@@ -1,0 +1,68 @@
+"""The FMUs that a scenario names: files, and the project's own, built when needed."""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path, PurePath
+
+from ..errors import InputError
+from ..fmu.fmu_model import Model
+from ..scenario.schema import Scenario
+
+
+def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
+    """Instance -> FMU; instances of one file share it.
+
+    Args:
+        scenario: what to run.
+        warnings: receives oddities that are no reason to refuse.
+
+    Raises:
+        InputError: no such FMU, or one that cannot be read.
+    """
+    bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
+    # A bare name is the project's own FMU; only one that the project lacks may be a file in the folder.
+    beside = sorted(name for name in bare if (scenario.folder / name).is_file())
+    paths = _own_fmus(sorted(bare.difference(beside)))
+    for name in beside:
+        try:
+            paths |= _own_fmus([name])
+            warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
+        except InputError:
+            paths[name] = scenario.folder / name
+    models: dict[Path, Model] = {}
+    found: dict[str, Model] = {}
+    for instance, entry in scenario.fmus.items():
+        path = paths.get(entry.path) or scenario.folder / entry.path
+        if path not in models:
+            models[path] = Model(path)
+        found[instance] = models[path]
+    return found
+
+
+def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
+    """Paths of the project's own FMUs, built if need be."""
+    if not names:
+        return {}
+    return dict(zip(names, map(Path, run_builder("--", *names)), strict=True))
+
+
+def run_builder(*arguments: str | Path) -> list[str]:
+    """Run the project's FMU builder in a process of its own.
+
+    Args:
+        arguments: of ``python -m fmus.build``.
+
+    Returns:
+        The lines that it prints.
+
+    Raises:
+        InputError: the last line of its complaint.
+    """
+    done = subprocess.run(
+        [sys.executable, "-m", "fmus.build", *arguments], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
+        raise InputError(reason[0].removeprefix("error: "))
+    return done.stdout.splitlines()

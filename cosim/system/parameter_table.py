@@ -1,0 +1,87 @@
+"""Parameter tables: CSV files whose columns become the numbered parameters of an FMU."""
+
+import csv
+import math
+from collections.abc import Collection, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from ..errors import InputError, nearest
+
+
+def read_table(path: Path) -> dict[str, list[float]]:
+    """Columns of a CSV file.
+
+    Args:
+        path: a file with one line of names and then lines of numbers; empty lines do not count.
+
+    Returns:
+        Name -> numbers, all of the same length.
+
+    Raises:
+        InputError: missing, unreadable, a name twice, a cell that is no finite number, no rows.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, skipinitialspace=True)
+            lines = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.csv")] if path.parent.is_dir() else []
+        raise InputError(f"no such table: '{path}'{nearest(path.name, near)}") from None
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"'{path}' cannot be read as a table: {error}") from None
+    if len(lines) < 2:
+        raise InputError(f"'{path}' needs a line of names and lines of numbers")
+    names = [name.strip() for name in lines[0][1]]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"'{path}': the column {name!r} stands there twice")
+    columns: dict[str, list[float]] = {name: [] for name in names}
+    for line, cells in lines[1:]:
+        where = f"'{path}', line {line}"
+        if len(cells) != len(names):
+            raise InputError(f"{where} has {len(cells)} cells, not {len(names)}")
+        for name, cell in zip(names, cells, strict=True):
+            columns[name].append(_number(cell, f"{where}: {name!r}"))
+    return columns
+
+
+def _number(text: str, where: str) -> float:
+    with suppress(ValueError):
+        value = float(text)
+        if math.isfinite(value) and "_" not in text:
+            return value
+    raise InputError(f"{where} = {text[:40]!r} is not a number")
+
+
+def table_parameters(
+    columns: Mapping[str, list[float]], known: Collection[str], where: str
+) -> dict[str, float]:
+    """The parameters of an FMU that a table gives.
+
+    Args:
+        columns: name -> numbers.
+        known: parameters of the FMU. One that takes a table has ``count``, for the number of rows, and
+            for each column ``c`` the parameters ``c_1``, ``c_2``, ...; a column that may be left out
+            has a ``c_given`` as well, which states whether it is there.
+        where: name of the table in messages.
+
+    Raises:
+        InputError: the FMU takes no table, not this column, or not so many rows; a column is missing.
+    """
+    if "count" not in known:
+        raise InputError(f"{where}: this FMU takes no table, as it has no parameter 'count'")
+    takes = [name.removesuffix("_1") for name in known if name.endswith("_1")]
+    for name in columns:
+        if name not in takes:
+            raise InputError(f"{where}: no column {name!r} is wanted{nearest(name, takes)}")
+    for name in takes:
+        if name not in columns and f"{name}_given" not in known:
+            raise InputError(f"{where}: the column '{name}' is missing")
+    rows = max(map(len, columns.values()))
+    most = sum(f"{takes[0]}_{k}" in known for k in range(1, rows + 1))
+    if rows > most:
+        raise InputError(f"{where}: {rows} rows are too many, at most {most} are taken")
+    found = {f"{name}_{k}": x for name, column in columns.items() for k, x in enumerate(column, 1)}
+    given = {f"{name}_given": 1.0 for name in columns if f"{name}_given" in known}
+    return {"count": float(rows), **given, **found}

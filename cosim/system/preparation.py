@@ -1,0 +1,124 @@
+"""Preparation of a system: a scenario checked against its FMUs. Nothing runs before this is done."""
+
+import math
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+from ..errors import InputError
+from ..fmu.fmu_model import NUMERIC
+from ..scenario.schema import Scenario
+from .checks import check_events, check_faults, check_processes, check_roles, check_window
+from .order import Link, execution_order
+from .own_fmus import read_models, run_builder
+from .start_values import Overrides, check_parameters
+from .system import Signal, System
+from .wiring import connect
+
+# Relative deviation of a ratio of times from an integer that counts as rounding.
+RATIO_TOLERANCE = 1e-6
+
+
+def prepare(scenario: Scenario, overrides: Overrides = (), native: bool = True) -> System:
+    """Read the FMUs of a scenario and check all that can be checked without running.
+
+    Args:
+        scenario: what to run.
+        overrides: parameter sets whose values override the scenario's.
+        native: whether FMUs may run programs that were not built on this computer.
+
+    Raises:
+        InputError: the first error.
+    """
+    warnings: list[str] = []
+    system = System(scenario, read_models(scenario, warnings), warnings=warnings)
+    if not native:
+        run_builder("--verify", "--", *{str(model.path) for model in system.models.values()})
+    check_processes(system)
+    check_window(scenario)
+    _count_steps(system)
+    check_parameters(system, overrides)
+    connect(system)
+    check_faults(system)
+    check_events(system)
+    check_roles(system)
+    _choose_signals(system)
+    if scenario.algorithm == "gauss_seidel":
+        system.order, late = newest_first(system)
+        system.warnings += late
+    else:
+        system.order = list(system.models)
+    return system
+
+
+def newest_first(system: System) -> tuple[list[str], list[str]]:
+    """Order of instances in which values travel farthest at one instant, and a warning for each cut."""
+    links = [
+        Link(c.source.instance, c.source.variable.name, c.target.instance, c.target.variable.name)
+        for c in system.connections
+    ]
+    feedthrough = {name: model.feedthrough for name, model in system.models.items()}
+    return execution_order(list(system.models), links, feedthrough)
+
+
+def integer_ratio(ratio: float) -> int | None:
+    """The positive integer that a ratio of times equals but for rounding; None if there is none."""
+    if not math.isfinite(ratio):
+        return None
+    count = round(ratio)
+    return count if count > 0 and abs(ratio - count) < RATIO_TOLERANCE * max(1.0, ratio) else None
+
+
+def _count_steps(system: System) -> None:
+    scenario = system.scenario
+    steps = integer_ratio(scenario.stop / scenario.step)
+    if steps is None:
+        raise InputError(f"stop = {scenario.stop} s is not a multiple of step = {scenario.step} s")
+    system.steps = steps
+    for name, entry in scenario.fmus.items():
+        every = integer_ratio((entry.step or scenario.step) / scenario.step)
+        if every is None:
+            raise InputError(
+                f"fmus.{name}: step = {entry.step} s is not a multiple of step = {scenario.step} s"
+            )
+        if every > steps:
+            raise InputError(f"fmus.{name}: step = {entry.step} s is longer than the whole run")
+        system.every[name] = every
+
+
+def _choose_signals(system: System) -> None:
+    """Choose the signals of the value table: connected, logged, or used by metrics, faults or events."""
+    available = {
+        f"{name}.{v.name}": Signal(name, v)
+        for name, model in system.models.items()
+        for v in model.variables.values()
+        if v.type in NUMERIC
+    }
+    flowing = [n for n, s in available.items() if s.variable.causality in ("input", "output")]
+    wanted = system.scenario.log.signals
+    if wanted == "all":
+        system.logged = flowing
+    else:
+        for k, pattern in enumerate(wanted):
+            for name in _matching(system, pattern, flowing, f"log.signals[{k}]"):
+                if name not in available:
+                    raise InputError(f"log.signals[{k}]: {name} is of type String, not a number")
+                if name not in system.logged:
+                    system.logged.append(name)
+    needed = {*system.logged}
+    needed |= set(system.scenario.roles.metric_inputs).intersection(available)
+    for c in system.connections:
+        needed |= {c.source.name, c.target.name}
+    for fault in system.scenario.faults:
+        needed |= set(fault.signals)
+    needed |= {f"{e.model}.{e.variable}" for e in system.scenario.events}.intersection(flowing)
+    system.signals = {name: signal for name, signal in available.items() if name in needed}
+
+
+def _matching(system: System, pattern: str, names: Sequence[str], where: str) -> list[str]:
+    """The variable of a name, or all inputs and outputs that match a pattern with *."""
+    if "*" not in pattern:
+        return [system.find(pattern, where).name]
+    found = [name for name in names if fnmatchcase(name, pattern.replace("[", "[[]"))]
+    if not found:
+        raise InputError(f"{where}: nothing matches '{pattern}'")
+    return found

@@ -1,0 +1,84 @@
+"""A checked system: models, signals and connections, laid out for running."""
+
+from dataclasses import dataclass, field
+
+from ..conversion import Conversion
+from ..errors import InputError, nearest
+from ..fmu.fmu_model import Model, Value, Variable
+from ..scenario.schema import Scenario
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A variable of an instance."""
+
+    instance: str
+    variable: Variable
+
+    @property
+    def name(self) -> str:
+        return f"{self.instance}.{self.variable.name}"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A checked connection, with the conversion of units that it needs."""
+
+    source: Signal
+    target: Signal
+    conversion: Conversion
+
+
+@dataclass
+class System:
+    """A checked system: what the master runs.
+
+    Attributes:
+        scenario: as read.
+        models: FMU of each instance, by instance name.
+        order: instances in the order of stepping.
+        every: base steps in one step of each instance.
+        steps: number of base steps.
+        connections: all connections, groups resolved.
+        signals: signals of the value table, by name.
+        logged: names of the logged signals, in the order of the log's columns.
+        parameters: start values to set, by instance.
+        warnings: oddities that are no reason to refuse.
+    """
+
+    scenario: Scenario
+    models: dict[str, Model]
+    every: dict[str, int] = field(default_factory=dict)
+    steps: int = 0
+    order: list[str] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list)
+    signals: dict[str, Signal] = field(default_factory=dict)
+    logged: list[str] = field(default_factory=list)
+    parameters: dict[str, list[tuple[Variable, Value]]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def close(self) -> None:
+        """Remove the unpacked FMUs."""
+        for model in set(self.models.values()):
+            model.close()
+
+    def find(self, name: str, where: str) -> Signal:
+        """The variable behind ``instance.variable``.
+
+        Raises:
+            InputError: no such instance or variable.
+        """
+        instance, _, variable = name.partition(".")
+        if instance not in self.models:
+            raise InputError(f"{where}: no instance '{instance}'{nearest(instance, self.models)}")
+        known = self.models[instance].variables
+        if variable not in known:
+            hint = nearest(variable, [f"{v}" for v in known])
+            raise InputError(f"{where}: '{instance}' has no variable '{variable}'{hint}")
+        return Signal(instance, known[variable])
+
+
+def causality_of(signal: Signal) -> str:
+    """The causality of a signal for messages: an input, a parameter."""
+    causality = signal.variable.causality
+    return f"an {causality}" if causality[0] in "aeiou" else f"a {causality}"

@@ -1,0 +1,112 @@
+"""Connections: which output feeds which input, and the conversion of values on their way."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from ..conversion import SAME, Conversion, conversion
+from ..errors import InputError, nearest
+from .system import Connection, Signal, System, causality_of
+
+# Types of output that an input of a type accepts.
+ACCEPTS = {
+    "Real": ("Real", "Integer", "Enumeration"),
+    "Integer": ("Integer", "Enumeration"),
+    "Enumeration": ("Enumeration", "Integer"),
+    "Boolean": ("Boolean",),
+}
+
+
+def connect(system: System) -> None:
+    """Fill in the connections of a system, groups resolved, and warn of inputs that nothing feeds.
+
+    Raises:
+        InputError: a missing end, two sources for one input, types or units that do not fit.
+    """
+    taken: dict[str, Signal] = {}
+    for k, (output, input_) in enumerate(system.scenario.connections):
+        where = f"connections[{k}] {output} -> {input_}"
+        for source, target in _resolve(system, output, input_, where):
+            ends = f"connections[{k}] {source.name} -> {target.name}"
+            if source.variable.causality != "output":
+                raise InputError(f"{ends}: {source.name} is {causality_of(source)}, not an output")
+            if target.variable.causality != "input":
+                raise InputError(f"{ends}: {target.name} is {causality_of(target)}, not an input")
+            if target.name in taken:
+                raise InputError(
+                    f"{ends}: {target.name} is already connected to {taken[target.name].name}"
+                )
+            if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
+                raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
+            taken[target.name] = source
+            system.connections.append(Connection(source, target, _link(source, target, ends, system)))
+    for name in system.scenario.transformations:
+        if name not in taken:
+            raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
+    _find_free_inputs(system, taken)
+
+
+def _find_free_inputs(system: System, taken: Collection[str]) -> None:
+    """Warn of inputs that nothing feeds and the scenario does not mention."""
+    for name, model in system.models.items():
+        free = [
+            v.name
+            for v in model.variables.values()
+            if v.causality == "input"
+            and f"{name}.{v.name}" not in taken
+            and v.name not in system.scenario.fmus[name].parameters
+        ]
+        if free:
+            system.warnings.append(
+                f"{name}: input {', '.join(free)} not connected; keeps its start value"
+            )
+
+
+def _link(source: Signal, target: Signal, ends: str, system: System) -> Conversion:
+    """The conversion of a value between two ends; a warning where units cannot be compared."""
+    given = system.scenario.transformations.get(target.name)
+    if given is not None:
+        if target.variable.type != "Real":
+            raise InputError(f"{ends}: a transformation needs a Real, not {target.variable.type}")
+        return Conversion(given.factor, given.offset)
+    a, b = source.variable.unit, target.variable.unit
+    how = conversion(a, b, ends)
+    if how is None and a is not None and b is not None:
+        system.warnings.append(
+            f"{ends}: units '{a.name}' and '{b.name}' cannot be compared, "
+            "because an FMU does not define them; the value passes unchanged"
+        )
+    return how or SAME
+
+
+def _resolve(system: System, output: str, input_: str, where: str) -> list[tuple[Signal, Signal]]:
+    """The pairs of a connection: one, or with * on both sides all whose names agree there."""
+    if "*" not in output + input_:
+        return [(system.find(output, where), system.find(input_, where))]
+    if output.count("*") != 1 or input_.count("*") != 1:
+        raise InputError(f"{where}: a group needs exactly one * on each side")
+    head, tail = _around(output)
+    source = output.partition(".")[0]
+    target = input_.partition(".")[0]
+    for name in (source, target):
+        if name not in system.models:
+            raise InputError(f"{where}: no instance '{name}'{nearest(name, system.models)}")
+    pairs: list[tuple[Signal, Signal]] = []
+    for variable in system.models[source].variables.values():
+        name = f"{source}.{variable.name}"
+        if variable.causality != "output" or len(name) < len(head) + len(tail):
+            continue
+        if name.startswith(head) and name.endswith(tail):
+            middle = name[len(head) : len(name) - len(tail)]
+            partner = input_.replace("*", middle).partition(".")[2]
+            other = system.models[target].variables.get(partner)
+            if other is not None and other.causality == "input":
+                pairs.append((Signal(source, variable), Signal(target, other)))
+    if not pairs:
+        raise InputError(f"{where}: no output and input agree in the place of *")
+    return pairs
+
+
+def _around(pattern: str) -> tuple[str, str]:
+    head, _, tail = pattern.partition("*")
+    return head, tail

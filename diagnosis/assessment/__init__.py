@@ -1,0 +1,27 @@
+"""How wrong a model is, and where.
+
+Prediction errors over windows of 8 s, regions in which the model error is larger than elsewhere, and
+whether a learned model is stable.
+"""
+
+from .evaluation import Evaluation, PredictionError, evaluate_run
+from .regions import ErrorRegions, Profile, Region, find_regions
+from .stability import OperatingRegion, Stability, check_stability
+from .uncertainty import omega_std
+from .windows import WindowErrors, Windows
+
+__all__ = [
+    "ErrorRegions",
+    "Evaluation",
+    "OperatingRegion",
+    "PredictionError",
+    "Profile",
+    "Region",
+    "Stability",
+    "WindowErrors",
+    "Windows",
+    "check_stability",
+    "evaluate_run",
+    "find_regions",
+    "omega_std",
+]

@@ -1,0 +1,103 @@
+"""Evaluation of a model on a measured run, before and after something was learned."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim import InputError
+
+from ..model import Integrals, Model, omega
+from ..smoothing import Smoothed
+from .windows import WindowErrors, Windows
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionError:
+    """Errors of one model on one run.
+
+    Attributes:
+        omega: (K, 3), model error in each window of the weak form [N, N, N m].
+        residuals: (samples, 3), measured minus predicted pose [m, m, rad] in the windows of 8 s; empty
+            if none has enough samples.
+        errors: of those windows; None if none has enough samples.
+    """
+
+    omega: np.ndarray
+    residuals: np.ndarray
+    errors: WindowErrors | None
+
+    @property
+    def position(self) -> float:
+        """Window prediction error [m]; NaN without a window."""
+        return float("nan") if self.errors is None else float(self.errors.over_all()[0])
+
+    @property
+    def heading(self) -> float:
+        """Window prediction error [rad]; NaN without a window."""
+        return float("nan") if self.errors is None else float(self.errors.over_all()[1])
+
+    @property
+    def omega_rms(self) -> np.ndarray:
+        """(3,), root mean square of the model error [N, N, N m]."""
+        return np.sqrt(np.mean(self.omega**2, axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One run with the errors of the initial and of the learned model on it.
+
+    Attributes:
+        model: the initial model.
+        integrals: the run, in windows of the weak form.
+        windows: the run, in windows of 8 s; None if none has enough samples.
+        held_out: whether nothing was learned from it.
+        before, after: errors of the initial and of the learned model; the same object where nothing was
+            learned.
+    """
+
+    model: Model
+    integrals: Integrals
+    windows: Windows | None
+    held_out: bool
+    before: PredictionError
+    after: PredictionError
+
+    @property
+    def smoothed(self) -> Smoothed:
+        return self.integrals.smoothed
+
+    @property
+    def name(self) -> str:
+        return self.integrals.run.name
+
+
+def evaluate_run(
+    w: Integrals, before: Model, after: Model | None = None, held_out: bool = False
+) -> Evaluation:
+    """Evaluate one model, or two, on a run.
+
+    Args:
+        w: windows of the run.
+        before: the initial model.
+        after: the learned model; None: nothing was learned.
+        held_out: whether nothing was learned from the run.
+    """
+    windows = _windows([w.smoothed])
+    first = _prediction_error(w, windows, before)
+    last = first if after is None else _prediction_error(w, windows, after)
+    return Evaluation(before, w, windows, held_out, first, last)
+
+
+def _windows(runs: Sequence[Smoothed]) -> Windows | None:
+    try:
+        return Windows(runs)
+    except InputError:
+        return None
+
+
+def _prediction_error(w: Integrals, windows: Windows | None, model: Model) -> PredictionError:
+    if windows is None:
+        return PredictionError(omega(w, model), np.zeros((0, 3)), None)
+    residuals = windows.residuals(model)
+    return PredictionError(omega(w, model), residuals, windows.summary(residuals))

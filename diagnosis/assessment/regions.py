@@ -1,0 +1,257 @@
+"""Where the model fails: regions of a covariate in which the model error is larger than elsewhere.
+
+Windows overlap and the model error is correlated in time, so that clusters of 30 s count as independent
+and means have cluster-robust standard errors. A region is reported only if the mean logarithm of its
+clusters' mean squares is above that of the rest at level 1 %: Welch's test, with Bonferroni's correction
+for the number of regions that were tried.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Integrals
+from .clusters import ClusterMean, cluster_mean, welch_p_value
+from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
+
+NAMES = {"X": "Surge", "Y": "Sway", "N": "Yaw"}
+UNITS = {"X": "N", "Y": "N", "N": "N m"}
+SIGNIFICANCE = 0.01  # level of the test after Bonferroni's correction; chosen
+# Blocks of 15 s in a cluster. Calibrated by tests/test_diagnosis_where.py on model error that is
+# correlated over 3 s and depends on no covariate: with one block three times as many regions were found.
+BLOCKS_PER_CLUSTER = 2
+# Ratio of the model error to its uncertainty, above which there is an error at all. Chosen: that
+# uncertainty is right within 30 % (tests/test_diagnosis_where.py).
+MIN_RATIO_TO_NOISE = 1.4
+SIGMAS_ABOVE_NOISE = 2.0  # cluster-robust standard errors, one-sided 2.3 %; chosen
+MIN_RATIO_TO_REST = 1.4  # of the RMS inside to that outside; smaller differences do not matter; chosen
+MIN_SHARE, MAX_SHARE = 0.05, 0.6  # of the windows that a region may hold; chosen
+MIN_CLUSTERS = 4  # inside and outside, so that each variance has three degrees of freedom; chosen
+CLUSTERS_PER_RUN = 10_000  # a number beyond that of any run's clusters, which keeps runs apart
+SMALLEST_SQUARE = 1e-30  # N2 or (N m)2, keeps a logarithm finite
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """RMS of the model error of an axis over a covariate.
+
+    Attributes:
+        axis: X, Y or N.
+        covariate: which.
+        run: name of the only run that is meant; None: all.
+        edges: (bins + 1,), in the covariate's unit.
+        rms, uncertainty: (bins,) [N or N m]; NaN in a bin without windows.
+        share: (bins,), of all windows.
+    """
+
+    axis: str
+    covariate: Covariate
+    run: str | None
+    edges: np.ndarray
+    rms: np.ndarray
+    uncertainty: np.ndarray
+    share: np.ndarray
+
+
+@dataclass(frozen=True)
+class Region:
+    """An interval of a covariate in which the model error is significantly larger than elsewhere.
+
+    Attributes:
+        axis: X, Y or N.
+        covariate: which.
+        run: name of the only run that is meant; None: all.
+        low, high: its ends, in the covariate's unit; None where it is open.
+        rms, elsewhere: RMS of the model error inside and outside [N or N m].
+        share: of the windows inside.
+        p_value: of Welch's test, corrected for the number of regions tried.
+        contrast: variance of the logarithm that the division into inside and outside explains.
+    """
+
+    axis: str
+    covariate: Covariate
+    run: str | None
+    low: float | None
+    high: float | None
+    rms: float
+    elsewhere: float
+    share: float
+    p_value: float
+    contrast: float
+
+    @property
+    def phrase(self) -> str:
+        """The region as a part of a sentence."""
+        by = self.covariate
+        low, high = (
+            None if x is None else f"{by.display_factor * x:.3g}" for x in (self.low, self.high)
+        )
+        if high is None:
+            text = by.above.format(low)
+        elif low is None:
+            text = by.below.format(high)
+        else:
+            text = by.between.format(low, high)
+        return f"in run {self.run} {text}" if self.run else text
+
+    @property
+    def sentence(self) -> str:
+        unit = UNITS[self.axis]
+        return (
+            f"{NAMES[self.axis]}: worst {self.phrase}: {self.rms:.2g} {unit} against "
+            f"{self.elsewhere:.2g} {unit} elsewhere, {100.0 * self.share:.0f} % of the time."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorRegions:
+    """Where a model fails.
+
+    Attributes:
+        sentences: one for each axis, on its clearest region.
+        regions: all that are significant, by axis, the clearest first.
+        profiles: of each axis over each covariate.
+    """
+
+    sentences: Sequence[str]
+    regions: Sequence[Region]
+    profiles: Sequence[Profile]
+
+
+def find_regions(
+    data: Sequence[Integrals], omega: Sequence[np.ndarray], std: Sequence[np.ndarray]
+) -> ErrorRegions:
+    """Regions in which the model error of some runs is significantly larger than elsewhere.
+
+    Args:
+        data: windows of each run.
+        omega: of each run the model error (K, 3) [N, N, N m].
+        std: of each run its standard deviation by the noise of the measurement (K, 3) [N, N, N m].
+    """
+    squares, noise = np.concatenate(omega) ** 2, np.concatenate(std) ** 2
+    numbers = [CLUSTERS_PER_RUN * k + w.block // BLOCKS_PER_CLUSTER for k, w in enumerate(data)]
+    cluster = np.unique(np.concatenate(numbers), return_inverse=True)[1]
+    several_runs = len(data) > 1
+    sentences: list[str] = []
+    regions: list[Region] = []
+    profiles: list[Profile] = []
+    for k, covariates in enumerate(covariates_by_axis(data)):
+        axis = AXES[k]
+        designs = [
+            _Design.of(axis, c, squares[:, k], noise[:, k], cluster, several_runs) for c in covariates
+        ]
+        profiles += [d.profile for d in designs]
+        rms, uncertainty = (np.sqrt(x[:, k].mean()) for x in (squares, noise))
+        measured = f"{rms:.2g} {UNITS[axis]}"
+        if not exceeds_noise(squares[:, k], noise[:, k], cluster):
+            within = f"{measured} is within the uncertainty of {uncertainty:.1g}"
+            sentences.append(f"{NAMES[axis]}: no error seen, {within}.")
+            continue
+        found = sorted(filter(None, (d.clearest_region() for d in designs)), key=lambda r: -r.contrast)
+        regions += found
+        everywhere = f"{measured} (uncertainty {uncertainty:.1g}), nowhere clearly worse than elsewhere."
+        sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {everywhere}")
+    return ErrorRegions(sentences, regions, profiles)
+
+
+def exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -> bool:
+    """Whether a model error is more than noise.
+
+    Args:
+        squares: (K,), of the model error [N2 or (N m)2].
+        noise: (K,), variance by the noise of the measurement [N2 or (N m)2].
+        cluster: (K,), number of each window's cluster.
+    """
+    excess = squares - MIN_RATIO_TO_NOISE**2 * noise
+    above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
+    return above.mean > SIGMAS_ABOVE_NOISE * np.sqrt(above.variance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """Block design of an axis and a covariate: bins by clusters.
+
+    Attributes:
+        profile: what is reported of it.
+        total, noise: (bins, clusters), sums of the squares and of the noise's variance.
+        count: (bins, clusters), numbers of windows.
+    """
+
+    profile: Profile
+    total: np.ndarray
+    noise: np.ndarray
+    count: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        axis: str,
+        by: CovariateValues,
+        squares: np.ndarray,
+        noise: np.ndarray,
+        cluster: np.ndarray,
+        several_runs: bool,
+    ) -> "_Design":
+        edges = by.edges
+        bins = max(edges.size - 1, 1)
+        place = np.clip(np.searchsorted(edges, by.values, side="right") - 1, 0, bins - 1)
+        flat = place * (cluster.max() + 1) + cluster[by.rows]
+        shape = (bins, cluster.max() + 1)
+
+        def cells(weights: np.ndarray | None) -> np.ndarray:
+            return np.bincount(flat, weights, bins * shape[1]).reshape(shape)
+
+        total, variance, count = cells(squares[by.rows]), cells(noise[by.rows]), cells(None)
+        n = count.sum(axis=1)
+        with np.errstate(invalid="ignore"):
+            rms, uncertainty = (np.sqrt(x.sum(axis=1) / n) for x in (total, variance))
+        run = by.run if several_runs else None
+        profile = Profile(axis, by.covariate, run, edges, rms, uncertainty, n / max(n.sum(), 1))
+        return cls(profile, total, variance, count)
+
+    def intervals(self) -> Iterator[tuple[int, int]]:
+        """First bin and the one after the last of each interval, which may pass the end if cyclic."""
+        by, bins = self.profile.covariate, len(self.total)
+        for first in range(bins):
+            for after in range(first + 1, first + bins if by.cyclic else bins + 1):
+                if (by.bounded or first == 0 or after == bins) and after - first < bins:
+                    yield first, after
+
+    def clearest_region(self) -> Region | None:
+        """The significant region of the largest contrast; None: there is none."""
+        bins = len(self.total)
+        tried = list(self.intervals())
+        best: Region | None = None
+        for first, after in tried:
+            inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
+            region = self._test(first, after, inside, len(tried))
+            if region is not None and (best is None or region.contrast > best.contrast):
+                best = region
+        return best
+
+    def _log_mean_square(self, bins: np.ndarray) -> ClusterMean:
+        """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
+        total, count = ((x[bins].sum(axis=0)) for x in (self.total + self.noise, self.count))
+        windows = np.maximum(count, 1)
+        return cluster_mean(count * np.log(np.maximum(total, SMALLEST_SQUARE) / windows), count)
+
+    def _test(self, first: int, after: int, inside: np.ndarray, tried: int) -> Region | None:
+        """The region, if it is significantly worse than the rest among so many that were tried."""
+        share = float(self.profile.share[inside].sum())
+        if not MIN_SHARE <= share <= MAX_SHARE:
+            return None
+        parts = (inside, ~inside)
+        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
+        a, b = map(self._log_mean_square, parts)
+        if min(a.dof, b.dof) + 1 < MIN_CLUSTERS or inner < MIN_RATIO_TO_REST * outer:
+            return None
+        p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
+        if p_value > SIGNIFICANCE:
+            return None
+        p, bins = self.profile, len(self.total)
+        cyclic = p.covariate.cyclic
+        low = float(p.edges[first]) if first > 0 or cyclic else None
+        high = float(p.edges[(after - 1) % bins + 1]) if after < bins or cyclic else None
+        contrast = share * (1.0 - share) * (a.mean - b.mean) ** 2
+        return Region(p.axis, p.covariate, p.run, low, high, inner, outer, share, p_value, contrast)

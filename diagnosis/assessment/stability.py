@@ -1,0 +1,230 @@
+"""Check whether a learned model may be simulated and controlled, see docs/stability.md.
+
+Three conditions: the mass matrix is positive definite, the hull dissipates at least as much as that of
+the nominal model, and the reference controller keeps the ship on the reference paths. The thesis left
+such a criterion as future work (7.4, chapter 8), after a regression model had failed (Fig. 7.16).
+"""
+
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+from fmus.effects import Motion
+from fmus.hull import damping_force
+from fmus.vessel.vessel_effects import NONE
+
+from ..model import Model
+from ..progress import Advance, silent
+from .closed_loop import BOUND, REFERENCES, largest_distance
+
+MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
+# Least difference that counts, share of the dissipation. Chosen: no coefficient is known to 1 %.
+TOLERANCE = 0.01
+DIRECTIONS = 21  # on each edge of a face; chosen, eigenvalues are met within 1 % of their range
+SPEEDS = np.linspace(0.02, 1.0, 25)  # shares of the region's limits; chosen
+COVERAGE = 0.99  # of a measured motion that its operating region holds; chosen
+MIN_REGION = 0.1  # of the default limits; chosen, so that an axis that hardly moves is checked as well
+
+
+class OperatingRegion(NamedTuple):
+    """Largest |u|, |v| [m/s] and |r| [rad/s] at which the ship operates.
+
+    The default holds 99 % of each of the four runs that NTNU published of CyberShip Enterprise 1; the
+    thesis' paths stay below half of it.
+    """
+
+    u: float = 0.4
+    v: float = 0.2
+    r: float = 0.6
+
+    @classmethod
+    def of(cls, nu: np.ndarray) -> "OperatingRegion":
+        """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
+        known = np.abs(nu[np.isfinite(nu).all(axis=1)])
+        most = np.quantile(known, COVERAGE, axis=0) if len(known) else np.zeros(3)
+        return cls(*map(float, np.maximum(most, MIN_REGION * np.array(cls()))))
+
+
+OPERATING = OperatingRegion()
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Result of the check.
+
+    Attributes:
+        mass_definite: whether M is positive definite.
+        nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
+        bounded: whether the ship stays within BOUND of its target on every reference path.
+        region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
+        notes: further remarks, a sentence each.
+    """
+
+    mass_definite: bool
+    nominal_min_dissipation: float
+    learned_min_dissipation: float
+    bounded: bool
+    region: str | None
+    notes: tuple[str, ...]
+
+    @property
+    def safe(self) -> bool:
+        """Whether the model may be written without ``--allow-unstable``."""
+        return self.mass_definite and self.bounded
+
+
+def check_stability(
+    model: Model,
+    nominal: Model,
+    advance: Advance = silent,
+    region: OperatingRegion = OPERATING,
+) -> Stability:
+    """Check a learned model against the nominal one.
+
+    Args:
+        model, nominal: the learned model and the initial one.
+        advance: receives the name of each step when it begins.
+        region: where the dissipation is compared.
+
+    Raises:
+        InputError: the nominal model's mass matrix is not positive definite, the learned model's has no
+            inverse, or the region has no size.
+    """
+    if not all(isfinite(most) and most > 0.0 for most in region):
+        raise InputError("the operating region needs positive limits of u, v and r")
+    metric = mass(nominal)
+    if not is_definite(metric):
+        raise InputError("the mass matrix of the nominal model is not positive definite")
+    mass_definite = is_definite(mass(model))
+    advance("dissipation")
+    everywhere = sampled_motions(region)
+    before = dissipation(nominal, everywhere, metric)
+    after = dissipation(model, everywhere, metric)
+    notes = (
+        []
+        if mass_definite
+        else ["the mass matrix is not positive definite: some force would push backwards"]
+    )
+    compared = [_compare(k, model, nominal, metric, region) for k in range(3)]
+    worse = [text for text in compared if text]
+    lowest = int(np.argmin(after))
+    if not worse and _less(after.min(), before.min()):
+        worse = [_motion(everywhere[lowest], float(after.min()), float(before.min()))]
+    bounded = mass_definite and _bounded(model, nominal, advance, notes)
+    return Stability(
+        mass_definite,
+        float(before.min()),
+        float(after.min()),
+        bounded,
+        "; ".join(worse) or None,
+        tuple(dict.fromkeys(notes)),
+    )
+
+
+def mass(model: Model) -> np.ndarray:
+    """(3, 3) symmetric part of M [kg, kg m, kg m2], effects included."""
+    try:
+        M = model.mass
+    except ZeroDivisionError:
+        raise InputError("a mass matrix has no inverse: no force would move the ship") from None
+    return 0.5 * (M + M.T)
+
+
+def is_definite(M: np.ndarray) -> bool:
+    """Whether a symmetric matrix is positive definite."""
+    return bool(np.linalg.eigvalsh(M).min() > 0.0)
+
+
+def force(model: Model, nu: np.ndarray) -> np.ndarray:
+    """Force (n, 3) [N, N, N m] on the hull by its motion nu (n, 3) through the water.
+
+    Damping, its changes, free curves and the user's effects. Of an effect from outside only what
+    depends on the velocity counts: its force at rest is taken off. Coriolis forces do no work.
+    """
+    b = model.hull
+
+    def total(u: np.ndarray, v: np.ndarray, r: np.ndarray) -> np.ndarray:
+        at = Motion(0.0, 0.0, 0.0, u, v, r, 0.0)
+        result = np.stack(damping_force(u, v, r, b.hull.damping))
+        for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
+            added = member.apply(acts, b.params.outside, NONE, at)
+            result = result + np.stack([np.broadcast_to(axis, u.shape) for axis in added])
+        return result.T
+
+    return total(*nu.T) - total(*np.zeros((3, 1)))
+
+
+def dissipation(model: Model, nu: np.ndarray, metric: np.ndarray) -> np.ndarray:
+    """-nu . F(nu) / (nu . M nu) (n,) [1/s]: relative rate at which the hull's force slows it down.
+
+    For linear damping F = -D nu its minimum over all directions is the smallest eigenvalue of the
+    symmetric part of D relative to M. Unlike a matrix D(nu) it does not depend on how F is factorised.
+    """
+    power = -np.einsum("ij,ij->i", nu, force(model, nu))
+    return power / np.einsum("ij,jk,ik->i", nu, metric, nu)
+
+
+def sampled_motions(region: OperatingRegion) -> np.ndarray:
+    """Velocities (n, 3) [m/s, m/s, rad/s] in all directions of a region, from slow to its border."""
+    edge = np.linspace(-1.0, 1.0, DIRECTIONS)
+    a, b = (grid.ravel() for grid in np.meshgrid(edge, edge))
+    one = np.ones_like(a)
+    faces = [
+        np.roll(np.column_stack([side * one, a, b]), k, axis=1) for k in range(3) for side in (-1, 1)
+    ]
+    directions = np.concatenate(faces) * np.array(region)
+    return (SPEEDS[:, None, None] * directions).reshape(-1, 3)
+
+
+def _less(after: float, before: float) -> bool:
+    return after < before - TOLERANCE * abs(before)
+
+
+def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: OperatingRegion) -> str:
+    """Where and how the learned hull dissipates less in one motion alone; empty: nowhere."""
+    name, unit = MOTIONS[k]
+    speeds = np.concatenate([-SPEEDS[::-1], SPEEDS]) * region[k]
+    nu = np.zeros((len(speeds), 3))
+    nu[:, k] = speeds
+    before, after = dissipation(nominal, nu, metric), dissipation(model, nu, metric)
+    if not _less(after.min(), before.min()):
+        return ""
+    worse = speeds[after < before - TOLERANCE * np.abs(before)]
+    how = "is driven on" if after.min() < 0.0 else "is braked less"
+    return (
+        f"{name} from {worse.min():.2g} to {worse.max():.2g} {unit}: the hull {how}, {after.min():.3g} "
+        f"1/s at {speeds[np.argmin(after)]:.2g} {unit} (nominal at least {before.min():.3g})"
+    )
+
+
+def _motion(nu: np.ndarray, after: float, before: float) -> str:
+    u, v, r = nu
+    return (
+        f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
+        f"{after:.3g} 1/s (nominal at least {before:.3g})"
+    )
+
+
+def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> bool:
+    """Whether the reference controller keeps the ship on every path; adds to the notes how well."""
+    bounded = True
+    for reference in REFERENCES:
+        advance(f"closed loop on the {reference.name}")
+        distance = largest_distance(reference, model)
+        if distance < BOUND:
+            notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
+            continue
+        bounded = False
+        notes.append(f"{reference.name}: more than {BOUND:g} m from the target")
+        outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
+        undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
+        if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < BOUND:
+            notes.append(
+                "it holds without wind, waves and current: they are too strong for the thrusters"
+            )
+        elif largest_distance(reference, nominal) >= BOUND:
+            notes.append("the nominal model is not held there either")
+    return bounded

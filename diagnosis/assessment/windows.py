@@ -1,0 +1,194 @@
+"""Window prediction error: how far a model departs from the measurement within eight seconds.
+
+A run is cut into consecutive windows, the remainder is dropped. In each the model starts from the
+smoothed state, with the thrusters' history from the commands before, and is compared with every raw
+sample that is no spike. Longer predictions say nothing: the nominal hull is unstable.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ops import wrap
+
+from ..model import Model
+from ..model.prediction import LONGEST_STEP, Starts, predict
+from ..smoothing import Smoothed
+
+# s. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s (docs/stability.md).
+LENGTH = 8.0
+MIN_COVERAGE = 0.5  # of a window's samples; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class WindowErrors:
+    """Root mean square errors of prediction in each window; inf where the model diverges.
+
+    Attributes:
+        run: (w,), number of each window's run.
+        start: (w,), when it starts [s].
+        samples: (w,), number of samples that it was compared with.
+        position: (..., w) [m], over north and east together.
+        heading: (..., w) [rad].
+    """
+
+    run: np.ndarray
+    start: np.ndarray
+    samples: np.ndarray
+    position: np.ndarray
+    heading: np.ndarray
+
+    def over_all(self, run: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and heading [rad], over all samples of one run or of all; NaN without any.
+
+        Returns:
+            Two arrays without the last axis of ``position``.
+        """
+        chosen = np.ones(self.run.size, bool) if run is None else self.run == run
+        n = self.samples[chosen]
+        squares = (np.square(e[..., chosen]) @ n for e in (self.position, self.heading))
+        with np.errstate(invalid="ignore"):
+            position, heading = (np.sqrt(s / np.sum(n)) for s in squares)
+        return position, heading
+
+
+class Windows:
+    """The windows of some runs, in which models are compared with the measurement.
+
+    Args:
+        runs: smoothed runs.
+
+    Attributes:
+        run, start: (w,), number of each window's run, and when it starts [s].
+        sample_window: (samples,), the window of each sample that is used.
+        measured: (samples, 3), the raw pose [m, m, rad].
+        since: (samples,), time since its window began [s].
+
+    Raises:
+        InputError: no run has a window with enough samples.
+    """
+
+    def __init__(self, runs: Sequence[Smoothed]) -> None:
+        parts = [usable_windows(smoothed) for smoothed in runs]
+        counts = [p.first_rows.size for p in parts]
+        if not sum(counts):
+            raise InputError(f"no window of {LENGTH:g} s has enough samples")
+        before = np.cumsum([0, *counts[:-1]])
+        self.run = np.repeat(np.arange(len(parts)), counts)
+        self.start = np.concatenate([p.time[p.first_rows] for p in parts])
+        self.sample_window = np.concatenate([p.window + a for p, a in zip(parts, before, strict=True)])
+        self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
+        self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
+        self._groups: list[tuple[Starts, np.ndarray]] = []
+        for h, five in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
+            members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, five)]
+            starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
+            group = Starts(starts, h, int(np.ceil(LENGTH / h - 1e-6)), five)
+            self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
+
+    def residuals(self, model: Model | None = None) -> np.ndarray:
+        """Measured minus predicted pose at each sample that is used.
+
+        Args:
+            model: the nominal one by default; a parameter that is an array (p, 1) stands for p models
+                at once.
+
+        Returns:
+            (samples, 3) [m, m, rad], heading wrapped; (p, samples, 3) for p models.
+
+        Raises:
+            InputError: an unknown name.
+        """
+        model = model or Model()
+        shapes = [np.shape(v)[:1] for v in (*model.vessel.values(), *model.thrusters.values())]
+        models = np.broadcast_shapes(*shapes)
+        found = np.empty((*(models or (1,)), *self.measured.shape))
+        for starts, windows in self._groups:
+            place = np.full(self.run.size, -1)
+            place[windows] = np.arange(windows.size)
+            mine = place[self.sample_window] >= 0
+            column = place[self.sample_window[mine]]
+            steps = predict(starts, model)
+            pose = between_steps(steps, column, self.since[mine] / starts.h)
+            found[:, mine] = self.measured[mine] - pose
+        found[..., 2] = wrap(found[..., 2])
+        return found if models else found[0]
+
+    def errors(self, model: Model | None = None) -> WindowErrors:
+        """The window prediction error of a model, argument as of :meth:`residuals`."""
+        return self.summary(self.residuals(model))
+
+    def summary(self, residuals: np.ndarray) -> WindowErrors:
+        """Root mean squares by window of the result (..., samples, 3) of :meth:`residuals`."""
+        samples = np.bincount(self.sample_window, minlength=self.run.size)
+        edges = np.cumsum([0, *samples[:-1]])  # samples lie window by window
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.add.reduceat(np.nan_to_num(residuals**2, nan=np.inf), edges, axis=-2)
+            mean = squares / samples[:, None]
+            position, heading = np.sqrt(mean[..., 0] + mean[..., 1]), np.sqrt(mean[..., 2])
+        return WindowErrors(self.run, self.start, samples, position, heading)
+
+
+class RunWindows(NamedTuple):
+    """The windows of one run that can be used.
+
+    Attributes:
+        smoothed: the run.
+        first_rows: (w,), row of each window's first sample.
+        rows, window: (samples,), row and window of each sample that is used.
+    """
+
+    smoothed: Smoothed
+    first_rows: np.ndarray
+    rows: np.ndarray
+    window: np.ndarray
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.smoothed.time
+
+    @property
+    def step_and_commands(self) -> tuple[float, bool]:
+        """Step of integration [s], which divides the sample period; whether commands are five."""
+        row = round(float(np.median(np.diff(self.time))), 9)
+        parts = int(np.ceil(row / LONGEST_STEP - 1e-6))
+        return row / parts, self.smoothed.track.run.five is not None
+
+
+def usable_windows(smoothed: Smoothed) -> RunWindows:
+    """The windows of a run that have their first sample and at least half of all."""
+    track, used, period = smoothed.track, smoothed.used, smoothed.track.period
+    since = smoothed.time - smoothed.time[0] + 0.25 * period
+    number = np.floor(since / LENGTH).astype(int)
+    complete = int((since[-1] + period) // LENGTH)
+    measured = np.flatnonzero(~track.between & (number < complete))
+    _, at = np.unique(number[measured], return_index=True)
+    first = measured[at]  # the first sample of each window that has any
+    prompt = since[first] - LENGTH * number[first] < period
+    chosen, samples = np.unique(number[used], return_counts=True)
+    full = chosen[samples >= MIN_COVERAGE * round(LENGTH / period)]
+    first = first[prompt & used[first] & np.isin(number[first], full)]
+    rows = np.flatnonzero(used & np.isin(number, number[first]))
+    return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Predicted pose at the samples, by linear interpolation between steps.
+
+    Args:
+        predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
+        column: (samples,), the window of each sample.
+        place: (samples,), number of steps from the window's start to it, a fraction included.
+
+    Returns:
+        (p, samples, 3) [m, m, rad].
+    """
+    step = np.clip(np.floor(place + 1e-6).astype(int), 0, len(predicted) - 2)
+    low, high = (predicted[k, :, :, column] for k in (step, step + 1))
+    with np.errstate(invalid="ignore", over="ignore"):
+        change = high - low
+        change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
+        return (low + (place - step)[:, None, None] * change).transpose(2, 0, 1)

@@ -1,0 +1,98 @@
+"""What the commands of the diagnosis share: options, a user's effects, progress, mistakes."""
+
+import argparse
+import io
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console, RenderableType
+
+from cosim import InputError
+from cosim.command import BAD_INPUT, Output, complain
+from cosim.interrupts import Held
+from fmus.declare import DeclarationError
+from fmus.effects import STANDARD
+from fmus.ship import Ship, ship
+
+from .progress import Advance, progress
+
+
+class Done(NamedTuple):
+    """How a command ended: its exit code, and what it shows."""
+
+    code: int
+    shown: Iterable[RenderableType]
+
+
+def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser with the options that both commands have: ``--model``, ``--effects``, ``--out``."""
+    made = argparse.ArgumentParser(
+        prog=f"python -m diagnosis.{name}",
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument(
+        "--model", type=Path, metavar="FILE.ssv", help="model to begin with (the nominal one)"
+    )
+    made.add_argument(
+        "--effects",
+        type=Path,
+        metavar="FILE.py",
+        action="append",
+        default=[],
+        help="a file of model effects of your own; may be repeated",
+    )
+    return made
+
+
+def folder(text: str) -> Path:
+    """The argument of ``--out``."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("needs the name of a folder")
+    return Path(text)
+
+
+def ship_with(files: Sequence[Path]) -> Ship:
+    """The ship with the effects of a user's files.
+
+    Raises:
+        InputError: a file has none, or fails.
+    """
+    effects = STANDARD
+    try:
+        for file in files:
+            effects = effects.plus_file(file)
+        return ship(effects)
+    except DeclarationError as error:
+        raise InputError(" ".join(str(error).split())) from None
+
+
+def run(work: Callable[[Advance], Done]) -> int:
+    """Do the work of a command, and show what it found.
+
+    Args:
+        work: is given a callback for progress.
+
+    Returns:
+        The exit code.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
+    errors = Console(stderr=True, highlight=False, soft_wrap=True)
+    with Held() as interrupts:
+        interrupts.allow()
+        try:
+            with progress(errors) as advance:
+                done = work(advance)
+        except InputError as error:
+            complain(error)
+            return BAD_INPUT
+        interrupts.hold()  # the files are there: what was found is shown
+        output = Output(highlight=False, markup=False)
+        for part in done.shown:
+            output.print(part)
+        interrupts.finish()
+    return done.code

@@ -1,0 +1,222 @@
+"""Which samples of a measured run are usable: faults are counted and reported, never repaired."""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ops import wrap
+
+from .reading import Run
+
+SHORTEST = 8.0  # s, of a run: one prediction window
+RAREST = 2.0  # s between two samples; a model ship's own time constants are shorter (chosen)
+OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
+# Of what regular sampling would give, gaps of up to GAP seconds filled. Chosen: what is rarer comes in
+# bursts, of which nothing can be differentiated.
+SPARSE, GAP = 0.05, 30.0
+LONGEST = 1e9  # s, of a run; thirty years are a mistake in a time stamp
+FARTHEST = 1e9  # m, rad; beyond is no place on earth
+MOST_OUT = 0.1  # largest share of rows whose time may be out of order (chosen)
+LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate around it (chosen)
+# Beyond these no ship moves, so that the unit must be another one (chosen).
+FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
+TURN = 6.3  # rad, just above a turn; a heading that stays below is in radians, and may wrap
+
+
+class Counts(NamedTuple):
+    """Samples of a run, and what became of them: used is the rest."""
+
+    samples: int
+    frozen: int
+    dropped: int
+    spikes: int
+    used: int
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A run with its samples judged.
+
+    Attributes:
+        run: its rows in the order of time, rows without a time of their own left out.
+        pose: (n, 3), pose [m, m, rad], heading continuous over turns; NaN where it is not valid.
+        frozen: (n,), all three channels repeat the measurement before.
+        dropped: (n,), NaN, infinite, or all three zero.
+        between: (n,), rows of a log between two measurements of a slower measurement system.
+        period: of the measurement [s].
+        out: rows left out, as their time stamp is missing, repeated or goes backwards.
+        notes: what was found, a line each.
+    """
+
+    run: Run
+    pose: np.ndarray
+    frozen: np.ndarray
+    dropped: np.ndarray
+    between: np.ndarray
+    period: float
+    out: int
+    notes: tuple[str, ...]
+
+    @cached_property
+    def valid(self) -> np.ndarray:
+        """(n,), rows with a new measurement."""
+        return ~(self.frozen | self.dropped | self.between)
+
+    def counts(self, spikes: int = 0) -> Counts:
+        """What became of the samples."""
+        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
+        samples = int((~self.between).sum()) + self.out
+        return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
+
+
+def clean(run: Run) -> Track:
+    """Judge the samples of a run.
+
+    Raises:
+        InputError: too short, time not in order, another unit than said, nothing valid, no motion.
+    """
+    where = f"run '{run.name}'"
+    kept = in_order(run.time)
+    out = run.time.size - kept.size
+    if out > MOST_OUT * run.time.size:
+        raise InputError(f"{where}: time does not grow in {out} of {run.time.size} rows")
+    notes = list(run.notes)
+    if out:
+        notes.append(f"{out} rows left out: time missing, repeated or backwards")
+        run = run.rows(kept)
+    with np.errstate(over="ignore"):
+        row = float(np.median(np.diff(run.time))) if kept.size > 1 else 0.0
+    seconds = float(run.time[-1] - run.time[0]) + row if kept.size > 1 else 0.0
+    if seconds < SHORTEST * (1.0 - 1e-6):
+        raise InputError(f"{where} is too short: {seconds:.3g} s, at least {SHORTEST:g} s are needed")
+    dropped = lost(run.pose)
+    repeats = repeated(run.pose, ~dropped)
+    fresh = np.flatnonzero(~dropped & ~repeats)
+    if fresh.size < 4:
+        raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
+    period = float(np.median(np.diff(run.time[fresh])))
+    if row > RAREST:
+        raise InputError(f"{where}: a sample each {row:.4g} s is too rare; is the time in another unit?")
+    if row < OFTENEST:
+        raise InputError(
+            f"{where}: a sample each {row:.4g} s is too frequent; is the time in another unit?"
+        )
+    if seconds > LONGEST:
+        raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
+    steps = np.minimum(np.diff(run.time), GAP)
+    if SPARSE * steps.sum() > row * run.time.size:
+        raise InputError(
+            f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
+        )
+    between = np.zeros_like(repeats)
+    if period > 1.5 * row:  # a log that is faster than the measurement
+        last = run.time[fresh][np.maximum(np.searchsorted(fresh, np.arange(repeats.size)) - 1, 0)]
+        between = repeats & (run.time - last < period - 0.5 * row)
+        notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
+    frozen = repeats & ~between
+    pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
+    _plausible(run.time[fresh], pose[fresh], where)
+    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
+    _moves(pose[fresh], where)
+    notes += _gaps(run.time[fresh], period)
+    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes))
+
+
+def in_order(time: np.ndarray) -> np.ndarray:
+    """Rows of the longest part of some times [s] that grows strictly; non-finite ones are left out."""
+    rows = np.flatnonzero(np.isfinite(time))
+    if (np.diff(time[rows]) > 0.0).all():
+        return rows
+    ends: list[float] = []  # the smallest time at which a part of that length can end
+    last: list[int] = []
+    before = np.full(time.size, -1)
+    for row in rows.tolist():
+        place = bisect_left(ends, time[row])
+        before[row] = last[place - 1] if place else -1
+        ends[place : place + 1] = [float(time[row])]
+        last[place : place + 1] = [row]
+    found = [last[-1]]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return np.array(found[::-1])
+
+
+def lost(pose: np.ndarray) -> np.ndarray:
+    """(n,): where a pose (n, 3) is no measurement: NaN, infinite, or all zero."""
+    return ~np.isfinite(pose).all(axis=1) | (pose == 0.0).all(axis=1)
+
+
+def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """(n,): where a pose (n, 3) is to the bit the last one that was there."""
+    rows = np.flatnonzero(there)
+    repeats = np.zeros(there.size, bool)
+    repeats[rows[1:]] = (np.diff(pose[rows], axis=0) == 0.0).all(axis=1)
+    return repeats
+
+
+def unwrap(time: np.ndarray, psi: np.ndarray, period: float) -> np.ndarray:
+    """The heading [rad] continuous over turns.
+
+    Over a long gap it may have turned by more than half a turn: then that step is taken which comes
+    nearest to what the yaw rate of the second before and the second after would have turned it.
+    """
+    step, dt = wrap(np.diff(psi)), np.diff(time)
+    rate = step / dt
+    for k in np.flatnonzero(dt > LONG * period):
+        near = (np.abs(time[1:] - time[k]) < 1.0) | (np.abs(time[:-1] - time[k + 1]) < 1.0)
+        near &= dt <= LONG * period
+        turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
+        step[k] = turn + wrap(step[k] - turn)
+    return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
+
+
+def _plausible(time: np.ndarray, pose: np.ndarray, where: str) -> None:
+    """Refuse units that no ship's motion can be in."""
+    far = float(np.sort(np.abs(pose), axis=0)[time.size // 2].max())
+    if far > FARTHEST:
+        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
+    second = np.searchsorted(time, time + 1.0)
+    second = second[second < time.size]
+    dt = time[second] - time[: second.size]
+    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
+    speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
+    if speed > FASTEST:
+        raise InputError(f"{where} goes {speed:.3g} m/s: is its position in mm?")
+    psi = pose[:, 2]
+    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
+        return
+    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
+    turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
+    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
+        raise InputError(f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?")
+
+
+def _moves(pose: np.ndarray, where: str) -> None:
+    """Refuse a run in which there is nothing but noise."""
+    reach = np.diff(np.quantile(pose, (0.1, 0.9), axis=0), axis=0)[0]
+    if not (reach > 6.0 * noise(pose)).any():
+        raise InputError(f"{where} does not move: its pose is noise around a place")
+
+
+def noise(values: np.ndarray) -> np.ndarray:
+    """Standard deviation of the noise of each channel, from third differences.
+
+    Args:
+        values: (n, channels) in a row; that some steps are longer than others does little harm, as
+            the median is taken.
+    """
+    third = np.abs(np.diff(values, 3, axis=0))
+    return 1.4826 * np.median(third, axis=0) / np.sqrt(20.0)
+
+
+def _gaps(time: np.ndarray, period: float) -> list[str]:
+    """A line for the gaps of half a second and more, if there are any."""
+    dt = np.diff(time)
+    long = dt > max(0.5, LONG * period)
+    if not long.any():
+        return []
+    return [f"{long.sum()} gaps, the longest {dt.max():.4g} s at {time[dt.argmax()]:.4g} s"]

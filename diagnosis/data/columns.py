@@ -1,0 +1,174 @@
+"""What the columns of a measurement mean: names, units and signs, given in a small JSON file beside it.
+
+``run.csv.json`` beside ``run.csv`` may say, for each column that is not as it should be, what it is
+called, in which unit it is, and how its axis lies::
+
+    {
+        "separator": ";",
+        "columns": {
+            "time": {"name": "t", "unit": "ms"},
+            "x": "North",
+            "y": {"name": "West", "unit": "mm", "flip": true},
+            "psi": {"name": "Heading", "unit": "deg", "flip": true, "offset": 90},
+        },
+    }
+
+Columns that it does not name keep their names and SI units.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from cosim import InputError
+from cosim.errors import nearest
+
+POSE = ("x", "y", "psi")
+TAU = ("tau_X", "tau_Y", "tau_N")
+THREE = ("u_vsp_x", "u_vsp_y", "u_bow")
+FIVE = ("u1", "u2", "u3", "u4", "u5")
+COMMANDS = (TAU, THREE, FIVE)
+POWER = ("power_vsp", "power_bow")  # may be beside the five
+SHOWN = 40  # characters of a name that a message shows; a broken file may have thousands (chosen)
+ALL = (*TAU, *THREE, *FIVE, *POWER)
+
+# Factor to SI of every unit that a quantity may be in.
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "angle": {"rad": 1.0, "deg": 0.017453292519943295},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
+    "command": {"1": 1.0, "%": 1e-2},
+}
+QUANTITY = {
+    "time": "time",
+    "x": "length",
+    "y": "length",
+    "psi": "angle",
+    "tau_X": "force",
+    "tau_Y": "force",
+    "tau_N": "moment",
+} | dict.fromkeys((*THREE, *FIVE, *POWER), "command")
+
+
+class Column(BaseModel):
+    """One column of a file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(description="the column's name in the file")
+    unit: str | None = Field(default=None, description="its unit; SI if not said")
+    flip: bool = Field(default=False, description="whether its axis points the other way")
+    offset: float = Field(
+        default=0.0, allow_inf_nan=False, description="what is added, in its unit, after the flip"
+    )
+
+
+class Layout(BaseModel):
+    """The content of the JSON file beside a measurement."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    separator: str = Field(default=",", min_length=1, max_length=1, description="between two cells")
+    decimal: str = Field(default=".", min_length=1, max_length=1, description="the decimal point")
+    columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
+
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _names_alone(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {key: {"name": c} if isinstance(c, str) else c for key, c in value.items()}
+
+    @field_validator("columns")
+    @classmethod
+    def _known(cls, value: dict[str, Column]) -> dict[str, Column]:
+        for key, column in value.items():
+            if key not in QUANTITY:
+                raise ValueError(f"'{key[:SHOWN]}' is not a signal of a run{nearest(key, QUANTITY)}")
+            units = UNITS[QUANTITY[key]]
+            if column.unit is not None and column.unit not in units:
+                raise ValueError(
+                    f"'{column.unit[:SHOWN]}' is no unit of {key}{nearest(column.unit, units)}"
+                )
+        return value
+
+    def column(self, signal: str) -> Column:
+        """The column of a signal."""
+        return self.columns.get(signal, Column(name=signal))
+
+
+def _log() -> Layout:
+    """Our own log: the pose after all faults, and the force after clipping."""
+    names = {"x": "observer.x_m", "y": "observer.y_m", "psi": "observer.psi_m"}
+    names |= {f"tau_{axis}": f"thrusters.tau_cmd_{axis}" for axis in "XYN"}
+    names |= {name: f"thrusters.{name}" for name in THREE}
+    return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
+
+
+LOG = _log()
+
+
+def to_si(values: Any, signal: str, column: Column) -> Any:
+    """Numbers of a column as the signal they stand for, in SI."""
+    flipped = -values if column.flip else values
+    with np.errstate(over="ignore"):  # an infinite number is no measurement, and counts as dropped
+        return (flipped + column.offset) * UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
+
+
+def read_layout(path: Path) -> Layout | None:
+    """What the JSON file beside a measurement says; None if there is none.
+
+    Raises:
+        InputError: it is not as it should be.
+    """
+    beside = path.with_name(path.name + ".json")
+    if not beside.is_file():
+        return None
+    try:
+        return Layout.model_validate(json.loads(beside.read_text(encoding="utf-8")))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part)[:SHOWN] for part in first["loc"])
+        known = (*Layout.model_fields, *Column.model_fields)
+        hint = nearest(str(first["loc"][-1]), known) if first["type"] == "extra_forbidden" else ""
+        text = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"'{beside}': {place}: {text}{hint}") from None
+    except RecursionError:
+        raise InputError(f"'{beside}' cannot be read: it is nested too deeply") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{beside}' cannot be read: {error}") from None
+
+
+def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
+    """The signals of a run that a file has: time, pose, and one form of the commands or more.
+
+    Args:
+        layout: which column is which signal.
+        names: columns of the file.
+        where: what messages call the file.
+
+    Raises:
+        InputError: a column is missing.
+    """
+    groups: list[tuple[str, ...]] = [
+        g for g in COMMANDS if any(layout.column(s).name in names for s in g)
+    ]
+    if not groups:
+        forms = ", or ".join(", ".join(group) for group in COMMANDS)
+        raise InputError(f"{where} has no commands: {forms}{nearest(TAU[0], names)}")
+    if FIVE in groups and any(layout.column(s).name in names for s in POWER):
+        groups.append(POWER)
+    named = [signal for signal in layout.columns if layout is not LOG]
+    wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named])
+    for signal in wanted:
+        name = layout.column(signal).name
+        if name not in names:
+            meant = f" (for {signal})" if name != signal else ""
+            raise InputError(f"{where} has no column '{name}'{meant}{nearest(name, names)}")
+    return list(wanted)

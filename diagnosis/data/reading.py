@@ -1,0 +1,243 @@
+"""Measured runs in one form, from whatever file they are in.
+
+Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and commands (see
+:mod:`.columns` for other names and units), a log of this project (its folder or file), and the MATLAB
+files that NTNU publishes of CyberShip Enterprise 1.
+"""
+
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.io import loadmat
+
+from cosim import InputError
+from cosim.errors import nearest
+from fmus.thrusters.allocation import Allocation, thrust
+
+from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
+
+ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from data)
+LOGS = ("log.csv", "log.parquet")
+# Real commands overshoot by rounding; far beyond they are in another unit.
+MOST_COMMAND = 1.05  # of the full command
+# What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
+READ_INTERRUPTED = "Calling read(nbytes) on source failed"
+# N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
+# below where sums of squares overflow.
+MOST_FORCE, MOST_POWER = 1e9, 1e3
+MATLAB = "cse1_data"
+MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
+# Two power settings: by hand that of the bow first, in dynamic positioning that of the VSP first.
+MATLAB_POWER = slice(12, 14)
+# The settings in dynamic positioning, at which the thrusters give their nominal force.
+FULL_VSP, FULL_BOW = 0.4, 0.5
+SAME_COMMAND = 1e-6  # of the full command; a difference below is rounding in the file
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One measured run, as it was found. A command acts from its time to the next.
+
+    Attributes:
+        name: of the file, or of the folder of a log.
+        time: (n,) [s].
+        pose: (n, 3), measured north, east, heading [m, m, rad]; lost samples are NaN or zeros.
+        tau_cmd: (n, 3), commanded force [N, N, N m] after clipping.
+        u: (n, 3), commands of VSP in surge, VSP in sway, bow [1]; None if not known.
+        five: (n, 5), commands of VSP 1 surge, sway, VSP 2 surge, sway, bow [1]; None if not known.
+        power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
+        notes: what was found that is not as it should be, a line each.
+    """
+
+    name: str
+    time: np.ndarray
+    pose: np.ndarray
+    tau_cmd: np.ndarray
+    u: np.ndarray | None = None
+    five: np.ndarray | None = None
+    power: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+
+    def rows(self, keep: np.ndarray) -> "Run":
+        """The run with only some of its rows."""
+        parts = (self.u, self.five, self.power)
+        u, five, power = (None if part is None else part[keep] for part in parts)
+        always = self.time[keep], self.pose[keep], self.tau_cmd[keep]
+        return Run(self.name, *always, u, five, power, self.notes)
+
+
+def propellers(five: np.ndarray) -> np.ndarray:
+    """Shares of full force (n, 2, 3) of the two thruster sets at ASIDE, by the five commands (n, 5)."""
+    bow = five[:, 4:]
+    return np.stack([np.hstack([five[:, :2], bow]), np.hstack([five[:, 2:4], 0.0 * bow])], axis=1)
+
+
+def force(five: np.ndarray, power: np.ndarray | None = None) -> np.ndarray:
+    """Nominal tau [N, N, N m], shape (n, 3), of the five commands of the real ship, shape (n, 5)."""
+    full = propellers(five)
+    x, y, bow = (full if power is None else full * power[:, None, [0, 0, 1]]).T
+    both = [thrust(x[k], y[k], bow[k], Allocation(p_y=aside)) for k, aside in enumerate(ASIDE)]
+    return np.sum(both, axis=0).T
+
+
+def read(path: str | Path) -> Run:
+    """A measured run.
+
+    Args:
+        path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
+
+    Raises:
+        InputError: absent, unreadable, a column missing, or commands in another unit.
+    """
+    path = Path(path)
+    if path.is_dir():
+        found = [path / name for name in LOGS if (path / name).is_file()]
+        if not found:
+            raise InputError(f"no log in '{path}': log.csv is missing")
+        path = found[0]
+    elif not path.is_file():
+        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
+    name = path.absolute().parent.name if path.name in LOGS else path.stem
+    columns = _matlab(path) if path.suffix == ".mat" else _tabular(path)
+    return _run(name, columns, f"'{path}'")
+
+
+def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
+    """A run of its signals, commands without a gap."""
+
+    def stack(group: tuple[str, ...]) -> np.ndarray | None:
+        return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
+
+    tau, u, five, power = (_held(stack(group)) for group in (TAU, THREE, FIVE, POWER))
+    power = None if power is None else np.maximum(power, 0.0)
+    for commands in (u, five):
+        most = 0.0 if commands is None else float(np.abs(commands).max(initial=0.0))
+        if most > MOST_COMMAND:
+            raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
+    if power is not None and power.max(initial=0.0) > MOST_POWER:
+        raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
+    if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
+        raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
+    lost = sum(not np.isfinite(columns[s]).all() for s in ALL if s in columns)
+    if tau is None:
+        if five is not None:
+            tau = force(five, power)
+        else:
+            assert u is not None
+            x, y, bow = u.T
+            tau = np.column_stack(thrust(x, y, bow, Allocation()))
+    notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
+    pose = np.column_stack([columns[s] for s in POSE])
+    return Run(name, columns["time"], pose, tau, u, five, power, notes)
+
+
+def _held(commands: np.ndarray | None) -> np.ndarray | None:
+    """Commands that keep their last value where one is missing, zero before the first."""
+    if commands is None:
+        return None
+    finite = np.where(np.isfinite(commands), commands, np.nan)
+    return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
+
+
+def _matlab(path: Path) -> dict[str, np.ndarray]:
+    """Signals of one of NTNU's files: one matrix, one column for each sample."""
+    try:
+        data = np.asarray(loadmat(path)[MATLAB], float)
+        if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop or not data.size:
+            raise ValueError(f"a matrix of shape {data.shape}")
+    except KeyError:
+        raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
+    except Exception as error:  # a broken file makes the reader stumble in many ways
+        raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
+    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE], *_power(data)]
+    return dict(zip(("time", *POSE, *FIVE, *POWER), rows, strict=True))
+
+
+def _power(data: np.ndarray) -> np.ndarray:
+    """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
+
+    The settings hold for stretches. In those that a controller steers, both VSP have the same sway
+    command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
+    limit.
+    """
+    bow, vsp = data[MATLAB_POWER]
+    alike = np.abs(data[MATLAB_FIVE][1] - data[MATLAB_FIVE][3]) < SAME_COMMAND
+    stretch = np.cumsum(
+        np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
+    )
+    steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
+    vsp, bow = np.where(steered, (bow, vsp), (vsp, bow))
+    return np.array([(np.maximum(vsp, 0.0) / FULL_VSP) ** 2, np.maximum(bow, 0.0) / FULL_BOW])
+
+
+def _tabular(path: Path) -> dict[str, np.ndarray]:
+    """Signals of a CSV or Parquet file."""
+    given = read_layout(path)
+    try:
+        names = _names(path, given or Layout())
+        layout = given or (LOG if LOG.column("x").name in names else Layout())
+        wanted = signals(layout, names, f"'{path}'")
+        table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
+    except ImportError:
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+    except InputError:
+        raise
+    except Exception as error:  # a broken file makes the readers stumble in many ways
+        text = " ".join(str(error).split())
+        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
+    columns = {}
+    for signal in wanted:
+        column = layout.column(signal)
+        if table.columns.tolist().count(column.name) > 1:
+            raise InputError(f"'{path}' has the column '{column.name}' more than once")
+        columns[signal] = to_si(_numbers(table[column.name], f"'{path}'"), signal, column)
+    return columns
+
+
+def _names(path: Path, layout: Layout) -> list[str]:
+    if path.suffix == ".parquet":
+        from pyarrow import parquet
+
+        return list(parquet.read_schema(path).names)
+    first = pd.read_csv(path, sep=layout.separator, nrows=0, encoding="utf-8-sig", index_col=False)
+    return [str(name).strip() for name in first.columns]
+
+
+def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
+    if path.suffix == ".parquet":
+        return pd.read_parquet(path, columns=wanted)
+    content = BytesIO(path.read_bytes())
+    try:
+        return _read_csv(content, layout, wanted)
+    except pd.errors.ParserError as error:
+        if READ_INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
+        raise
+
+
+def _read_csv(content: BytesIO, layout: Layout, wanted: list[str]) -> pd.DataFrame:
+    return pd.read_csv(
+        content,
+        sep=layout.separator,
+        decimal=layout.decimal,
+        usecols=lambda name: str(name).strip() in wanted,
+        encoding="utf-8-sig",
+        skipinitialspace=True,
+        index_col=False,
+    ).rename(columns=str.strip)
+
+
+def _numbers(cells: pd.Series, where: str) -> np.ndarray:
+    """A column as floats; empty cells are NaN."""
+    try:
+        numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
+        raise InputError(f"{where}: {cells.name} is not a column of numbers") from None
+    wrong = np.flatnonzero(np.isnan(numbers) & np.asarray(cells.notna()))
+    if wrong.size:
+        raise InputError(f"{where}: {cells.name} = {str(cells.iloc[wrong[0]])[:40]!r} is not a number")
+    return numbers

@@ -1,0 +1,175 @@
+"""The candidates: what each effect of a ship would add to the model error, as regressors.
+
+The regressors of a candidate are computed by the model itself with the effect switched on, so that a
+formula stands in the declaration of the effect and nowhere else. An effect whose force is linear in its
+coefficients has one shape; any other has several, one for each value tried of what it is nonlinear in.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from fmus.effects import Effect
+
+from ..model import Integrals, Model, omega
+
+SMALL = (
+    1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
+)
+# Values at which a failure's time is tried [1]: long runs must not take more memory.
+CHANGE_POINTS = 150
+CLOSEST = 5.0  # s, between two of them: the model error is an average over 3 s
+# A nonlinear effect without values of its own is tried at these multiples of the value at which its
+# force is as large as the model error, found between the smallest and the largest in steps of ten.
+MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
+SMALLEST, LARGEST = 1e-6, 1e6
+MOST = 0.5  # share of its largest force from which on it counts as saturated; chosen
+SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One way in which an effect may act.
+
+    Attributes:
+        given: parameter -> value that makes the shape, an addition to the model.
+        fitted: parameters that scale it.
+        offset: (K, 3), the force of what is given alone; None where that is nothing.
+        columns: (K, 3, p), force for one unit of each fitted parameter.
+        nuisance_offset: (q,), nuisance parameters together with what is given; None: as they are.
+        precision: (p, p), prior precision of the fitted ones; None: 0.
+    """
+
+    given: Mapping[str, float]
+    fitted: Sequence[str]
+    offset: np.ndarray | None
+    columns: np.ndarray
+    nuisance_offset: np.ndarray | None = None
+    precision: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect with the shapes that it can take on these data."""
+
+    effect: Effect
+    shapes: Sequence[Shape] = field(default_factory=list)
+
+
+def model_error(data: Sequence[Integrals], model: Model) -> np.ndarray:
+    """Model error (K, 3) [N, N, N m] of all runs one after the other."""
+    return np.concatenate([omega(w, model) for w in data])
+
+
+def shape(
+    data: Sequence[Integrals],
+    model: Model,
+    base: np.ndarray,
+    given: Mapping[str, float],
+    fitted: Sequence[str],
+    step: float = 1.0,
+) -> Shape:
+    """What the model gains by an effect: minus the change of the model error, by steps of ``step``."""
+    start = model_error(data, model.plus(given)) if given else base
+    columns = [(start - model_error(data, model.plus({**given, n: step}))) / step for n in fitted]
+    stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
+    return Shape(dict(given), list(fitted), base - start if given else None, stacked)
+
+
+def spacing(data: Sequence[Integrals]) -> float:
+    """Time between two change points [s] that are tried."""
+    return max(CLOSEST, float(max(w.run.time[-1] for w in data)) / CHANGE_POINTS)
+
+
+def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Prior precision of the values of a curve: its second differences are N(0, size^2).
+
+    The size is that at which the curve, were it the same everywhere, would be as large as the whole
+    model error: nodes without data follow their neighbours.
+
+    Args:
+        base: (K, 3), model error.
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    unit = np.square(columns.sum(axis=2))
+    axes = unit.sum(axis=0) > 0.0
+    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
+    bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
+    return bend.T @ bend
+
+
+def values_to_try(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
+) -> list[Mapping[str, float]]:
+    """The values at which a nonlinear effect is tried."""
+    times = e.search.change_points
+    declared = e.search.values(model.values)
+    if times:
+        # Of several times as many as there would be of one.
+        share = CHANGE_POINTS ** (1.0 - 1.0 / len(times))
+        every = spacing(data) * share
+        last = max(w.run.time[-1] for w in data)
+        instants = np.arange(every, last, every).tolist()
+        chosen = [dict(zip(times, at, strict=True)) for at in combinations(instants, len(times))]
+        return [{**at, **more} for at in chosen for more in declared or [{}]]
+    if declared or e.differentiable:
+        return declared
+    return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
+
+
+def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """Values to try as additions to a model: those of coefficients are, others are values themselves."""
+    return {n: x if n in e.coefficients else x - model.value(n) for n, x in values.items()}
+
+
+def scaled(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, name: str
+) -> Iterator[dict[str, float]]:
+    """Multiples of a coefficient's value at which its force is as large as the model error.
+
+    Where the force never is, because it saturates, of the value at which it has most of its largest.
+    The effect's other parameters are refined as well, from where they are.
+    """
+    allowed = next(p.range for p in e.parameters if p.name == name)
+    low = -LARGEST if allowed.min is None else allowed.min
+    high = LARGEST if allowed.max is None else allowed.max
+    wanted = float(np.square(base).sum())
+    others = {n: model.value(n) for n in e.shape_parameters}
+    others |= {n: 0.0 for n in e.coefficients if n != name}
+    for sign in (1.0, -1.0):
+        forces: dict[float, float] = {}
+        size = SMALLEST
+        while max(forces.values(), default=0.0) < wanted and low <= sign * size <= high:
+            change = base - model_error(data, model.plus({name: sign * size}))
+            forces[size] = float(np.square(change).sum())
+            size *= 10.0
+        largest = max(forces.values(), default=0.0)
+        if largest > SLIGHT:
+            size = next(s for s, force in forces.items() if force >= MOST * largest)
+            values = [sign * k * size for k in MULTIPLES]
+            yield from ({**others, name: value} for value in values if low <= value <= high)
+
+
+def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect) -> Candidate:
+    """An effect's shapes on these data."""
+    shapes: list[Shape] = []
+    # By inertia, current and measurement the model error changes smoothly, but not linearly.
+    hull = e.kind in ("force", "environment", "actuator") and e.linear
+    step = 1.0 if hull or not e.differentiable else SMALL
+    if e.differentiable and not e.search.change_points:
+        plain = shape(data, model, base, {}, e.fitted, step)
+        precision = smoothness(base, plain.columns) if e.search.smooth else None
+        shapes.append(replace(plain, precision=precision))
+    for values in values_to_try(data, model, base, e):
+        shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
+    return Candidate(e, shapes)
+
+
+def candidates(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[Candidate]:
+    """All effects that the ship can have and that a regression can find."""
+    ship = model.ship
+    effects = [ship.effects[name] for name in ship.candidates]
+    found = [candidate(data, model, base, e) for e in effects if e.search.by == "regression"]
+    return [c for c in found if c.shapes]

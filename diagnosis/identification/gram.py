@@ -1,0 +1,183 @@
+"""Gram matrices of all candidates, block by block.
+
+With the model error y and the regressors X of a block in units of the noise, a block holds
+[y X]^T [y X]. Sums over blocks give every regression, its folds and its bootstrap replicates without
+the data themselves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .candidates import Candidate
+
+# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
+# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
+OVERLAP = 4.0
+RUN = 10_000  # blocks of a run are numbered from this times its number on
+FOLDS = 8  # of cross-validation over blocks
+# Ridge of the regression for the noise, relative to the regressors: they may be collinear.
+NOISE_RIDGE = 1e-6
+
+Key = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """Nuisance parameters, fitted along with every candidate.
+
+    Their prior penalty is (offset + b)^T precision (offset + b) for a change b.
+
+    Attributes:
+        columns: (K, 3, q), force of one unit of each.
+        precision: (q, q), prior precision: 1 on the diagonal for a nominal coefficient, in prior
+            standard deviations; 0 for a parameter of an effect that was found before.
+        offset: (q,), how far each already is from its prior mean.
+    """
+
+    columns: np.ndarray
+    precision: np.ndarray
+    offset: np.ndarray
+
+
+class Fold(NamedTuple):
+    """Blocks held out (h,), and the Gram matrix (p, p) of all others."""
+
+    held: np.ndarray
+    train: np.ndarray
+
+
+class Entry(NamedTuple):
+    """One shape of a candidate among the columns.
+
+    Attributes:
+        given: index of the column of what is given, -1 without one.
+        columns: indices of its fitted columns.
+        start: (p,), where the fitted parameters are at first.
+        precision: (p, p), their prior precision.
+        offset: (q,), offset of the nuisance parameters that belongs to what is given.
+        nonlinear: number of parameters that are given, not fitted.
+    """
+
+    given: int
+    columns: list[int]
+    start: np.ndarray
+    precision: np.ndarray
+    offset: np.ndarray
+    nonlinear: int
+
+
+NOTHING: Key = (-1, 0)  # the key of no candidate at all
+
+
+@dataclass(frozen=True, eq=False)
+class GramTable:
+    """All columns of one problem as Gram matrices, block by block.
+
+    Attributes:
+        grams: (blocks, p, p), in units of the noise; column 0 is the model error.
+        rows: windows in each block.
+        runs: number of each block's run.
+        entries: (candidate, shape) -> its columns.
+        nuisance: indices of the nuisance parameters' columns.
+        precision: (q, q), their prior precision.
+        sigma: (3,), standard deviation of the noise of each axis [N, N, N m].
+    """
+
+    grams: np.ndarray
+    rows: np.ndarray
+    runs: np.ndarray
+    entries: dict[Key, Entry]
+    nuisance: list[int]
+    precision: np.ndarray
+    sigma: np.ndarray
+
+    @cached_property
+    def total(self) -> np.ndarray:
+        """(p, p), over all blocks."""
+        return self.grams.sum(axis=0)
+
+    @cached_property
+    def by_block(self) -> list[Fold]:
+        """Folds of interleaved blocks of all runs."""
+        return self._folds(np.arange(len(self.grams)) % FOLDS)
+
+    @cached_property
+    def by_run(self) -> list[Fold]:
+        """Each run as a fold of its own."""
+        return self._folds(self.runs)
+
+    def _folds(self, number: np.ndarray) -> list[Fold]:
+        held = [np.flatnonzero(number == n) for n in np.unique(number)]
+        return [Fold(k, self.total - self.grams[k].sum(axis=0)) for k in held]
+
+    @property
+    def per_parameter(self) -> float:
+        """Complexity penalty of one parameter: log n of the Bayesian information criterion."""
+        return float(np.log(3.0 * self.rows.sum() / OVERLAP))
+
+
+def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """RMS of what even all columns together leave of the model error, by axis, at least ``floor``."""
+    left = []
+    for axis in range(3):
+        A = columns[:, axis, :]
+        A = A[:, np.abs(A).max(axis=0) > 0.0]
+        scale = np.sqrt((A**2).mean(axis=0))
+        A = A / scale
+        gram = A.T @ A + NOISE_RIDGE * len(A) * np.eye(A.shape[1])
+        fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
+        left.append(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
+    return np.maximum(left, floor)
+
+
+def gram_table(
+    y: np.ndarray,
+    blocks: np.ndarray,
+    candidates: Sequence[Candidate],
+    nuisance: Nuisance,
+    sigma: np.ndarray,
+) -> GramTable:
+    """Gram matrices of some candidates.
+
+    Args:
+        y: (K, 3), model error [N, N, N m].
+        blocks: (K,), number of the block of each window.
+        candidates: with their shapes.
+        nuisance: parameters that are fitted along.
+        sigma: (3,), standard deviation of the noise of each axis.
+    """
+    columns = [y[:, :, None]]
+    count = 1
+    entries = {NOTHING: Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)}
+    for i, c in enumerate(candidates):
+        for j, s in enumerate(c.shapes):
+            given = -1
+            if s.offset is not None:
+                columns.append(s.offset[:, :, None])
+                given = count
+                count += 1
+            columns.append(s.columns)
+            size = len(s.fitted)
+            entries[i, j] = Entry(
+                given,
+                list(range(count, count + size)),
+                np.array([s.given.get(n, 0.0) for n in s.fitted]),
+                np.zeros((size, size)) if s.precision is None else s.precision,
+                nuisance.offset if s.nuisance_offset is None else s.nuisance_offset,
+                len(set(s.given) - set(s.fitted)),
+            )
+            count += size
+    columns.append(nuisance.columns)
+    indices = list(range(count, count + nuisance.columns.shape[2]))
+    A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
+    names = np.unique(blocks)
+    grams = np.empty((names.size, A.shape[2], A.shape[2]))
+    for k, name in enumerate(names):
+        part = A[blocks == name].reshape(-1, A.shape[2])
+        grams[k] = part.T @ part
+    rows = np.array([(blocks == name).sum() for name in names])
+    return GramTable(grams, rows, names // RUN, entries, indices, nuisance.precision, sigma)

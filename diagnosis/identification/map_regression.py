@@ -1,0 +1,166 @@
+"""Maximum a posteriori regression of the model error, and its cross-validated loss.
+
+With the model error y in units of the noise, the candidate's regressors X with coefficients beta, and
+the nuisance regressors Z with coefficients b, the fit minimises
+
+    |y - X beta - Z b|^2 + (beta_0 + beta)^T P (beta_0 + beta) + (o + b)^T Q (o + b),
+
+where P, Q are prior precisions and beta_0, o how far the parameters already are from their prior mean.
+A candidate's score is its loss on blocks that the fit has not seen, the prior penalty of the fit to all
+data, and log n for each effective parameter, tr((X^T X + P)^-1 X^T X), as of the Bayesian information
+criterion.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from .gram import Fold, GramTable
+
+RIDGE = 1e-9  # relative: collinear regressors share what they explain
+EMPTY = 1e-12  # sum of squares, in units of the noise, below which a column holds nothing on these data
+
+
+class Fit(NamedTuple):
+    """A fitted regression.
+
+    Attributes:
+        used, left: columns and their weights, whose sum is what is left of the model error.
+        beta: (p,), fitted coefficients of the candidate.
+        penalty: prior penalty of all fitted parameters.
+    """
+
+    used: np.ndarray
+    left: np.ndarray
+    beta: np.ndarray
+    penalty: float
+
+    def loss(self, grams: np.ndarray) -> np.ndarray:
+        """Sum of squares left in each of some Gram matrices (..., p, p)."""
+        part = grams[..., self.used[:, None], self.used]
+        return (part @ self.left) @ self.left
+
+
+class Regression(NamedTuple):
+    """One shape of a candidate, and the nuisance parameters.
+
+    Attributes:
+        target: (p,), weights of the columns that are to be explained.
+        use: columns fitted: the candidate's, then the nuisance parameters'.
+        free: how many of them are the candidate's.
+        precision, offset: their prior precision, and distance from the prior mean at first.
+        nonlinear: number of parameters that were given, not fitted.
+    """
+
+    target: np.ndarray
+    use: np.ndarray
+    free: int
+    precision: np.ndarray
+    offset: np.ndarray
+    nonlinear: int
+
+    def fitted(self, gram: np.ndarray) -> Fit:
+        """The maximum a posteriori fit to data with a Gram matrix (p, p)."""
+        H = gram[self.use[:, None], self.use] + self.precision
+        diagonal = np.einsum("ii->i", H)
+        diagonal += RIDGE * (diagonal + 1.0)
+        given = np.flatnonzero(self.target)
+        right = gram[self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
+        beta = np.linalg.solve(H, right)
+        last = self.offset + beta
+        return Fit(
+            np.concatenate([given, self.use]),
+            np.concatenate([self.target[given], -beta]),
+            beta[: self.free],
+            float(last @ self.precision @ last),
+        )
+
+    def size(self, gram: np.ndarray) -> float:
+        """Effective number of the candidate's parameters, those that were given included."""
+        k = self.use[: self.free]
+        data = gram[k[:, None], k]
+        ridge = RIDGE * np.diag(np.diag(data) + 1.0)
+        inverse = np.linalg.solve(data + self.precision[: k.size, : k.size] + ridge, data)
+        return float(np.trace(inverse)) + self.nonlinear
+
+
+def regression(t: GramTable, candidate: int, shape: int) -> Regression:
+    """A candidate's shape as a regression; candidate -1 is none at all."""
+    entry = t.entries[candidate, shape]
+    target = np.zeros(t.grams.shape[1])
+    target[0] = 1.0
+    if entry.given >= 0:
+        target[entry.given] = -1.0
+    plain = not entry.precision.any()
+    live = np.array([k for k, c in enumerate(entry.columns) if not plain or t.total[c, c] > EMPTY], int)
+    use = np.array([*[entry.columns[k] for k in live], *t.nuisance])
+    precision = np.asarray(block_diag(entry.precision[live[:, None], live], t.precision))
+    offset = np.concatenate([entry.start[live], entry.offset])
+    return Regression(target, use, live.size, precision, offset, entry.nonlinear)
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A candidate with its cross-validated loss.
+
+    Attributes:
+        candidate, shape: which, and the shape that fits all data best.
+        blocks: (blocks,), loss of each block by a fit that has not seen it.
+        runs: loss of all runs, each by a fit to the others; that of the blocks where there is one run.
+        penalty: complexity penalty, and prior penalty of the fit to all data.
+    """
+
+    candidate: int
+    shape: int
+    blocks: np.ndarray
+    runs: float
+    penalty: float
+
+    @property
+    def score(self) -> float:
+        """Lower is better."""
+        return float(self.blocks.sum()) + self.penalty
+
+
+def score(t: GramTable, candidate: int, shapes: int) -> Scored:
+    """Score of a candidate; in each fold its shape is chosen by the training part."""
+    options = [regression(t, candidate, k) for k in range(shapes)]
+    by_block = held_out_loss(t, options, t.by_block)
+    by_run = held_out_loss(t, options, t.by_run) if len(t.by_run) > 1 else by_block
+    fits = [o.fitted(t.total) for o in options]
+    shape = int(np.argmin([float(f.loss(t.total)) + f.penalty for f in fits]))
+    penalty = options[shape].size(t.total) * t.per_parameter + fits[shape].penalty
+    return Scored(candidate, shape, by_block, float(by_run.sum()), penalty)
+
+
+def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Sequence[Fold]) -> np.ndarray:
+    """Loss of each block (blocks,) by the fit, of the shape that does best, to all other folds."""
+    found = np.empty(len(t.grams))
+    for held, train in folds:
+        fits = [o.fitted(train) for o in options]
+        best = min(fits, key=lambda one, train=train: float(one.loss(train)) + one.penalty)
+        found[held] = [best.loss(t.grams[k]) for k in held]
+    return found
+
+
+def first_share(
+    t: GramTable, scored: Sequence[Scored], replicates: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Share of block-bootstrap replicates in which each of some candidates comes first."""
+    wins = np.zeros(len(scored))
+    count = len(t.grams)
+    models = [regression(t, s.candidate, s.shape) for s in scored]
+    sizes = [m.size(t.total) for m in models]
+    for _ in range(replicates):
+        weights = np.bincount(rng.integers(0, count, count), minlength=count).astype(float)
+        gram = np.tensordot(weights, t.grams, axes=1)
+        fits = [m.fitted(gram) for m in models]
+        scores = [
+            float(f.loss(gram)) + f.penalty + size * t.per_parameter
+            for f, size in zip(fits, sizes, strict=True)
+        ]
+        wins[int(np.argmin(scores))] += 1
+    return wins / replicates

@@ -1,0 +1,254 @@
+"""Gauss-Newton refinement: effects and nuisance parameters moved together to their most likely values.
+
+With the model error r(theta) in units of the noise, the cost is
+
+    |r(theta)|^2 + theta^T P theta,
+
+P the prior precision of all parameters about their prior means. A step solves
+(J^T J + P) delta = J^T r - P theta, halved while the cost does not fall. The slopes J by the nuisance
+parameters hardly change on the way and are taken once; those of a new effect anew at each step.
+Change points have no slope: they are searched around their first guess.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from fmus.ship import Ship
+
+from ..model import Integrals, Model
+from .candidates import SMALL, Shape, model_error, spacing
+from .gram import OVERLAP, Nuisance
+from .map_regression import RIDGE
+from .prior import NominalPrior
+
+STEPS = 5  # of Gauss-Newton, at the most
+ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
+SMALLEST_SCALE = 1e-2  # of a parameter, by which the step of its finite difference is scaled
+HALVINGS = (1.0, 0.5, 0.25)
+# Steps [s] by which a change point is searched, the last a few samples of a slow measurement.
+CHANGE_POINT_STEPS = (1.0, 0.2)
+REACH = 5  # of these steps to both sides
+LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one degree of freedom
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSet:
+    """What a model is fitted to.
+
+    Attributes:
+        data: windows of every run.
+        blocks: (K,), number of the block of each window.
+        sigma: (3,), noise of each axis [N, N, N m]; None as long as it is not known.
+        prior: of the nominal coefficients.
+    """
+
+    data: Sequence[Integrals]
+    blocks: np.ndarray
+    sigma: np.ndarray | None
+    prior: NominalPrior
+
+    @property
+    def weight(self) -> np.ndarray:
+        """(3,), what an error counts on each axis."""
+        return 1.0 / np.asarray(self.sigma) / np.sqrt(OVERLAP)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A model on the way to the most likely one.
+
+    Attributes:
+        start: the model that the user gave.
+        offset: nominal coefficients, each in prior standard deviations from its prior mean.
+        values: parameters of the effects that were found, as additions.
+        precision: prior precision of those of them that are fitted.
+    """
+
+    start: Model
+    offset: np.ndarray
+    values: Mapping[str, float] = field(default_factory=dict)
+    precision: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @classmethod
+    def at(cls, start: Model, prior: NominalPrior) -> "Estimate":
+        """The start."""
+        return cls(start, np.zeros(prior.size))
+
+    def model(self, prior: NominalPrior) -> Model:
+        """The model with all of it."""
+        return self.start.plus(self.values).plus(prior.changes(self.offset))
+
+    @property
+    def fitted(self) -> list[str]:
+        """Those values that are fitted by slopes."""
+        searched = change_points(self.start.ship)
+        return [n for n in self.values if n not in searched]
+
+    def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "Estimate":
+        """The estimate with additions, effects' parameters within their range."""
+        names = (*self.values, *values)
+        together = {n: self.values.get(n, 0.0) + values.get(n, 0.0) for n in names}
+        within = {n: bounded(self.start, n, v) for n, v in together.items()}
+        return replace(self, values=within, offset=self.offset + offset)
+
+
+def change_points(ship: Ship) -> frozenset[str]:
+    """Parameters of a ship's effects that are times within a run."""
+    return frozenset(n for e in ship.effects.values() for n in e.search.change_points)
+
+
+def bounded(start: Model, name: str, addition: float) -> float:
+    """An addition to a parameter of a model, with which it stays within its range."""
+    limits, present = start.declared(name).range, start.value(name)
+    low = -np.inf if limits.min is None else limits.min
+    high = np.inf if limits.max is None else limits.max
+    return min(max(addition, low - present), high - present)
+
+
+def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:
+    """Force (K, 3) that the model gains by one unit of a parameter."""
+    small = SMALL * max(abs(scale), SMALLEST_SCALE)
+    return (left - model_error(t.data, model.plus({name: small}))) / small
+
+
+def nuisance(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
+    """What is fitted along with every candidate: effects found before, and nominal coefficients.
+
+    Args:
+        t: what is fitted to.
+        at: the model so far.
+        base: its model error (K, 3).
+    """
+    model = at.model(t.prior)
+    fitted = at.fitted
+    columns = [slope(t, model, base, n, at.values[n]) for n in fitted]
+    for n, std in t.prior.std.items():
+        none = np.zeros_like(base)
+        columns.append(std * slope(t, model, base, n, t.prior.mean[n]) if std else none)
+    precision = np.asarray(block_diag(at.precision, np.eye(t.prior.size)))
+    offset = np.array([*[at.values[n] for n in fitted], *at.offset])
+    return Nuisance(np.stack(columns, axis=2), precision, offset)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A candidate's parameters to start from.
+
+    Attributes:
+        values: parameter -> value.
+        fitted: those that are fitted by slopes.
+        precision: prior precision of these.
+    """
+
+    values: Mapping[str, float]
+    fitted: Sequence[str]
+    precision: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A candidate at its most likely values.
+
+    Attributes:
+        estimate: the model with it.
+        left: (K, 3), its model error.
+        columns: (K, 3, p), slopes by the parameters that were fitted.
+        cost: sum of squares and prior penalty.
+        intervals: 95 % interval of each change point [s].
+    """
+
+    estimate: Estimate
+    left: np.ndarray
+    columns: np.ndarray
+    cost: float
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+    """A candidate, the effects found before and the nominal coefficients at their most likely values.
+
+    Args:
+        t: what is fitted to.
+        at: the model so far.
+        along: nuisance parameters, from :func:`nuisance`.
+        start: of the new effect.
+    """
+    if change_points(at.start.ship) & set(start.values):
+        return _with_change_points(t, at, along, start)
+    return _gauss_newton(t, at, along, start)
+
+
+def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+    fitted = [*start.fitted, *at.fitted]
+    precision = np.asarray(block_diag(start.precision, along.precision))
+    weight = t.weight
+
+    def evaluate(estimate: Estimate) -> Refined:
+        model = estimate.model(t.prior)
+        left = model_error(t.data, model)
+        columns = [slope(t, model, left, n, estimate.values[n]) for n in start.fitted]
+        stacked = np.stack(columns, axis=2) if columns else np.zeros((*left.shape, 0))
+        theta = parameters(estimate)
+        cost = float(((left * weight) ** 2).sum() + theta @ precision @ theta)
+        return Refined(estimate, left, stacked, cost)
+
+    def parameters(estimate: Estimate) -> np.ndarray:
+        return np.array([*[estimate.values[n] for n in fitted], *estimate.offset])
+
+    best = evaluate(at.plus(start.values, np.zeros(t.prior.size)))
+    for _ in range(STEPS):
+        columns = np.concatenate([best.columns, along.columns], axis=2)
+        A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
+        H = A.T @ A + precision
+        H += RIDGE * np.diag(np.diag(H) + 1.0)
+        right = A.T @ (best.left * weight).reshape(-1) - precision @ parameters(best.estimate)
+        delta = np.linalg.solve(H, right)
+        further = best
+        for share in HALVINGS:
+            step = dict(zip(fitted, (share * delta).tolist(), strict=False))
+            further = evaluate(best.estimate.plus(step, share * delta[len(fitted) :]))
+            if further.cost < best.cost:
+                break
+        gained = best.cost - further.cost
+        if gained > 0.0:
+            best = further
+        if gained < ENOUGH:
+            break
+    return best
+
+
+def _with_change_points(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+    """The same with the change points searched one after the other around their first guess [s]."""
+    names = [n for n in start.values if n in change_points(at.start.ship)]
+    least = CHANGE_POINT_STEPS[-1]
+
+    def tried(times: Mapping[str, float]) -> Refined:
+        later = {n: max(time, least) for n, time in times.items()}
+        return _gauss_newton(t, at, along, replace(start, values={**start.values, **later}))
+
+    found = tried({n: start.values[n] for n in names})
+    coarse = spacing(t.data) / REACH
+    sizes = (coarse, *CHANGE_POINT_STEPS) if coarse > CHANGE_POINT_STEPS[0] else CHANGE_POINT_STEPS
+    every: dict[str, list[Refined]] = {n: [found] for n in names}
+    for size in sizes:
+        for name in names:
+            times = {n: found.estimate.values[n] for n in names}
+            around = [tried({**times, name: times[name] + k * size}) for k in range(-REACH, REACH + 1)]
+            every[name] += around
+            found = min([found, *around], key=lambda r: r.cost)
+    intervals = {}
+    for name, trials in every.items():
+        likely = [r.estimate.values[name] for r in trials if r.cost < found.cost + LIKELY]
+        intervals[name] = (min(likely) - least, max(likely) + least)
+    return replace(found, intervals=intervals)
+
+
+def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:
+    """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
+    given = {n: v for n, v in r.estimate.values.items() if n not in at.values}
+    fitted = [r.estimate.values[n] for n in at.fitted]
+    offset = np.array([*fitted, *r.estimate.offset])
+    return Shape(given, list(start.fitted), base - r.left, r.columns, offset, start.precision)

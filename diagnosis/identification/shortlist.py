@@ -1,0 +1,218 @@
+"""One step of the forward selection: all effects of the ship as candidates, the best of them refined.
+
+All candidates are scored by a regression that is linear in their parameters; the best of them are then
+refined and scored again, with the axes weighted by what even the best leaves over.
+"""
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from .candidates import Candidate, candidates, model_error
+from .gram import GramTable, Nuisance, gram_table, noise
+from .map_regression import RIDGE, Regression, Scored, regression, score
+from .refinement import (
+    Estimate,
+    Refined,
+    Start,
+    TrainingSet,
+    as_shape,
+    change_points,
+    nuisance,
+    refine,
+)
+
+LENGTH = 8  # of the shortlist
+# Share of a force that must be its own for data to tell its cause from another, or from those found:
+# below 5 % no manoeuvre of the study in which this was tried could (method of the project, chosen).
+SEPARATION = 0.05
+REWEIGHTINGS = 4  # at the most
+CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
+# A curve that can do what an effect with this many parameters fewer does is no other explanation of it.
+FREE_SHAPE = 5
+FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
+TIE = 2.0  # paired standard errors within which two candidates are alike
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """All candidates beside a model, linear in their parameters.
+
+    Attributes:
+        base: (K, 3), the model's error.
+        nuisance: parameters that are fitted along.
+        table: all candidates.
+        candidates: in the table's order.
+        order: the candidates scored, best first.
+        nothing: the score without any.
+    """
+
+    base: np.ndarray
+    nuisance: Nuisance
+    table: GramTable
+    candidates: Sequence[Candidate]
+    order: Sequence[Scored]
+    nothing: Scored
+
+    @property
+    def size(self) -> float:
+        """Sum of squares of the model error, in units of the noise."""
+        return float(self.table.total[0, 0])
+
+
+def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
+    """Score every effect that is not known yet."""
+    model = at.model(t.prior)
+    base = model_error(t.data, model)
+    found = [c for c in candidates(t.data, model, base) if c.effect.id not in known]
+    along = nuisance(t, at, base)
+    linear = [s.columns for c in found for s in c.shapes[:1]]
+    sigma = noise(base, np.concatenate([*linear, along.columns], axis=2), FLOOR)
+    return weighted(t, sigma, base, along, found)
+
+
+def weighted(
+    t: TrainingSet,
+    sigma: np.ndarray,
+    base: np.ndarray,
+    along: Nuisance,
+    found: Sequence[Candidate],
+) -> Ranking:
+    """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
+    table = gram_table(base, t.blocks, found, along, sigma)
+    free = len(along.offset) - t.prior.size
+    new = [k for k in range(len(found)) if novelty(table, k, free) >= SEPARATION]
+    order = in_order([score(table, k, len(found[k].shapes)) for k in new])
+    return Ranking(base, along, table, found, order, score(table, -1, 1))
+
+
+def novelty(t: GramTable, candidate: int, free: int) -> float:
+    """Share of a linear candidate's force that what was found cannot give, set freely; else 1.
+
+    Args:
+        t: the table it stands in.
+        candidate: its number.
+        free: how many of the nuisance parameters, the first, are of effects that were found.
+    """
+    entry = t.entries[candidate, 0]
+    mine = entry.columns
+    if free == 0 or entry.given >= 0 or not mine:
+        return 1.0
+    found = t.nuisance[:free]
+    own, gram, across = t.total[mine][:, mine], t.total[found][:, found], t.total[found][:, mine]
+    gram = gram + RIDGE * np.diag(np.diag(gram) + 1.0)
+    left = np.diag(own - across.T @ np.linalg.solve(gram, across))
+    return float(np.max(left / np.maximum(np.diag(own), 1e-12)))
+
+
+def in_order(scored: Sequence[Scored]) -> list[Scored]:
+    """The best first; of two that are the same on any data the one that was declared first."""
+    return sorted(scored, key=lambda s: (round(s.score, 2), s.candidate))
+
+
+@dataclass(frozen=True, eq=False)
+class Shortlist:
+    """The best candidates of a ranking, refined.
+
+    Attributes:
+        ids: of their effects.
+        starts, refined: where they started from, and where they came to.
+        table: all of them.
+        scored: best first; their candidates are indices of the above.
+    """
+
+    ids: Sequence[str]
+    starts: Sequence[Start]
+    refined: Sequence[Refined]
+    table: GramTable
+    scored: Sequence[Scored]
+
+    @property
+    def winner(self) -> Estimate:
+        """The model with the best of them."""
+        best = self.scored[0].candidate
+        estimate = self.refined[best].estimate
+        precision = block_diag(estimate.precision, self.starts[best].precision)
+        return replace(estimate, precision=np.asarray(precision))
+
+
+def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
+    """Refine the best candidates and score them again."""
+    best = sorted(ranking.order[:LENGTH], key=lambda s: s.candidate)
+    effects = [ranking.candidates[s.candidate].effect for s in best]
+    starts = [start(at, ranking, s) for s in best]
+    refined = [refine(t, at, ranking.nuisance, s) for s in starts]
+    shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
+    found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
+    table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
+    scored = in_order([score(table, k, 1) for k in range(len(best))])
+    return Shortlist([e.id for e in effects], starts, refined, table, scored)
+
+
+def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[TrainingSet, Ranking, Shortlist]:
+    """A shortlist in which an error counts by what even the best candidate leaves over.
+
+    Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
+    such would move the nominal coefficients to wherever it becomes a little less.
+
+    Args:
+        t, at, ranking: all candidates beside a model.
+    """
+    least = ranking.table.sigma
+    t = replace(t, sigma=least)
+    found = shortlist(t, at, ranking)
+    for _ in range(REWEIGHTINGS):
+        left = found.refined[found.scored[0].candidate].left
+        sigma = np.maximum(least, np.sqrt(np.mean(left**2, axis=0)))
+        change = sigma / ranking.table.sigma
+        if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
+            break
+        t = replace(t, sigma=sigma)
+        ranking = weighted(t, sigma, ranking.base, ranking.nuisance, ranking.candidates)
+        found = shortlist(t, at, ranking)
+    return t, ranking, found
+
+
+def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
+    """A candidate's parameters by the linear fit; those without any data stay out."""
+    shape = ranking.candidates[best.candidate].shapes[best.shape]
+    mine = regression(ranking.table, best.candidate, best.shape)
+    beta = dict(zip(mine.use.tolist(), mine.fitted(ranking.table.total).beta, strict=False))
+    columns = ranking.table.entries[best.candidate, best.shape].columns
+    found = {n: float(beta[k]) for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
+    values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
+    fitted = [n for n in values if n not in change_points(at.start.ship)]
+    size = len(fitted)
+    precision = np.zeros((size, size)) if shape.precision is None else shape.precision
+    return Start(values, fitted, precision)
+
+
+def alike(t: GramTable, best: Scored, other: Scored) -> bool:
+    """Whether another candidate is within two paired standard errors, or can do what the best does."""
+    d = other.blocks - best.blocks
+    behind = float(d.sum()) + other.penalty - best.penalty
+    if behind <= TIE * float(np.sqrt(len(d)) * d.std()):
+        return True
+    mine, its = (regression(t, s.candidate, s.shape) for s in (best, other))
+    return its.free < mine.free + FREE_SHAPE and separation(t, mine, its) < SEPARATION
+
+
+def separation(t: GramTable, mine: Regression, its: Regression) -> float:
+    """Share of the best one's force that the other and the nominal coefficients cannot give."""
+    force = own_force(t, mine)
+    force[mine.use[: mine.free]] += mine.fitted(t.total).beta
+    offset = 0.0 * t.entries[-1, 0].offset
+    nothing = Regression(force, mine.use[mine.free :], 0, t.precision, offset, 0)
+    other = its._replace(target=force - own_force(t, its), offset=0.0 * its.offset)
+    costs = [float(f.loss(t.total)) + f.penalty for f in (x.fitted(t.total) for x in (nothing, other))]
+    return costs[1] / max(costs[0], 1e-12)
+
+
+def own_force(t: GramTable, which: Regression) -> np.ndarray:
+    """(p,), the force of what is given of a candidate, without the coefficients that moved with it."""
+    force = -which.target
+    force[0] = 0.0
+    force[t.nuisance] -= which.offset[which.free :] - t.entries[-1, 0].offset
+    return force

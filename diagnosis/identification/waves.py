@@ -1,0 +1,183 @@
+"""Waves, found by a peak in the spectrum of the model error.
+
+They come and go with no parameter of the ship, so nothing is fitted to them. They are looked for in what
+the best model leaves over, as a ship that is held by a controller swings, too; the windows of the weak
+form let hardly any of them through.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import spectrogram
+
+from fmus.frames import rotate_to_body
+
+from ..data import Track
+from ..model import Model
+from ..model.thrust import Response, thrust
+from ..model.weak_form import acceleration, by_mass
+from ..smoothing import Smoothed, smooth
+
+# The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
+BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
+PEAK = 4.0  # times the spectrum around it
+FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes from the commands
+FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
+AROUND = 0.9  # Hz, width of the spectrum around
+SEGMENT = 25.0  # s; six periods of the slowest wave
+NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
+REPLICATES = 200  # of the bootstrap over segments
+RATE = 10.0  # Hz; half of it is far above the band
+
+
+@dataclass(frozen=True)
+class Waves:
+    """What the spectrum shows.
+
+    Attributes:
+        peak: frequency [rad/s].
+        force: standard deviation of the horizontal force around the peak [N].
+        share: of the model error's power, on the axis where they stand out most.
+        confidence: share of bootstrap replicates in which they stand out.
+    """
+
+    peak: float
+    force: float
+    share: float
+    confidence: float
+
+
+class Peak(NamedTuple):
+    """A peak above the spectrum around it: index of frequency and axis, how many times higher."""
+
+    row: int
+    axis: int
+    height: float
+
+
+def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> Waves | None:
+    """The waves in some runs, if there are any.
+
+    Args:
+        runs: smoothed runs.
+        model: the most likely one; what it leaves over is looked at.
+        rng: for the bootstrap.
+    """
+    left, noise, white = [], [], []
+    for smoothed in runs:
+        run = smooth(smoothed.track, driven=False)
+        error = model_error(run, model)
+        left += stretches(error, run.time)
+        white.append(2.0 * run.noise**2 * run.track.period)
+        other = redrawn(run, rng)
+        del run  # of a long run there is not room for two
+        noise += stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time)
+    if not left or not noise:
+        return None
+    frequency, segments = segments_of(left)
+    floor = segments_of(noise)[1].mean(axis=-1)
+    power = segments.mean(axis=-1)
+    band = inside(frequency, floor, np.mean(white, axis=0), model.reference_mass)
+    level, found = peak(frequency, power, floor, band)
+    count = segments.shape[-1]
+    least = PEAK + FEW / count
+    if found.height < least:
+        return None
+    draws = rng.integers(0, count, (REPLICATES, count))
+    heights = [peak(frequency, segments[..., d].mean(axis=-1), floor, band)[1].height for d in draws]
+    at = float(frequency[found.row])
+    near = np.abs(frequency - at) < NEAR * at
+    extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
+    return Waves(
+        2.0 * np.pi * at,
+        float(np.sqrt(extra[:2].sum() * frequency[1])),
+        float(extra[found.axis] / power[:, found.axis].sum()),
+        float(np.mean(np.array(heights) >= least)),
+    )
+
+
+def redrawn(run: Smoothed, rng: np.random.Generator) -> Track:
+    """The run as it was smoothed, with other noise of the same strength."""
+    pose = run.eta + run.noise * rng.standard_normal(run.eta.shape)
+    return replace(run.track, pose=np.where(run.used[:, None], pose, run.track.pose))
+
+
+def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments)."""
+    length = round(SEGMENT * RATE)
+    found = [spectrogram(x, RATE, nperseg=length, axis=0, detrend="linear") for x in parts]
+    return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
+
+
+def followed(
+    frequency: np.ndarray, noise: np.ndarray, white: np.ndarray, mass: np.ndarray
+) -> np.ndarray:
+    """Share (m, 3) of a motion that the smoother follows, as a spline of white jerk does.
+
+    Args:
+        frequency: (m,) [Hz].
+        noise: (m, 3), spectrum of the force that noise makes.
+        white: (3,), spectrum of the noise of the measurement [m2/Hz, m2/Hz, rad2/Hz].
+        mass: (3, 3), mass matrix by which accelerations are forces.
+    """
+    level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
+    whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
+    low = share < 0.25  # half of a motion is a quarter of its power
+    corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
+    return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
+
+
+def inside(frequency: np.ndarray, noise: np.ndarray, white: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Where waves are looked for (m, 3); arguments as of :func:`followed`."""
+    band = (frequency >= BAND[0]) & (frequency <= BAND[1])
+    return band[:, None] & (followed(frequency, noise, white, mass) >= FOLLOWED)
+
+
+def peak(
+    frequency: np.ndarray, power: np.ndarray, floor: np.ndarray, band: np.ndarray
+) -> tuple[np.ndarray, Peak]:
+    """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
+
+    Args:
+        frequency: (m,) [Hz].
+        power: (m, 3), spectrum.
+        floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
+        band: (m, 3), where a peak counts.
+    """
+    width = 2 * int(AROUND / frequency[1] / 2.0) + 1
+    floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
+    level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
+    height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
+    row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
+    return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def model_error(run: Smoothed, model: Model) -> np.ndarray:
+    """omega (n, 3) [N, N, N m] by the smoothed acceleration, NaN where there is none."""
+    u_dot, v_dot = rotate_to_body(run.eta[:, 2], run.eta_ddot[:, 0], run.eta_ddot[:, 1])
+    u, v, r = run.nu.T
+    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, run.eta_ddot[:, 2]])
+    response = Response(run.track.run, model)
+    driven = by_mass(model, thrust(run.track.run, response, np.nan_to_num(run.nu)))
+    free = acceleration(model, run.time, run.eta, run.nu)
+    return (nu_dot - free - driven) @ model.reference_mass.T
+
+
+def stretches(error: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, at RATE."""
+    known = np.isfinite(error).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    found = []
+    for first, end in edges.reshape(-1, 2):
+        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / RATE)
+        if even.size < SEGMENT * RATE:
+            continue
+        # Means over each interval: what is quicker must not pass for something slow.
+        sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
+        at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
+        found.append(np.diff(at, axis=0) * RATE)
+    return found

@@ -1,0 +1,104 @@
+"""A model as a file: an SSP 1.0 parameter set with what differs from the nominal model.
+
+``python -m cosim.run SCENARIO --parameters model.ssv`` runs with it, ``python -m fmus.build --parameters
+model.ssv`` makes FMUs that have it, and any tool that knows SSP can bind it to ours.
+"""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from cosim import (
+    BASE_UNITS,
+    InputError,
+    Parameter,
+    ParameterSet,
+    Unit,
+    read_parameters,
+    write_parameters,
+)
+from cosim.errors import nearest
+from fmus.base_units import base_exponents
+from fmus.declare import Variable
+from fmus.ship import Ship, ship
+
+from .ship_model import Model
+
+MEASUREMENT = "measurement"
+# What a tool is told of a parameter that no FMU has.
+NO_FMU = "of the measurement system, which no FMU has; in a scenario it is a fault"
+
+
+def write_model(path: Path, model: Model) -> None:
+    """Write a model as a parameter set.
+
+    What equals its nominal value is left out: the file of the nominal model is an empty set. No FMU has
+    a parameter of the measurement system, such as the offset of its clock: it stands in an
+    annotation, which :func:`read_model` knows, and of which ``cosim.run`` says that it has no effect.
+
+    Args:
+        path: ``.ssv``; an older file is replaced.
+        model: its parameters may be of a user's effects, if those were loaded.
+
+    Raises:
+        InputError: a parameter that no FMU has, or a value that its FMU would refuse.
+    """
+    values: dict[str, dict[str, Parameter]] = {}
+    for part, declared in model.ship.parameters.items():
+        values[part] = {}
+        for name, value in getattr(model, part).items():
+            v = _find(name, declared, f"{part}.{name}")
+            if _within(float(value), v, f"{part}.{name}") != v.start:
+                text = f"{v.description}; {NO_FMU}" if part == MEASUREMENT else v.description
+                values[part][name] = Parameter(float(value), v.unit, text)
+    beside = values.pop(MEASUREMENT)
+    used = [str(given.unit) for group in (*values.values(), beside) for given in group.values()]
+    units = {unit: base_exponents(unit) for unit in sorted(set(used))}
+    write_parameters(path, ParameterSet(values, units, beside, "model"))
+
+
+def read_model(path: Path, of: Ship | None = None) -> Model:
+    """A model from a parameter set.
+
+    Args:
+        path: ``.ssv``; a value without a unit is in that of the FMU.
+        of: the ship that it is a model of; by default with the effects of this project.
+
+    Raises:
+        InputError: no parameter set, a model or parameter that is not ours, a value or unit that does
+            not fit.
+    """
+    given = read_parameters(path)
+    of = of or ship()
+    declared = {part: names for part, names in of.parameters.items() if part != MEASUREMENT}
+    found: dict[str, dict[str, float]] = {part: {} for part in declared}
+    for part, values in given.values.items():
+        if part not in declared:
+            raise InputError(f"'{path}' has values for '{part}'{nearest(part, declared)}")
+        for name, parameter in values.items():
+            where = f"'{path}': {part}.{name}"
+            v = _find(name, declared[part], where)
+            own = base_exponents(v.unit)
+            unit = Unit(v.unit, tuple(own.get(base, 0) for base in BASE_UNITS))
+            found[part][name] = _within(given.number(parameter, unit, where), v, where)
+    known = of.parameters[MEASUREMENT]
+    beside = {name: p.value for name, p in given.beside.items() if name in known}
+    return Model(found["vessel"], found["thrusters"], beside, of)
+
+
+def _find(name: str, declared: Mapping[str, Variable], where: str) -> Variable:
+    if name not in declared:
+        raise InputError(
+            f"{where} is no parameter{nearest(name, declared)}; one of an effect of your own "
+            "needs --effects FILE.py"
+        )
+    return declared[name]
+
+
+def _within(value: float, v: Variable, where: str) -> float:
+    """The value, if its FMU would take it."""
+    low = -math.inf if v.range.min is None else v.range.min
+    high = math.inf if v.range.max is None else v.range.max
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InputError(f"{where} = {value:g} is not a number from {low:g} to {high:g}")
+    return value

@@ -1,0 +1,186 @@
+"""Many short predictions at once, with the very physics of the vessel and the thrusters.
+
+The functions of :mod:`fmus` run on arrays: one column for each window, one row for each set of
+parameters. Of the five commands of the real ship each propeller is a thruster set of its own; elsewhere
+there is one.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fmus.effects import Running
+from fmus.frames import rotate_to_body
+from fmus.ops import when, wrap
+from fmus.signals import Force
+from fmus.thrusters import chain
+from fmus.vessel import vessel
+
+from ..smoothing import Smoothed
+from .ship_model import Model
+from .thrust import IDLE, Response, commanded_shares, placed, places
+
+LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
+INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Windows, of one run or more, that are predicted together.
+
+    Attributes:
+        runs: each run with the rows of the first samples of its windows.
+        h: step of integration [s], a whole part of the time between two rows.
+        steps: in a window.
+        five: whether there are five commands.
+    """
+
+    runs: tuple[tuple[Smoothed, np.ndarray], ...]
+    h: float
+    steps: int
+    five: bool
+
+    def first(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
+        """(..., w): what an array (n, ...) of each run holds where windows begin."""
+        return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
+
+    @property
+    def powered(self) -> bool:
+        """Whether any run tells the power of its thrusters."""
+        return any(smoothed.track.run.power is not None for smoothed, _ in self.runs)
+
+    def times(self, clock: float) -> list[np.ndarray]:
+        """Middle of each step, (steps, w) for each run, as commands are stamped.
+
+        Args:
+            clock: seconds by which a pose is older than its stamp.
+        """
+        middle = (np.arange(self.steps)[:, None] + 0.5) * self.h - clock
+        return [smoothed.time[rows] + middle for smoothed, rows in self.runs]
+
+    def power(self, clock: float) -> np.ndarray:
+        """(steps, 2, w): power of VSP and bow thruster, argument as of :meth:`times`."""
+        found = []
+        for (smoothed, _), time in zip(self.runs, self.times(clock), strict=True):
+            run = smoothed.track.run
+            row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+            found.append(np.ones((*row.shape, 2)) if run.power is None else run.power[row])
+        return np.concatenate(found, axis=1).transpose(0, 2, 1)
+
+    def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
+        """Commands that arrive and shares of full force that act, each (steps, 3, sets, 1, w)."""
+        found = []
+        for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
+            response = Response(smoothed.track.run, model, not at_rest(smoothed))
+            if response.slow:
+                start = smoothed.time[rows] + np.arange(self.steps)[:, None] * self.h
+                found.append(response.mean(start, start + self.h))
+            else:
+                commands = held(smoothed, model, time)
+                found.append((commands, commands))
+        given, acting = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        return given.transpose(0, 3, 2, 1)[:, :, :, None], acting.transpose(0, 3, 2, 1)[:, :, :, None]
+
+
+def at_rest(smoothed: Smoothed) -> bool:
+    """Whether a ship hardly moves at the start of a run."""
+    known = np.isfinite(smoothed.nu[:, 0])
+    return bool((np.abs(smoothed.nu[known.argmax()]) < IDLE).all())
+
+
+def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
+    """Commanded shares of full force (steps, w, sets, 3) of a run at times (steps, w) [s]."""
+    run = smoothed.track.run
+    row = np.searchsorted(run.time, time, side="right") - 1
+    found = commanded_shares(run, model)[np.maximum(row, 0)]
+    if at_rest(smoothed):
+        found[row < 0] = 0.0
+    return found
+
+
+def predict(starts: Starts, model: Model) -> np.ndarray:
+    """The measured pose as a model predicts it.
+
+    Args:
+        starts: where to begin.
+        model: its parameters may be arrays (p, 1), for p models at once.
+
+    Returns:
+        (steps + 1, 3, p, w): pose [m, m, rad] at each step.
+    """
+    body, drive, h = model.hull, model.drive, starts.h
+    p = drive.params
+    arriving = [starts.arriving(single) for single in singles(model)]
+    given, acting = (np.concatenate(part, axis=3) for part in zip(*arriving, strict=True))
+    aside = np.array(places(starts.runs[0][0].track.run))[:, None, None]
+    s = first_state(starts, body)
+    shape = np.broadcast_shapes(*sizes(body.params, p), acting.shape[-2:], s.x.shape)
+    found = np.empty((starts.steps + 1, 3, *shape))
+    with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
+        found[0] = vessel.measured(s, body)
+        power = starts.power(model.clock) if starts.powered else None
+        thrusters = placed(drive, aside, None)
+        for k, shares in enumerate(acting):
+            if power is not None:
+                thrusters = placed(drive, aside, chain.Power(*power[k]))
+            now = Running._make((s.t + h, s.u, s.v, s.r, *given[k]))
+            forces = chain.act(tuple(shares), now, thrusters)
+            s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
+            found[k + 1] = vessel.measured(s, body)
+    return found
+
+
+def singles(model: Model) -> list[Model]:
+    """The models of one whose thrusters' parameters are arrays (p, 1); itself where none is."""
+    many = [np.size(v) for v in model.thrusters.values() if isinstance(v, np.ndarray)]
+    if not many:
+        return [model]
+
+    def one(values: Mapping[str, Any], k: int) -> dict[str, float]:
+        return {n: float(v[k, 0]) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+
+    return [replace(model, thrusters=one(model.thrusters, k)) for k in range(max(many))]
+
+
+def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
+    """The ship a step later."""
+    return when(
+        b.disturbed,
+        lambda: vessel.integrate(s, tau, b, h, vessel.disturbed),
+        lambda: vessel.integrate(s, tau, b.hull, h),
+    )
+
+
+def sizes(*groups: Any) -> list[tuple[int, ...]]:
+    """Shapes (p, 1) of the parameters that are arrays, those of single propellers aside."""
+    found: list[tuple[int, ...]] = []
+    for item in groups:
+        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)[-2:]]
+    return found
+
+
+def first_state(starts: Starts, b: vessel.Prepared) -> vessel.State:
+    """Where the smoother says that each window begins, seen through the model's measurement effects."""
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), b)
+    time = starts.first(lambda s: s.time) + 0.0 * pose[0]
+    return vessel.State._make([*pose, *nu, time])
+
+
+def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
+    x, y, psi = true_pose(eta, b)
+    ahead, astern = true_pose(eta + INSTANT * eta_dot, b), true_pose(eta - INSTANT * eta_dot, b)
+    x_dot, y_dot, r = ((a - b) / (2.0 * INSTANT) for a, b in zip(ahead, astern, strict=True))
+    return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
+
+
+def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
+    """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
+    pose = [m[None] for m in measured]
+    for _ in range(8):
+        x, y, psi = vessel.measured(vessel.State(*pose), b)
+        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
+        pose = [a + b for a, b in zip(pose, off, strict=True)]
+    return pose

@@ -1,0 +1,238 @@
+"""The force of the thrusters along a measured run, by the very functions of the thrusters' FMU.
+
+What lies between a command and the share of full force that acts (delay, limited rate, lag, and a user's
+effects with a memory) is computed by :mod:`fmus.thrusters.chain` in short steps of a regular grid. A
+memory lasts only so long: the grid is cut into parts that are stepped side by side, each from the time
+before it that still matters. Weak form and predictions use the same result, :class:`Response`.
+"""
+
+from copy import copy
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fmus.effects import Memory, Running
+from fmus.thrusters import chain
+from fmus.thrusters.allocation import allocate
+
+from ..data.reading import ASIDE, Run, propellers
+from .ship_model import Model
+
+# s; longest step of the thrusters, as of the vessel: a force that lags is held over a step as in the
+# FMU, which is half a step earlier than a continuous lag.
+STEP = 0.02
+LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond what windows of some seconds show
+PART = 4.0  # s; about as long as a memory, which costs least
+# m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
+IDLE = (0.02, 0.02, 0.05)
+
+
+def commanded_shares(run: Run, model: Model) -> np.ndarray:
+    """(n, sets, 3), commanded shares of full force of each set of thrusters.
+
+    Of the five commands of the real ship each propeller is a set of its own, at ``ASIDE``; elsewhere
+    there is one, amidships.
+    """
+    if run.five is not None:
+        return propellers(run.five)
+    if run.u is not None:
+        return run.u[:, None]
+    X, Y, N = run.tau_cmd.T
+    return np.column_stack(allocate(X, Y, N, model.drive.params.allocation))[:, None]
+
+
+def places(run: Run) -> tuple[float, ...]:
+    """How far [m] to starboard each set of thrusters sits."""
+    return ASIDE if run.five is not None else (0.0,)
+
+
+def placed(drive: chain.Prepared, aside: Any, power: chain.Power | None) -> chain.Prepared:
+    """Thrusters that sit ``aside`` [m] to starboard of where they are, at a power of the run."""
+    p = drive.params
+    plant = p.plant._replace(plant_p_y=p.plant.plant_p_y + aside)
+    if power is not None:
+        power = chain.Power(p.power.power_vsp * power.power_vsp, p.power.power_bow * power.power_bow)
+    return drive._replace(params=p._replace(plant=plant, power=power or p.power))
+
+
+def thrust(run: Run, response: "Response", nu: np.ndarray) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] that acts from each sample to the next.
+
+    Args:
+        run: its time and power.
+        response: of the model's thrusters to the run's commands.
+        nu: (n, 3), body-fixed velocity.
+    """
+    power = None if run.power is None else chain.Power(*run.power.T)
+    given, acting = response.between_samples
+    total = np.zeros_like(run.tau_cmd)
+    for k, aside in enumerate(places(run)):
+        now = Running._make([run.time, *nu.T, *given[:, k].T])
+        drive = placed(response.model.drive, aside, power)
+        total += np.column_stack(np.broadcast_arrays(*chain.act(tuple(acting[:, k].T), now, drive)))
+    return total
+
+
+class Response:
+    """What the commands of a run become before they are forces.
+
+    Args:
+        run: its commands.
+        model: whose thrusters follow them.
+        moving: whether the ship was under way when the run began, so that its first command held before;
+            else nothing was commanded before.
+
+    Attributes:
+        slow: whether the thrusters have any memory.
+    """
+
+    def __init__(self, run: Run, model: Model, moving: bool = False) -> None:
+        self.run, self.model, self.moving = run, model, moving
+        drive = model.drive
+        self._memories = [
+            (acts, member, memory)
+            for of in ("command", "force")
+            for k, member, memory in drive.effects.remembering[of]
+            if (acts := drive.slow[k])
+        ]
+        self.slow = bool(self._memories) or drive.params.rate.plant_rate > 0.0
+
+    def of(self, model: Model) -> "Response":
+        """The response of another model whose :meth:`key` is the same, computed only once."""
+        if model is self.model:
+            return self
+        other = copy(self)
+        other.model = model
+        return other
+
+    @staticmethod
+    def key(model: Model) -> tuple[Any, ...]:
+        """What the response depends on, to be kept while it stays the same."""
+        p = model.drive.params
+        return p.dynamics, p.rate, p.allocation, model.clock
+
+    @cached_property
+    def between_samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Means (n, sets, 3) from each sample to the next: commands that arrive, shares that act."""
+        if not self.slow and self.model.clock == 0.0:
+            shares = commanded_shares(self.run, self.model)
+            return shares, shares
+        ends = np.append(self.run.time, self.run.time[-1] + self._period)
+        return self.mean(ends[:-1], ends[1:])
+
+    def mean(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Means over intervals of the run's time: commands that arrive, and shares that act.
+
+        Args:
+            start, end: (...) [s].
+
+        Returns:
+            Two arrays (..., sets, 3).
+        """
+        a, b = self._elapsed(start), self._elapsed(end)
+        given, acting = ((at(b) - at(a)) / like(b - a, 2) for at in self._integrals)
+        return given, acting
+
+    @cached_property
+    def _period(self) -> float:
+        return float(np.median(np.diff(self.run.time)))
+
+    @cached_property
+    def _clock(self) -> np.ndarray:
+        """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
+        gaps = np.minimum(np.diff(self.run.time), LONGEST_MEMORY)
+        return np.concatenate([[0.0], np.cumsum(gaps)])
+
+    def _elapsed(self, time: np.ndarray) -> np.ndarray:
+        """The run's times [s], those before and after it included, in the time of :attr:`_clock`."""
+        t = self.run.time
+        inside = np.interp(time, t, self._clock)
+        return inside + np.minimum(time - t[0], 0.0) + np.maximum(time - t[-1], 0.0)
+
+    @cached_property
+    def _commands(self) -> "Integral":
+        """Integral of the commands as they were given; the clock of the pose is late."""
+        shares = commanded_shares(self.run, self.model)
+        before = shares[0] if self.moving else 0.0 * shares[0]
+        edges = np.append(self._clock, self._clock[-1] + self._period) + self.model.clock
+        return Integral(edges, shares, before)
+
+    @cached_property
+    def _integrals(self) -> tuple["Integral", "Integral"]:
+        if not self.slow:
+            return self._commands, self._commands
+        h = self._step
+        edges = h * np.arange(int(np.ceil(self._clock[-1] / h + 1.0)) + 1)
+        given, acting = self._stepped(edges, h)
+        before = self._commands.before
+        return Integral(edges, given, before), Integral(edges, acting, before)
+
+    @property
+    def _step(self) -> float:
+        """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
+        fine = self._period / np.ceil(self._period / STEP - 1e-6)
+        kept = [
+            self._lasts(member, memory) / (memory.keeps - 1)
+            for _, member, memory in self._memories
+            if memory.keeps
+        ]
+        return float(max([fine, *kept]))
+
+    def _lasts(self, member: Any, memory: Memory) -> float:
+        return float(memory.lasts(*self.model.drive.params.dynamics[member.parameters]))
+
+    def _stepped(self, edges: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Means over each step (K, sets, 3): commands that arrive, and shares that act."""
+        drive = self.model.drive
+        rate = drive.params.rate.plant_rate
+        memory = sum(self._lasts(member, m) for _, member, m in self._memories)
+        memory += 2.0 / rate if rate > 0.0 else 0.0
+        before, part = (int(np.ceil(min(x, LONGEST_MEMORY) / h)) + 1 for x in (memory, PART))
+        size = edges.size - 1
+        parts = -(-size // part)
+        # Column m holds the steps of part m, those before it that it remembers first.
+        rows = np.arange(-before, part)[:, None] + part * np.arange(parts)
+        commands = np.diff(self._commands(np.append(edges, edges[-1] + h)), axis=0) / h
+        commanded = np.where(like(rows < 0, 2), self._commands.before, commands[np.clip(rows, 0, size)])
+        past = chain.at_rest(drive.effects)
+        given = np.empty_like(commanded)
+        acting = np.empty_like(commanded)
+        for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
+            past, arriving = chain.command_response(past, tuple(each), drive, h)
+            past, shares = chain.force_response(past, arriving, drive, h)
+            given[k], acting[k] = np.stack(arriving, axis=-1), np.stack(shares, axis=-1)
+        found = []
+        for signal in (given, acting):
+            parts_first = np.moveaxis(signal[before:], 1, 0)
+            found.append(parts_first.reshape(parts * part, *commanded.shape[2:])[:size])
+        return found[0], found[1]
+
+
+class Integral:
+    """The integral of a signal that is constant between edges, and before and after them.
+
+    Args:
+        edges: (K + 1,) [s].
+        values: (K, ...).
+        before: (...), its value before the first edge.
+    """
+
+    def __init__(self, edges: np.ndarray, values: np.ndarray, before: np.ndarray) -> None:
+        steps = like(np.diff(edges), values.ndim - 1)
+        self.edges, self.values, self.before = edges, values, before
+        self._sums = np.concatenate([0.0 * values[:1], np.cumsum(values * steps, axis=0)])
+
+    def __call__(self, time: np.ndarray) -> np.ndarray:
+        """The integral from the first edge to times (...) [s]."""
+        time = np.asarray(time)
+        k = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.values) - 1)
+        left = time - self.edges[k]
+        further = self.before.ndim
+        slope = np.where(like(left < 0.0, further), self.before, self.values[k])
+        return self._sums[k] + slope * like(left, further)
+
+
+def like(x: np.ndarray, further: int) -> np.ndarray:
+    """An array with further axes of length one behind its own."""
+    return x.reshape(*x.shape, *[1] * further)

@@ -1,0 +1,193 @@
+"""The model error over windows, without ever forming an acceleration (weak form).
+
+The equation of motion is multiplied with a smooth kernel w over a window and integrated; by parts, the
+acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from fmus.signals import Force
+from fmus.vessel import vessel
+
+from ..data.reading import Run
+from ..smoothing import Smoothed
+from ..smoothing.smoother import breaks
+from .prediction import at_rest, true_motion
+from .ship_model import Model
+from .thrust import Response, thrust
+
+WIDTH = 3.0  # s
+EVERY = 0.5  # s
+BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
+BLOCKS = 64
+KEPT = 3  # models of which parts of the model error are remembered: the last, one before, one beside
+
+
+def kernel(s: np.ndarray) -> np.ndarray:
+    """(1 - s^2)^3 of unit area over [-1, 1]."""
+    return 35.0 / 32.0 * (1.0 - s * s) ** 3
+
+
+def kernel_rate(s: np.ndarray) -> np.ndarray:
+    return -6.0 * 35.0 / 32.0 * s * (1.0 - s * s) ** 2
+
+
+def kernel_integral(s: np.ndarray) -> np.ndarray:
+    return 35.0 / 32.0 * (s - s**3 + 0.6 * s**5 - s**7 / 7.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Integrals:
+    """The windows of one run that can be used, and the integrals over them.
+
+    Attributes:
+        smoothed: the run.
+        middle: (K,) [s].
+        block: (K,), number of the block that the middle lies in.
+        smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
+            times one that is held from each sample to the next.
+        memory: parts of the model error that were computed lately.
+    """
+
+    smoothed: Smoothed
+    middle: np.ndarray
+    block: np.ndarray
+    smooth: csr_matrix
+    slope: csr_matrix
+    held: csr_matrix
+    memory: dict[tuple[str, Any], Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def run(self) -> Run:
+        return self.smoothed.track.run
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """(n,), samples at which there is a smoothed state; the others have weight zero."""
+        return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
+
+    def recall(self, what: str, key: Any, make: Callable[[], Any]) -> Any:
+        """A part of the model error, from memory if it was computed for the same parameters lately.
+
+        Of two models that differ in the hull alone the thrust is the same, and so on.
+        """
+        found = self.memory.pop((what, key), None)
+        if found is None:
+            found = make()
+            older = [k for k in self.memory if k[0] == what]
+            for k in older[: len(older) + 1 - KEPT]:
+                del self.memory[k]
+        self.memory[what, key] = found  # the last in order is the latest
+        return found
+
+
+def places(t: np.ndarray) -> np.ndarray:
+    """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
+    last = np.floor((t[-1] - t[0] - WIDTH + 1e-9) / EVERY)
+    reach = np.ceil(WIDTH / 2 / EVERY)
+    near = np.unique(np.round((t - t[0] - WIDTH / 2) / EVERY))
+    found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
+    return found[(found >= 0.0) & (found <= last)]
+
+
+def integrals(smoothed: Smoothed) -> Integrals:
+    """The windows of a run in which at least half of the samples are there and thrusters at work."""
+    run = smoothed.track.run
+    t = run.time
+    middles = t[0] + WIDTH / 2 + EVERY * places(t)
+    known = np.isfinite(smoothed.nu).all(axis=1)
+    fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
+    gone = np.cumsum(np.concatenate([[0], ~known]))
+    busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
+    first = np.searchsorted(t, middles - WIDTH / 2, side="left")
+    last = np.searchsorted(t, middles + WIDTH / 2, side="right")
+    count = last - first
+    # Stretches know nothing of each other: no window lies in two.
+    parts = np.cumsum(np.concatenate([[0], breaks(t, smoothed.track)]))
+    whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
+    kept = (
+        whole
+        & (count > 3)
+        & (gone[last] == gone[first])
+        & (2 * (fresh[last] - fresh[first]) >= count)
+        & (busy[last] > busy[first])
+    )
+    middles, first, last = middles[kept], first[kept], last[kept]
+    rows = np.repeat(np.arange(middles.size), last - first)
+    columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
+    half = WIDTH / 2
+    s = np.clip((t[columns] - middles[rows]) / half, -1.0, 1.0)
+    after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
+    gap = np.gradient(t)[columns]
+    starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
+    shape = (middles.size, t.size)
+    block = max(BLOCK, float(t[-1] - t[0]) / BLOCKS)
+
+    def matrix(values: np.ndarray) -> csr_matrix:
+        return csr_matrix((values, columns, starts), shape=shape)
+
+    return Integrals(
+        smoothed,
+        middles,
+        np.floor((middles - t[0]) / block).astype(int),
+        matrix(kernel(s) / half * gap),
+        matrix(-kernel_rate(s) / half**2 * gap),
+        matrix(kernel_integral(after) - kernel_integral(s)),
+    )
+
+
+def omega(w: Integrals, model: Model) -> np.ndarray:
+    """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
+
+    An acceleration counts as a force by the inertia of the model that this one was made from.
+    """
+    of_pose = model.ship.effects.of_kind("measurement")
+    names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
+    measured = tuple((name, model.vessel.get(name, 0.0)) for name in names)
+    ship = (measured, tuple(sorted(model.vessel.items())))
+    drive = (measured, tuple(sorted(model.thrusters.items())), model.clock)
+    eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
+    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+
+    def force() -> np.ndarray:
+        key = Response.key(model)
+        response = w.recall("response", key, lambda: Response(w.run, model, not at_rest(w.smoothed)))
+        return w.held @ thrust(w.run, response.of(model), nu)
+
+    driven = w.recall("driven", drive, force)
+    return (change - free - by_mass(model, driven)) @ model.reference_mass.T
+
+
+def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust.
+
+    Args:
+        model: of the ship.
+        time: (n,) [s].
+        eta: (n, 3) true pose [m, m, rad].
+        nu: (n, 3) body-fixed velocity over ground.
+    """
+    s = vessel.State._make([*eta.T, *nu.T, time])
+    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
+    return np.column_stack(np.broadcast_arrays(*nu_dot))
+
+
+def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
+    """M^-1 of a force (n, 3)."""
+    i11, i22, i23, i32, i33 = model.hull.hull.inverse
+    X, Y, N = force.T
+    return np.column_stack([i11 * X, i22 * Y + i23 * N, i32 * Y + i33 * N])
+
+
+def _motion(w: Integrals, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
+    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
+    eta, nu = (np.concatenate(part).T for part in motion)
+    eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
+    return eta, nu, w.slope @ nu

@@ -1,0 +1,190 @@
+"""Content of the JSON files, made from the results of the diagnosis."""
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TypedDict
+
+from fmus.effects.text import Found
+
+from ..assessment.evaluation import Evaluation
+from ..assessment.regions import ErrorRegions, Profile, Region
+from ..identification.findings import Finding
+from ..session import Comparison, Diagnosis
+from . import result_keys
+from .finding_text import advice, equation, sentence, separation_note, unit
+
+LIBRARIES = ("cybership", "numpy", "scipy")
+# Effects on other sets of axes count as XYN in the files.
+AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
+NOTHING_FOUND = "Nothing is missing that these data show."
+
+
+def comparison_content(
+    comparison: Comparison, model: Path | None, files: Sequence[str]
+) -> result_keys.ComparisonContent:
+    """The content of ``comparison.json``.
+
+    Args:
+        comparison: the errors of a model on some runs.
+        model: its file; None: the nominal one.
+        files: names of the files that are written together.
+    """
+    return result_keys.ComparisonContent(
+        data=_data(comparison.evaluations),
+        errors=[_errors(e) for e in comparison.evaluations],
+        where=_where(comparison.before),
+        **_provenance(comparison, model, files),
+    )
+
+
+def diagnosis_content(
+    diagnosis: Diagnosis, model: Path | None, files: Sequence[str]
+) -> result_keys.DiagnosisContent:
+    """The content of ``diagnosis.json``.
+
+    Args:
+        diagnosis: what was learned.
+        model: file of the initial model; None: the nominal one.
+        files: names of the files that are written together.
+    """
+    learned, comparison, s = diagnosis.learned, diagnosis.comparison, diagnosis.stability
+    effects = [
+        _effect(diagnosis, f, share) for f, share in zip(learned.effects, diagnosis.shares, strict=True)
+    ]
+    return result_keys.DiagnosisContent(
+        verdict=diagnosis.verdict,
+        sentence=" ".join(e.sentence for e in effects) or NOTHING_FOUND,
+        effects=effects,
+        suspect_coefficients=[
+            result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects
+        ],
+        ranking=[result_keys.RankedResult(id=r.id, score=r.score, q2=r.q2) for r in learned.ranking],
+        data=_data(comparison.evaluations),
+        errors=[_errors(e) for e in comparison.evaluations],
+        where=_where(comparison.before),
+        where_after=_where(comparison.after),
+        stability=result_keys.StabilityResult(
+            nominal_min_dissipation=s.nominal_min_dissipation,
+            learned_min_dissipation=s.learned_min_dissipation,
+            bounded=s.bounded,
+            region=s.region,
+            mass_definite=s.mass_definite,
+            notes=list(s.notes),
+        ),
+        prior=diagnosis.prior,
+        seed=diagnosis.seed,
+        **_provenance(comparison, model, files),
+    )
+
+
+class _Provenance(TypedDict):
+    """What both files say of their origin."""
+
+    runs: list[str]
+    model: str | None
+    files: list[str]
+    versions: dict[str, str]
+
+
+def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]) -> _Provenance:
+    versions = {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+    return {
+        "runs": [e.name for e in comparison.evaluations],
+        "model": None if model is None else model.name,
+        "files": list(files),
+        "versions": versions,
+    }
+
+
+def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
+    runs = []
+    for e in evaluations:
+        time, track = e.smoothed.time, e.smoothed.track
+        seconds = float(time[-1] - time[0]) + track.period
+        runs.append(
+            result_keys.RunData(
+                run=e.name,
+                held_out=e.held_out,
+                seconds=seconds,
+                notes=list(e.smoothed.notes),
+                **e.smoothed.counts._asdict(),
+            )
+        )
+    totals = {
+        name: sum(getattr(r, name) for r in runs) for name in result_keys.SampleCounts.model_fields
+    }
+    return result_keys.Data(runs=runs, **totals)
+
+
+def _errors(e: Evaluation) -> result_keys.RunErrors:
+    b, a = e.before, e.after
+    return result_keys.RunErrors(
+        run=e.name,
+        held_out=e.held_out,
+        window_position_rmse=result_keys.Change(before=b.position, after=a.position),
+        window_heading_rmse=result_keys.Change(before=b.heading, after=a.heading),
+        omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
+    )
+
+
+def _where(found: ErrorRegions) -> result_keys.WhereResult:
+    return result_keys.WhereResult(
+        sentences=list(found.sentences),
+        regions=[_region(r) for r in found.regions],
+        profiles=[_profile(p) for p in found.profiles],
+    )
+
+
+def _region(r: Region) -> result_keys.RegionResult:
+    return result_keys.RegionResult(
+        axis=r.axis,
+        by=r.covariate.id,
+        unit=r.covariate.unit,
+        run=r.run,
+        low=r.low,
+        high=r.high,
+        rms=r.rms,
+        elsewhere=r.elsewhere,
+        share_of_time=r.share,
+        sentence=r.sentence,
+    )
+
+
+def _profile(p: Profile) -> result_keys.ProfileResult:
+    return result_keys.ProfileResult(
+        axis=p.axis,
+        by=p.covariate.id,
+        unit=p.covariate.unit,
+        run=p.run,
+        ends=p.edges.tolist(),
+        rms=p.rms.tolist(),
+        uncertainty=p.uncertainty.tolist(),
+        share_of_time=p.share.tolist(),
+    )
+
+
+def _effect(diagnosis: Diagnosis, f: Finding, share: float) -> result_keys.EffectResult:
+    effects = diagnosis.start.ship.effects
+    effect = effects[f.id]
+    # Of a coefficient the addition counts, of any other parameter of the effect its value.
+    present = {n: 0.0 if n in effect.coefficients else diagnosis.start.value(n) for n in f.values}
+    values = {n: x + present[n] for n, x in f.values.items()}
+    ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
+    coefficients = {
+        name: result_keys.Coefficient(value=value, unit=unit(effect, name), ci95=ci95.get(name))
+        for name, value in values.items()
+    }
+    return result_keys.EffectResult(
+        id=f.id,
+        axis=AXES.get(effect.axis, "XYN"),
+        coefficients=coefficients,
+        confidence=f.confidence,
+        share_of_error=share,
+        indistinguishable=list(f.alike),
+        advice=advice(f.id, f.alike, effects),
+        sentence=sentence(Found(effect, values, diagnosis.speeds)),
+        equation=equation(effect, values, ci95),
+        separation=separation_note(f.id, f.alike),
+    )

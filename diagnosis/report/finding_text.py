@@ -1,0 +1,92 @@
+"""A finding in words: a sentence, an equation, and what to run to tell effects apart."""
+
+from collections.abc import Mapping, Sequence
+
+from fmus.effects import Effect, EffectSet
+from fmus.effects.text import Found
+
+CURVE = 8  # more coefficients than that are shown as a curve
+MOST_SHOWN = 4  # of the effects that data cannot tell apart, the most likely first; chosen
+
+
+def sentence(found: Found) -> str:
+    """The finding in one sentence: the effect's own, else its description."""
+    own = found.effect.wording.sentence
+    if own is not None:
+        return own(found)
+    return f"The ship has an effect that the model lacks: {found.effect.description.rstrip('.')}."
+
+
+def unit(effect: Effect, name: str) -> str:
+    """The unit of a parameter of an effect."""
+    return next(p.unit for p in effect.parameters if p.name == name)
+
+
+def equation(
+    effect: Effect, values: Mapping[str, float], ci95: Mapping[str, tuple[float, float]]
+) -> str:
+    """The effect's formula, and its coefficients with units and intervals."""
+    formula = effect.formula or effect.id
+    shown = [name for name in values if values[name] or name in ci95]
+    if len(shown) > CURVE:
+        nodes = ", ".join(f"{values[name]:.2g}" for name in shown)
+        return f"{formula}; {shown[0]} ... {shown[-1]} = {nodes} {unit(effect, shown[0])}"
+    symbols = [s.strip() for s in effect.symbol.split(",")]
+    names = symbols if len(symbols) == len(effect.coefficients) else effect.coefficients
+    called = dict(zip(effect.coefficients, names, strict=True))
+    parts = [_coefficient(called.get(n, n), values[n], unit(effect, n), ci95.get(n)) for n in shown]
+    return "; ".join([formula, *parts])
+
+
+def _coefficient(symbol: str, value: float, unit: str, interval: tuple[float, float] | None) -> str:
+    """Such as ``δ = 0.3 m (0.29 to 0.31)``."""
+    text = f"{symbol} = {value:.3g}" + (f" {unit}" if unit != "1" else "")
+    return text if interval is None else f"{text} ({interval[0]:.3g} to {interval[1]:.3g})"
+
+
+def tell_apart(one: Effect, other: Effect) -> str:
+    """What to run so that two effects can be told apart.
+
+    Either effect may know, or else the family of either; else both are excited.
+    """
+    a, b = one.wording, other.wording
+    known = (
+        a.apart.get(other.id),
+        b.apart.get(one.id),
+        a.family.apart.get(b.family.name),
+        b.family.apart.get(a.family.name),
+    )
+    excite = "run " + "; and ".join(dict.fromkeys((a.family.excite, b.family.excite)))
+    return next((text for text in known if text), excite)
+
+
+def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
+    """What to run next, for an effect and those that the data cannot tell from it; empty if none.
+
+    Args:
+        name: id of the effect.
+        alike: ids of the others, the most likely first; the advice is for the first few.
+        effects: of the ship.
+    """
+    texts: dict[str, list[str]] = {}
+    for other in alike[:MOST_SHOWN]:
+        texts.setdefault(tell_apart(effects[name], effects[other]), []).append(other)
+    parts = [f"To tell {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
+    if len(alike) > MOST_SHOWN:
+        parts.append(
+            "So many causes fit that the data hold too little: vary speed, turn and drift more."
+        )
+    return " ".join(parts)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a row: a, b or c; of many the first few, and how many more."""
+    shown = [*names[:MOST_SHOWN]]
+    more = len(names) - len(shown)
+    *most, last = [*shown, f"{more} others"] if more else shown
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+def separation_note(name: str, alike: Sequence[str]) -> str:
+    """Which effects these data cannot tell from one; empty if none."""
+    return f"On these data {name} cannot be told apart from {listed(alike)}." if alike else ""

@@ -1,0 +1,59 @@
+"""Numbers, units and verdicts as the page shows them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+VERDICTS = {
+    "found": "Something is missing, and it was found",
+    "ambiguous": "Something is missing, and more than one cause fits",
+    "none": "Nothing is missing that these data show",
+}
+NO_VALUE = "–"
+_UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
+POSITIONAL = (1e-4, 1e6)  # magnitudes that are written without an exponent; chosen
+WHOLE_RATIO = 9.95  # from which on a ratio has no decimal, as it would round to 10.0
+
+
+def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
+    """A number to so many significant digits; a dash where it is None or not finite."""
+    if value is None or not np.isfinite(value):
+        return NO_VALUE
+    scaled = factor * value
+    text = f"{scaled:.{digits}g}"
+    if "e" in text and POSITIONAL[0] <= abs(scaled) < POSITIONAL[1]:
+        text = f"{scaled:.0f}" if abs(scaled) >= 1.0 else f"{scaled:.6f}".rstrip("0")
+    return text.replace("-", "−")
+
+
+def unit(text: str) -> str:
+    """A unit of the FMUs for people: ``N.s2/m2`` as N·s²/m², nothing for ``1``."""
+    return "" if text == "1" else text.translate(_UNIT)
+
+
+def percent(value: float | None) -> str:
+    """A share in per cent; a dash where it is None."""
+    return NO_VALUE if value is None else f"{100.0 * value:.0f} %"
+
+
+def times(before: float | None, after: float | None) -> str:
+    """Ratio by which an error fell; a dash where there is none."""
+    if before is None or after is None or not after or not np.isfinite(before / after):
+        return NO_VALUE
+    ratio = before / after
+    return f"{ratio:.0f}×" if ratio >= WHOLE_RATIO else f"{ratio:.1f}×"
+
+
+def plain(value: object) -> str:
+    """Any value that JSON can hold, on one line."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {plain(each)}" for key, each in value.items())
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Sequence):
+        return ", ".join(plain(each) for each in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float)):
+        return number(value, 6)
+    return NO_VALUE if value is None else str(value)

@@ -1,0 +1,191 @@
+"""Schema of ``comparison.json`` and ``diagnosis.json``.
+
+All numbers are in SI; a number that is not finite, or not known, is null.
+"""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+Number = Annotated[float | None, BeforeValidator(_finite)]
+Axes = Literal["X", "Y", "N", "XY", "XYN"]
+
+
+class Part(BaseModel):
+    """A part of a result."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SampleCounts(Part):
+    """Numbers of samples: all, those left out for each reason, and the rest, which is used."""
+
+    samples: int
+    frozen: int
+    dropped: int
+    spikes: int
+    used: int
+
+
+class RunData(SampleCounts):
+    """Samples of one run, its duration [s], and notes on it, a line each."""
+
+    run: str
+    held_out: bool
+    seconds: Number
+    notes: list[str]
+
+
+class Data(SampleCounts):
+    """Samples of all runs together, and of each."""
+
+    runs: list[RunData]
+
+
+class Change(Part):
+    """A number of the initial and of the learned model; the same where nothing was learned."""
+
+    before: Number
+    after: Number
+
+
+class AxesChange(Part):
+    """Numbers for X, Y, N of the initial and of the learned model."""
+
+    before: list[Number]
+    after: list[Number]
+
+
+class RunErrors(Part):
+    """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m]."""
+
+    run: str
+    held_out: bool
+    window_position_rmse: Change
+    window_heading_rmse: Change
+    omega_rms: AxesChange
+
+
+class RegionResult(Part):
+    """Interval of a covariate where the model error is larger than elsewhere; an open end is null."""
+
+    axis: str
+    by: str
+    unit: str
+    run: str | None
+    low: Number
+    high: Number
+    rms: Number
+    elsewhere: Number
+    share_of_time: Number
+    sentence: str
+
+
+class ProfileResult(Part):
+    """RMS of the model error of an axis over a covariate, bin by bin, with its uncertainty."""
+
+    axis: str
+    by: str
+    unit: str
+    run: str | None
+    ends: list[Number]
+    rms: list[Number]
+    uncertainty: list[Number]
+    share_of_time: list[Number]
+
+
+class WhereResult(Part):
+    """Where the model fails: a sentence for each axis, all significant regions, and all profiles."""
+
+    sentences: list[str]
+    regions: list[RegionResult]
+    profiles: list[ProfileResult]
+
+
+class ComparisonContent(Part):
+    """The content of ``comparison.json``; at its end what it was made with."""
+
+    data: Data
+    errors: list[RunErrors]
+    where: WhereResult
+    runs: list[str]
+    model: str | None
+    files: list[str]
+    versions: dict[str, str]
+
+
+class Coefficient(Part):
+    """An addition to the nominal value, and its 95 % interval; null where there is none."""
+
+    value: Number
+    unit: str
+    ci95: tuple[Number, Number] | None
+
+
+class EffectResult(Part):
+    """An effect that was accepted."""
+
+    id: str
+    axis: Axes
+    coefficients: dict[str, Coefficient]
+    confidence: Number
+    share_of_error: Number
+    indistinguishable: list[str]
+    advice: str
+    sentence: str
+    equation: str
+    separation: str
+
+
+class SuspectResult(Part):
+    """A nominal coefficient that is likely wrong: its new value, and by how many standard deviations."""
+
+    name: str
+    z: Number
+    value: Number
+
+
+class RankedResult(Part):
+    """A candidate of the first step; a lower score is better."""
+
+    id: str
+    score: Number
+    q2: Number
+
+
+class StabilityResult(Part):
+    """Result of the check of the learned model."""
+
+    nominal_min_dissipation: Number
+    learned_min_dissipation: Number
+    bounded: bool
+    region: str | None
+    mass_definite: bool
+    notes: list[str]
+
+
+class DiagnosisContent(Part):
+    """The content of ``diagnosis.json``; at its end what it was made with."""
+
+    verdict: Literal["found", "ambiguous", "none"]
+    sentence: str
+    effects: list[EffectResult]
+    suspect_coefficients: list[SuspectResult]
+    ranking: list[RankedResult]
+    data: Data
+    errors: list[RunErrors]
+    where: WhereResult
+    where_after: WhereResult
+    stability: StabilityResult
+    prior: Number
+    seed: int
+    runs: list[str]
+    model: str | None
+    files: list[str]
+    versions: dict[str, str]

@@ -1,0 +1,143 @@
+"""Output of the commands on a terminal of 80 columns, or in a pipe."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from math import degrees
+
+from rich.console import RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, RunErrors
+
+MAX_CANDIDATES = 5  # of the ranking; chosen
+SMALL_SHARE = 0.01  # of the squared error, below which an effect carries a warning; chosen
+
+
+def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
+    """Output of ``diagnosis.compare``."""
+    yield from _data(r.data)
+    yield from _lines("Where the model fails", r.where.sentences)
+    yield from _errors(r.errors, learned=False)
+    yield from _files(r.files, out)
+
+
+def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
+    """Output of ``diagnosis.learn``."""
+    yield from _data(r.data)
+    yield from _lines("Where the model fails", r.where.sentences)
+    if not r.effects:
+        yield from _lines("Finding", [r.sentence])
+    for k, effect in enumerate(r.effects, 1):
+        yield from _lines(
+            f"Finding {k}: {effect.id}" if len(r.effects) > 1 else "Finding", _effect(effect)
+        )
+    if r.suspect_coefficients:
+        suspects = [
+            f"{s.name} is rather {_number(s.value)} ({_number(s.z, 2)} standard deviations of the prior)"
+            for s in r.suspect_coefficients
+        ]
+        yield from _lines("Suspect coefficients", suspects)
+    if r.effects:
+        first, *others = r.ranking[:MAX_CANDIDATES]
+        behind = [f"{c.id} +{(c.score or 0.0) - (first.score or 0.0):.3g}" for c in others]
+        yield from _lines(
+            "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
+        )
+    yield from _errors(r.errors, learned=bool(r.effects))
+    yield from _lines("Stability", _stability(r))
+    yield from _files(r.files, out)
+
+
+def _titled(title: str, body: RenderableType) -> Iterator[RenderableType]:
+    yield Text(title, style="bold")
+    yield Padding(body, (0, 0, 1, 2))
+
+
+def _lines(title: str, lines: Iterable[str]) -> Iterator[RenderableType]:
+    yield from _titled(title, Text("\n".join(lines)))
+
+
+def _files(files: Sequence[str], out: str) -> Iterator[RenderableType]:
+    yield Text(f"{', '.join(files)} in {out}", no_wrap=True, overflow="ignore")
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for k, name in enumerate(columns):
+        table.add_column(Text(name), justify="right" if k else "left", overflow="fold")
+    return table
+
+
+def _data(data: Data) -> Iterator[RenderableType]:
+    table = _table("run", "time", "samples", "frozen", "dropped", "spikes", "used")
+    for r in data.runs:
+        seconds = f"{_number(r.seconds, 4)} s"
+        counts = (r.samples, r.frozen, r.dropped, r.spikes, r.used)
+        table.add_row(_run(r.run, r.held_out), seconds, *map(str, counts))
+    yield from _titled("Data", table)
+    notes = [f"{r.run}: {note}" for r in data.runs for note in r.notes]
+    if notes:
+        yield from _lines("Found in the data", notes)
+
+
+def _run(name: str, held_out: bool) -> Text:
+    return Text(f"{name} (held out)" if held_out else name)
+
+
+def _effect(e: EffectResult) -> Iterator[str]:
+    yield e.sentence
+    yield e.equation
+    share = _percent(e.share_of_error)
+    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error"
+    if not (e.share_of_error or 0.0) >= SMALL_SHARE:
+        yield "warning: with it the error hardly falls, which is no reason to believe it"
+    yield from filter(None, (e.separation, e.advice))
+
+
+def _errors(errors: Sequence[RunErrors], learned: bool) -> Iterator[RenderableType]:
+    """Window prediction error, and RMS of the model error."""
+    predictions, forces = (
+        _table("run", "position [mm]", "heading [°]"),
+        _table("run", "X [N]", "Y [N]", "N [N m]"),
+    )
+
+    def cell(before: float | None, after: float | None, scale: float = 1.0) -> str:
+        parts = (before, after) if learned else (before,)
+        return " -> ".join(_number(None if x is None else scale * x, 2) for x in parts)
+
+    for e in errors:
+        run, position, heading = _run(e.run, e.held_out), e.window_position_rmse, e.window_heading_rmse
+        millimetres = cell(position.before, position.after, 1e3)
+        predictions.add_row(run, millimetres, cell(heading.before, heading.after, degrees(1.0)))
+        axes = zip(e.omega_rms.before, e.omega_rms.after, strict=True)
+        forces.add_row(run, *(cell(b, a) for b, a in axes))
+    when = ", before -> after" if learned else ""
+    yield from _titled(f"Predictions over 8 s miss by{when}", predictions)
+    yield from _titled(f"Force that the model lacks{when}", forces)
+
+
+def _stability(r: DiagnosisContent) -> Iterator[str]:
+    s = r.stability
+    if not s.mass_definite:
+        yield "The mass matrix of the learned model is not positive definite."
+    bounded = "stays bounded" if s.bounded else "does NOT stay bounded"
+    yield f"In closed loop the learned model {bounded} on the reference paths."
+    yield (
+        f"smallest dissipation {_number(s.learned_min_dissipation)} 1/s, "
+        f"of the model at first {_number(s.nominal_min_dissipation)} 1/s"
+    )
+    if s.region:
+        yield f"warning: less dissipation than at first: {s.region}"
+    yield from s.notes
+
+
+def _number(x: float | None, digits: int = 3) -> str:
+    """A number for people."""
+    if x is None:
+        return "-"
+    return f"{x:.0f}" if abs(x) >= 10.0**digits else f"{x:.{digits}g}"
+
+
+def _percent(x: float | None, decimals: int = 0) -> str:
+    return "-" if x is None else f"{100.0 * x:.{decimals}f} %"

@@ -1,0 +1,5 @@
+"""Pose, velocity, acceleration of a measured run with their uncertainty, without a model of a ship."""
+
+from .smoother import Smoothed, smooth
+
+__all__ = ["Smoothed", "smooth"]

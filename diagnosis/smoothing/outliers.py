@@ -1,0 +1,84 @@
+"""Outliers of a run: Huber's robust weights, then a test of each sample by its deleted residual."""
+
+import numpy as np
+
+from .likelihood import adapt, likeliest
+from .penalised import Problem, solve
+from .spline import inverse_band, variance
+
+OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
+# Standard deviations from which on the loss of Huber (1964) is linear. Chosen: 95 % of normal noise
+# counts in full.
+HUBER = 2.0
+# Times the 90 % quantile of |z|; beyond, a sample starts with less weight. Chosen: no ship is there.
+FAR = 10.0
+REWEIGHTINGS = 10  # most rounds of reweighting, and of the outlier test; two or three are the rule
+SAME_WEIGHT = 0.02  # change of a robust weight that ends the reweighting; the outlier test follows it
+FEWEST_INLIERS = 6  # samples of a stretch: a spline of degree 5 follows any six
+
+
+class TooFewError(Exception):
+    """In some stretch hardly any sample agrees with the others.
+
+    Args:
+        rows: of the run, all samples of that stretch.
+    """
+
+    def __init__(self, rows: np.ndarray) -> None:
+        self.rows = rows
+
+
+def robust(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """Which samples are no outliers, and the smoothness of the spline through them.
+
+    Args:
+        p: problem with an even penalty.
+        local: (3,), smoothness that follows a few samples, to find what sticks out.
+
+    Returns:
+        The problem with its penalty adapted to the jerk, smoothness (3,), weights (n,) of 0 and 1.
+
+    Raises:
+        TooFewError: in some stretch.
+    """
+    weights = outlier_test(p, local, robust_weights(p, local))
+    p, smoothness = adapt(p, likeliest(p, weights)[0], weights)
+    return p, smoothness, outlier_test(p, smoothness, weights)
+
+
+def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
+    """Weights (n,) of Huber's M-estimator by iterative reweighting: 1, and HUBER / |r| far off."""
+    far = FAR * np.maximum(np.quantile(np.abs(p.z), 0.9, axis=0), p.sigma)
+    weights = np.minimum(1.0, (far / np.maximum(np.abs(p.z), far * 1e-9)).min(axis=1))
+    for _ in range(REWEIGHTINGS):
+        off = np.abs(p.z - p.b(solve(p, smoothness, weights).coefficients)) / p.sigma
+        before, weights = weights, np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
+        if np.abs(weights - before).max() < SAME_WEIGHT:
+            break
+    return weights
+
+
+def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """1 for each sample that agrees with all the others, 0 for an outlier, (n,).
+
+    A sample that had a weight is compared with the fit without it: its deleted residual and the variance
+    of that follow from the fit with it and its leverage.
+
+    Raises:
+        TooFewError: in some stretch.
+    """
+    stretch = np.searchsorted(p.grid.first, p.b.first, side="right") - 1
+    for _ in range(REWEIGHTINGS):
+        fit = solve(p, smoothness, weights)
+        spread = variance(p.b, inverse_band(fit.factors))
+        off = np.abs(p.z - p.b(fit.coefficients)) / p.sigma
+        leverage = np.minimum(weights[:, None] * spread, 0.999)
+        expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))
+        kept = (off <= OUTLIER * expected).all(axis=1).astype(float)
+        if (kept == weights).all():
+            break
+        few = np.bincount(stretch, kept) < FEWEST_INLIERS
+        if few.any():
+            raise TooFewError(p.rows[few[stretch]])
+        weights = kept
+    return weights

@@ -1,0 +1,199 @@
+"""Pose, velocity and acceleration of a measured run without any model of the ship.
+
+Each channel is modelled as a process driven by the commands (:mod:`.command_response`) and by white
+jerk, measured with white noise. The noise is estimated from third differences, the spectral density of
+the jerk by restricted maximum likelihood, and how it varies over time from the jerk that is found
+(:mod:`.likelihood`). A sample further than five standard deviations from its prediction by all others
+is a spike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from cosim import InputError
+from fmus.frames import rotate_to_body
+
+from ..data import Counts, Track
+from ..data.cleaning import noise
+from .command_response import CommandResponse, Commands, with_commands
+from .outliers import TooFewError, robust
+from .penalised import Problem, solve
+from .spline import Knots, basis, inverse_band, knots, roughness, variance
+
+# s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
+BREAK = 3.0
+SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
+FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
+NOTICED = 0.1  # s; a shorter delay is not reported (chosen)
+# [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
+LEAST_NOISE = 2e-5
+# The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
+# has a time constant of two sampling periods, 64 = 2^6.
+LOCAL = 64.0
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A smoothed run. All arrays (n, 3) are NaN where too much is missing.
+
+    Attributes:
+        track: the run with its samples judged.
+        spikes: (n,), samples refused by the outlier test.
+        eta, eta_dot, eta_ddot: pose, heading continuous, and derivatives [m, m, rad; /s; /s2].
+        nu: body-fixed velocity over ground [m/s, m/s, rad/s].
+        eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
+        noise: (3,), standard deviation of the measurement [m, m, rad].
+        jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
+        delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
+    """
+
+    track: Track
+    spikes: np.ndarray
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+    nu: np.ndarray
+    eta_std: np.ndarray
+    eta_dot_std: np.ndarray
+    eta_ddot_std: np.ndarray
+    nu_std: np.ndarray
+    noise: np.ndarray
+    jerk: np.ndarray
+    delay: float
+
+    @property
+    def time(self) -> np.ndarray:
+        """(n,) [s]."""
+        return self.track.run.time
+
+    @property
+    def used(self) -> np.ndarray:
+        """(n,), samples that count: new, no spike, in a stretch that could be smoothed."""
+        return self.track.valid & ~self.spikes & np.isfinite(self.eta[:, 0])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found in the data, a line each."""
+        if not self.delay >= NOTICED:
+            return self.track.notes
+        delay = (
+            f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
+        )
+        return (*self.track.notes, delay)
+
+    @property
+    def counts(self) -> Counts:
+        """What became of the samples."""
+        return self.track.counts(int(self.spikes.sum()))
+
+
+def smooth(track: Track, driven: bool = True) -> Smoothed:
+    """Smooth a run.
+
+    Args:
+        track: the run.
+        driven: whether the response to the commands is modelled, see :mod:`.command_response`. Without,
+            the spline follows whatever is quick, and noise with it.
+
+    Raises:
+        InputError: no stretch of it is dense enough, or its samples do not determine a motion.
+    """
+    rows = np.flatnonzero(track.valid)
+    while True:
+        try:
+            found = _smooth(track, rows, driven)
+        except TooFewError as stretch:
+            rows = np.setdiff1d(rows, stretch.rows)
+        except LinAlgError as error:
+            raise InputError(
+                f"run '{track.run.name}': its samples do not determine a smooth motion ({error})"
+            ) from None
+        else:
+            return found
+
+
+def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
+    """Smooth a run by some of its rows."""
+    time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
+    grid = knots(*stretches(time[rows], track), max(SPACING, track.period))
+    inside = within(grid, time)
+    dense = rows[inside[rows]]
+    z = track.pose[dense] - origin
+    sigma = np.maximum(noise(z), LEAST_NOISE)
+    stiffness = np.ones((3, int(grid.intervals.sum())))
+    even = Problem(dense, z, basis(grid, time[dense]), grid, roughness(grid), stiffness, sigma)
+    local = np.full(3, LOCAL * (track.period / grid.spacing) ** 5)
+    adapted, smoothness, weights = robust(even, local)
+    fit, response = solve(adapted, smoothness, weights), CommandResponse.none(time.size)
+    if driven:
+        psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
+        commands = Commands(track, psi, grid)
+        smoothness, fit, response = with_commands(even, smoothness, fit, weights, commands)
+    inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
+    spikes = track.valid.copy()
+    spikes[rows] = False
+    spikes[dense] = weights == 0.0
+    found = []
+    for derivative, known in enumerate(response[:3]):
+        b = basis(grid, time[inside], derivative)
+        found += [spread(b(fit.coefficients) + known[inside], inside)]
+        found += [spread(np.sqrt(variance(b, inverse)), inside)]
+    eta, eta_std, eta_dot, eta_dot_std, eta_ddot, eta_ddot_std = found
+    eta += origin
+    u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
+    return Smoothed(
+        track,
+        spikes,
+        eta,
+        eta_dot,
+        eta_ddot,
+        np.column_stack([u, v, eta_dot[:, 2]]),
+        eta_std,
+        eta_dot_std,
+        eta_ddot_std,
+        _body_std(eta, u, v, eta_std, eta_dot_std),
+        sigma,
+        sigma**2 / (smoothness * grid.spacing**5),
+        response.delay,
+    )
+
+
+def breaks(time: np.ndarray, track: Track) -> np.ndarray:
+    """(n - 1,): which gaps between times (n,) [s] of a run are too long to be bridged."""
+    return np.diff(time) > max(BREAK, 10.0 * track.period)
+
+
+def stretches(time: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
+    """Start and end [s] of the parts of a run between long gaps that have enough samples."""
+    cut = np.flatnonzero(breaks(time, track))
+    first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
+    enough = last - first + 1 >= FEWEST
+    if not enough.any():
+        raise InputError(f"run '{track.run.name}': nowhere {FEWEST} samples without a long gap")
+    return time[first[enough]], time[last[enough]]
+
+
+def within(grid: Knots, time: np.ndarray) -> np.ndarray:
+    """(n,), which times [s] lie in a stretch."""
+    stretch = np.searchsorted(grid.start, time, side="right") - 1
+    return (stretch >= 0) & (time <= grid.end[stretch])
+
+
+def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Values (k, 3) in the k rows of a mask (n,), NaN in the others."""
+    found = np.full((where.size, values.shape[1]), np.nan)
+    found[where] = values
+    return found
+
+
+def _body_std(
+    eta: np.ndarray, u: np.ndarray, v: np.ndarray, eta_std: np.ndarray, eta_dot_std: np.ndarray
+) -> np.ndarray:
+    """Standard deviation of nu (n, 3), the heading's included; the channels are independent."""
+    c2, s2 = np.cos(eta[:, 2]) ** 2, np.sin(eta[:, 2]) ** 2
+    x, y = eta_dot_std[:, 0] ** 2, eta_dot_std[:, 1] ** 2
+    turn = eta_std[:, 2] ** 2
+    ahead, aside = c2 * x + s2 * y + v**2 * turn, s2 * x + c2 * y + u**2 * turn
+    return np.column_stack([np.sqrt(ahead), np.sqrt(aside), eta_dot_std[:, 2]])

@@ -1,0 +1,131 @@
+"""Build the FMUs: ``python -m fmus.build [NAME|FILE.py ...] [--out DIR]``, see ``--help``."""
+
+if __name__ == "__main__":
+    from fmus.interruption import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+import os
+import sys
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..declare import DeclarationError, Range, discover, variables
+from ..effects import STANDARD, EffectSet
+from ..interruption import run_interruptible
+from . import ledger
+from .building import build, cache_folder
+from .finding import BuildError, load, which
+from .start_values_file import read_starts
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; prints the path of each FMU, one a line, in the order asked for."""
+    parser = argparse.ArgumentParser(
+        prog="python -m fmus.build",
+        description="Build the project's FMUs, or an FMU from a component file of your own.",
+        epilog="examples:  python -m fmus.build\n"
+        "           python -m fmus.build vessel controller_abs --out fmu\n"
+        "           python -m fmus.build my_controller.py --out fmu\n"
+        "           python -m fmus.build --list vessel\n"
+        "           python -m fmus.build vessel --effects my_effects.py --out fmu\n"
+        "           python -m fmus.build --parameters model.ssv --out fmu\n"
+        "           python -m fmus.build --verify fmu/vessel.fmu",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
+    parser.add_argument(
+        "--list", action="store_true", help="list the FMUs, or the variables of those named"
+    )
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="build nothing; tell whether all programs in these .fmu files were built on this computer",
+    )
+    parser.add_argument(
+        "--effects",
+        type=Path,
+        metavar="FILE.py",
+        action="append",
+        default=[],
+        help="a file of model effects of your own, for vessel and thrusters; may be repeated",
+    )
+    parser.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE.ssv",
+        help="SSP parameter set whose values become start values (without NAME: of the FMUs it names)",
+    )
+    options = parser.parse_args(arguments)
+    try:
+        effects = STANDARD
+        for file in options.effects:
+            effects = effects.plus_file(file)
+        if options.verify:
+            _verify(options.names)
+        elif options.list:
+            _print_list(options.names, effects)
+        else:
+            starts = None if options.parameters is None else read_starts(options.parameters)
+            for path in build(options.names, options.out, starts, _note, effects):
+                print(path)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (BuildError, DeclarationError, OSError) as error:
+        print("error:", " ".join(str(error).split()), file=sys.stderr)
+        return 2
+    return 0
+
+
+def _verify(names: Sequence[str]) -> None:
+    """Refuse FMUs with a program file that no build on this computer has made.
+
+    Raises:
+        BuildError: names the first such file; or a file cannot be read.
+    """
+    for name in names:
+        try:
+            wrong = ledger.unknown_binary(Path(name), cache_folder())
+        except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
+            raise BuildError(f"'{name}' cannot be read: {error}") from error
+        if wrong:
+            raise BuildError(f"'{name}' was not built here: it holds '{wrong}'")
+
+
+def _print_list(names: Sequence[str], effects: EffectSet) -> None:
+    """Print the FMUs there are, or every variable of those that are named."""
+    if not names:
+        for _, component in discover():
+            print(f"{component.name:24} {component.description}")
+    for name in names:
+        _, component = load(*which(name), effects)
+        print(f"{component.name}: {component.description}")
+        kinds = [
+            ("parameter", component.params),
+            ("input", component.inputs),
+            ("output", component.outputs),
+        ]
+        for kind, group in kinds:
+            for v in variables(group):
+                start = f"{v.start:g}" if kind != "output" else ""
+                print(f"  {kind:10}{v.name:18}{start:>9} {v.unit:14}{v.description}{_limits(v.range)}")
+
+
+def _note(text: str) -> None:
+    print("note:", text, file=sys.stderr)
+
+
+def _limits(allowed: Range) -> str:
+    if allowed.min is None:
+        return "" if allowed.max is None else f", at most {allowed.max:g}"
+    return (
+        f", {allowed.min:g} to {allowed.max:g}" if allowed.max is not None else f", >= {allowed.min:g}"
+    )
+
+
+if __name__ == "__main__":
+    run_interruptible(main)

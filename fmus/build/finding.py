@@ -1,0 +1,92 @@
+"""Which component a name on the command line means: one of ours, or that of a user's file."""
+
+import importlib.util
+import keyword
+import math
+import traceback
+from pathlib import Path
+
+from ..base_units import base_exponents
+from ..declare import Component, DeclarationError, discover, nearest, width
+from ..effects import STANDARD, EffectSet
+from ..fmi.trace import trace_init, trace_step
+
+ROOT = Path(__file__).parent.parent
+
+
+class BuildError(Exception):
+    """What was asked for cannot be built; the message says why."""
+
+
+def which(name: str) -> tuple[str, Path | None]:
+    """What a name on the command line means: an FMU of ours, or a user's file and its stem."""
+    if not name.endswith(".py"):
+        return name.removesuffix(".fmu"), None
+    own_file = Path(name)
+    if not own_file.is_file():
+        raise BuildError(f"no such component file: '{name}'")
+    stem = own_file.stem
+    taken = {path.stem for path in ROOT.iterdir()}
+    if not stem.isidentifier() or keyword.iskeyword(stem) or stem in taken:
+        raise BuildError(f"'{name}': a component file cannot be called '{stem}'")
+    return stem, own_file
+
+
+def load(name: str, own_file: Path | None, effects: EffectSet = STANDARD) -> tuple[str, Component]:
+    """Module name and component of an FMU of ours with some effects, or of a user's file."""
+    if own_file is None:
+        known = {component.name: (module, component) for module, component in discover(effects)}
+        if name in known:
+            if effects.files:
+                _check_effects(known[name][1], effects)
+            return known[name]
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
+        raise BuildError(f"no FMU '{name}'{hint}")
+    spec = importlib.util.spec_from_file_location(own_file.stem, own_file)
+    if spec is None or spec.loader is None:
+        raise BuildError(f"'{own_file}' cannot be read as a Python module")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise BuildError(f"'{own_file}' fails when imported: {error!r}") from error
+    component = getattr(module, "COMPONENT", None)
+    if not isinstance(component, Component):
+        raise BuildError(f"'{own_file}' declares no COMPONENT = Component(...)")
+    try:
+        _check(component)
+    except Exception as error:
+        raise BuildError(f"{_place_of(error, own_file)}: {error}") from error
+    return f"fmus.{own_file.stem}", component
+
+
+def _check(component: Component) -> None:
+    """Find out now what is wrong with a user's component, while the error can still name the line."""
+    if not component.name.isidentifier() or not component.name.isascii():
+        raise DeclarationError(f"'{component.name}' cannot be the name of an FMU")
+    for v in component.variables:
+        base_exponents(v.unit)
+        if not math.isfinite(v.start):
+            raise DeclarationError(f"{v.name} starts at {v.start}")
+    for trace in (trace_init(component), trace_step(component)):
+        if len(trace.outputs) != width(component.outputs):
+            raise DeclarationError(
+                f"step gives {len(trace.outputs)} outputs, {width(component.outputs)} are declared"
+            )
+
+
+def _check_effects(component: Component, effects: EffectSet) -> None:
+    """Find out now whether a component works with the effects of a user's files."""
+    try:
+        _check(component)
+    except Exception as error:
+        places = [_place_of(error, file) for file in effects.files]
+        named = [place for place in places if ":" in place] or places
+        raise BuildError(f"{named[0]}: {error}") from error
+
+
+def _place_of(error: Exception, own_file: Path) -> str:
+    """File and line of a user's file where an error comes from."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [f for f in frames if Path(f.filename).resolve() == own_file.resolve()]
+    return f"{own_file}:{lines[-1].lineno}: {lines[-1].line}" if lines else str(own_file)

@@ -1,0 +1,334 @@
+"""The declaration of a model effect: what the real ship may have and the nominal model lacks.
+
+An effect is a pure function with the decorator :func:`effect`, which says everything about it in one
+place. From it come the parameters of the vessel's and the thrusters' FMU (zero: no effect), the force
+outputs, the table of the documentation, the candidates of an identification, and the text of a finding.
+The function's first arguments and its result belong to the kind:
+
+=============  ==========================================  =========================================
+kind           first arguments                             result
+=============  ==========================================  =========================================
+force          :class:`Motion`                             force on the hull (X, Y, N) [N, N, N m]
+environment    :class:`Motion`                             the same, or what ``gives`` says
+inertia        :class:`~fmus.hull.Inertia`                 the changed Inertia
+actuator       :class:`Thrust`, :class:`Running`           the changed Thrust
+actuator with  memory, three signals, step h [s]           the next memory, the changed signals
+a memory
+measurement    measured pose (x, y, psi) [m, m, rad]       the changed pose
+=============  ==========================================  =========================================
+
+Every further argument is a parameter, ``name: Annotated[float, unit, description, Range?] = start``. The
+parameters that start at zero are the effect's coefficients: with all of them zero there is no effect.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from inspect import signature
+from typing import Any, Literal, NamedTuple, get_args, get_type_hints
+
+from ..declare import DeclarationError, Variable, variables
+from ..docstring import docstring
+from .families import UNKNOWN, Family
+
+Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
+Device = Literal["vsp", "bow"]
+# Pictures that show an effect: its force over speed or command, drawn by the report.
+Picture = Literal[
+    "hull surge force over surge speed",
+    "VSP surge force over command",
+    "VSP sway force over command",
+    "bow effectiveness over surge speed",
+    "VSP force given over commanded",
+    "bow force given over commanded",
+]
+
+
+class Motion(NamedTuple):
+    """Pose, heading continuous over turns, velocity, and time.
+
+    A force on the hull may depend on all of it; to an effect the velocity is that through the water.
+    """
+
+    x: Any = 0.0
+    y: Any = 0.0
+    psi: Any = 0.0
+    u: Any = 0.0
+    v: Any = 0.0
+    r: Any = 0.0
+    t: Any = 0.0
+
+
+class Running(NamedTuple):
+    """What a thruster's force may depend on: time [s], velocity, commands -1...1."""
+
+    t: Any = 0.0
+    u: Any = 0.0
+    v: Any = 0.0
+    r: Any = 0.0
+    u_vsp_x: Any = 0.0
+    u_vsp_y: Any = 0.0
+    u_bow: Any = 0.0
+
+
+class Thrust(NamedTuple):
+    """Forces of the thrusters [N], and what turns their sum into tau.
+
+    ``loss_*`` is the part of tau that is lost on each axis; ``dx`` and ``dy`` [m] is how far from the
+    assumed point the force acts.
+    """
+
+    vsp_x: Any = 0.0
+    vsp_y: Any = 0.0
+    bow: Any = 0.0
+    loss_X: Any = 0.0
+    loss_Y: Any = 0.0
+    loss_N: Any = 0.0
+    dx: Any = 0.0
+    dy: Any = 0.0
+
+
+class Memory(NamedTuple):
+    """How an actuator effect depends on the past.
+
+    Attributes:
+        initial: the memory before anything was commanded, nested tuples of floats.
+        of: the three signals that it changes: commands on their way to the thrusters, or the shares of
+            full force that the thrusters give.
+        lasts: ``lasts(*parameters)``: time [s] after which what was commanded before no longer matters.
+        keeps: how many steps of the past it holds; None: as many as there are.
+        idle: ``idle(memory, signals)``: the memory after a step in which the effect does not act, from
+            which it starts if it is switched on; by default it stays as it is.
+    """
+
+    initial: Any
+    of: Literal["command", "force"]
+    lasts: Callable[..., Any]
+    keeps: int | None = None
+    idle: Callable[[Any, Any], Any] | None = None
+
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Search:
+    """How an identification finds the parameters of an effect.
+
+    Attributes:
+        by: ``regression`` on the model error, or a peak in its ``spectrum``.
+        differentiable: whether the force may be linearised about zero; by default, if it is linear.
+        tries: values to try of the parameters that the force is not linear in, each a mapping from
+            parameter to value; or a function that makes them of the parameters of the model in use. The
+            best is refined afterwards. An effect that is neither differentiable nor has any is tried at
+            multiples of the value of each coefficient at which its force is as large as the model error,
+            and refined in all parameters that are no settings.
+        fitted: parameters that are fitted by regression at each value tried; by default all
+            coefficients of a differentiable effect, else none.
+        change_points: parameters that are times within a run [s]: tried throughout each run, and refined
+            by search, as the fit has no slope by them.
+        smooth: whether the coefficients are values of a curve at equally spaced nodes, of which
+            neighbours are alike.
+    """
+
+    by: Literal["regression", "spectrum"] = "regression"
+    differentiable: bool | None = None
+    tries: Iterable[Values] | Callable[[Values], Iterable[Values]] = ()
+    fitted: tuple[str, ...] | None = None
+    change_points: tuple[str, ...] = ()
+    smooth: bool = False
+
+    def values(self, nominal: Values) -> list[Values]:
+        """The values to try, for a model with these parameters."""
+        return list(self.tries(nominal) if callable(self.tries) else self.tries)
+
+
+@dataclass(frozen=True)
+class Wording:
+    """How a finding is put into words.
+
+    Attributes:
+        sentence: the finding in one sentence, from a :class:`~fmus.effects.text.Found`; by default the
+            effect's description.
+        family: effects of a kind, with the manoeuvre that brings them out.
+        apart: id of another effect -> what to run so that the two can be told apart.
+        pictures: curves to draw.
+    """
+
+    sentence: Callable[[Any], str] | None = None
+    family: Family = UNKNOWN
+    apart: Mapping[str, str] = field(default_factory=dict)
+    pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One effect.
+
+    Attributes:
+        id: its name in scenarios, reports and results.
+        kind: what it acts on, see the table above.
+        axis: axes that its force acts on: X, Y, N, XY, XN, YN or XYN.
+        description: one line for people.
+        formula, symbol, sign, source: how it is written, what positive values do, where it is from.
+        linear: whether the force is linear in the coefficients.
+        parameters: its parameters, in the order of the function's arguments.
+        function: the effect itself; None where no FMU has it, but the measurement system.
+        settings: parameters that are given and never fitted.
+        gives: a ``force``; ``water velocity``, body-fixed (u, v) [m/s, m/s]; or the name of the damping
+            coefficient that it adds to.
+        needs: thrusters that a ship must have for it.
+        memory: how it depends on the past; None: not at all.
+        search, wording: see there.
+    """
+
+    id: str
+    kind: Kind
+    axis: str
+    description: str
+    formula: str
+    symbol: str
+    sign: str
+    source: str
+    linear: bool
+    parameters: tuple[Variable, ...]
+    function: Callable[..., Any] | None
+    settings: frozenset[str] = frozenset()
+    gives: str = "force"
+    needs: frozenset[str] = frozenset()
+    memory: Memory | None = None
+    search: Search = Search()
+    wording: Wording = Wording()
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function gives."""
+        assert self.function is not None
+        return self.function(*arguments)
+
+    @property
+    def slug(self) -> str:
+        """The id as a name of variables: ``X_absu_u`` for ``X_|u|u``."""
+        named = re.sub(r"\|(\w)\|", r"abs\1_", self.id)
+        return re.sub(r"\W+", "_", named).strip("_")
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the parameters that are zero where there is no effect."""
+        return tuple(p.name for p in self.parameters if p.start == 0.0 and p.name not in self.settings)
+
+    @property
+    def shape_parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that say how the effect acts, not how strong it is."""
+        return tuple(p.name for p in self.parameters if p.start != 0.0 and p.name not in self.settings)
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether the force may be linearised about zero."""
+        return self.linear if self.search.differentiable is None else self.search.differentiable
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Parameters that a regression finds."""
+        if self.search.fitted is not None:
+            return self.search.fitted
+        return self.coefficients if self.differentiable else ()
+
+    def regressors(self, *at: Any) -> list[Any]:
+        """What one unit of each coefficient gives alone, for an effect that is linear in them.
+
+        Args:
+            at: the function's leading arguments, scalars or arrays in them.
+
+        Returns:
+            For each coefficient the function's result.
+        """
+        if not self.linear or self.function is None:
+            raise ValueError(f"{self.id} is not linear in its coefficients")
+        starts = {p.name: p.start for p in self.parameters}
+        units = [starts | {name: 1.0} for name in self.coefficients]
+        return [self.function(*at, *unit.values()) for unit in units]
+
+
+def effect(
+    id: str,  # noqa: A002
+    kind: Kind,
+    axis: str,
+    *,
+    formula: str = "",
+    symbol: str = "",
+    sign: str = "",
+    source: str = "",
+    linear: bool = True,
+    settings: Iterable[str] = (),
+    **more: Any,
+) -> Callable[[Callable[..., Any]], Effect]:
+    """Decorator that makes an effect of a function; its docstring's first line describes it.
+
+    Args:
+        id, kind, axis, formula, symbol, sign, source, linear, settings: see :class:`Effect`.
+        more: further fields of :class:`Effect`: gives, needs, memory, search, wording; and parameters,
+            where the function does not declare them in its signature, with description.
+
+    Raises:
+        DeclarationError: unknown kind, axis or field, or a parameter without unit, description or start.
+    """
+    unknown = set(more) - {"gives", "needs", "memory", "search", "wording", "parameters", "description"}
+    if unknown:
+        raise DeclarationError(f"{id}: an effect has no '{min(unknown)}'")
+
+    def declare(function: Callable[..., Any]) -> Effect:
+        if kind not in get_args(Kind):
+            raise DeclarationError(f"{id}: no kind '{kind}'; there are {', '.join(get_args(Kind))}")
+        if not axis or not set(axis) <= set("XYN"):
+            raise DeclarationError(f"{id}: the axis must be made of X, Y and N, not '{axis}'")
+        lines = (more.get("description") or docstring(function)).strip().splitlines()
+        if not lines:
+            raise DeclarationError(f"{id}: the first line of the docstring describes the effect")
+        memory = more.get("memory")
+        leading = 3 if memory is not None else 2 if kind == "actuator" else 1
+        parameters = more.get("parameters") or _parameters(id, leading, function)
+        how = frozenset(settings)
+        strengths = [p.name for p in parameters if p.start == 0.0 and p.name not in how]
+        if not strengths:
+            raise DeclarationError(f"{id} needs a parameter that starts at 0, where it has no effect")
+        search: Search = more.get("search", Search())
+        named = {*how, *(search.fitted or ()), *search.change_points}
+        strange = sorted(named - {p.name for p in parameters})
+        if strange:
+            raise DeclarationError(f"{id} has no parameter '{strange[0]}'")
+        return Effect(
+            id,
+            kind,
+            axis,
+            lines[0],
+            formula,
+            symbol or ", ".join(strengths),
+            sign,
+            source,
+            linear,
+            parameters,
+            function,
+            how,
+            more.get("gives", "force"),
+            frozenset(more.get("needs", ())),
+            memory,
+            search,
+            more.get("wording", Wording()),
+        )
+
+    return declare
+
+
+def _parameters(name: str, leading: int, function: Callable[..., Any]) -> tuple[Variable, ...]:
+    """The declared parameters of an effect's function."""
+    arguments = list(signature(function).parameters.values())[leading:]
+    hints = get_type_hints(function, include_extras=True)
+    group = type(
+        name,
+        (),
+        {
+            "__annotations__": {a.name: hints.get(a.name, Any) for a in arguments},
+            "_field_defaults": {a.name: a.default for a in arguments if a.default is not a.empty},
+        },
+    )
+    return variables(group)

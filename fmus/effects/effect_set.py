@@ -1,0 +1,168 @@
+"""Sets of effects: those of this project, and with a user's."""
+
+import hashlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..declare import DeclarationError, nearest
+from .effect import Effect, Kind, Motion, Running, Thrust
+
+ROOM = Path(__file__).parent
+
+
+class EffectSet(Mapping[str, Effect]):
+    """Effects by id, in the order of declaration; no two have an id or a parameter in common.
+
+    Args:
+        effects: the effects.
+        files: users' files that some of them are from.
+
+    Raises:
+        DeclarationError: an id or a parameter is declared twice.
+    """
+
+    def __init__(self, effects: Iterable[Effect], files: Iterable[Path] = ()) -> None:
+        self._effects: dict[str, Effect] = {}
+        self.files = tuple(files)
+        taken: dict[str, str] = {}
+        for e in effects:
+            if e.id in self._effects:
+                raise DeclarationError(f"there is an effect '{e.id}' already")
+            for p in e.parameters:
+                if p.name in taken:
+                    owner = taken[p.name]
+                    raise DeclarationError(f"'{p.name}' is a parameter of the effect '{owner}' already")
+                taken[p.name] = e.id
+            self._effects[e.id] = e
+
+    def __getitem__(self, name: str) -> Effect:
+        if name not in self._effects:
+            raise KeyError(f"no effect '{name}'{nearest(name, self._effects)}")
+        return self._effects[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._effects)
+
+    def __len__(self) -> int:
+        return len(self._effects)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    def of_kind(self, *kinds: Kind) -> list[Effect]:
+        """The effects of some kinds: kind by kind, in the order of declaration."""
+        return [e for kind in kinds for e in self.values() if e.kind == kind]
+
+    def plus(self, effects: Iterable[Effect], file: Path | None = None) -> "EffectSet":
+        """The set with further effects, of a user's file.
+
+        Raises:
+            DeclarationError: an id or a parameter is taken, or an effect is called linear and is not.
+        """
+        effects = list(effects)
+        for e in effects:
+            if e.linear and not is_linear(e):
+                raise DeclarationError(
+                    f"'{e.id}': twice the coefficient is not twice the effect; "
+                    "declare it with linear=False"
+                )
+        return EffectSet([*self.values(), *effects], [*self.files, *([] if file is None else [file])])
+
+    def plus_file(self, path: Path) -> "EffectSet":
+        """The set with the effects of a user's file.
+
+        Args:
+            path: a Python file with functions decorated by :func:`fmus.effects.effect`.
+
+        Raises:
+            DeclarationError: the file cannot be read, fails, or has no effect, or one that is taken.
+        """
+        taken = {found.stem for found in (*ROOM.iterdir(), *self.files)}
+        if not path.stem.isidentifier() or path.stem in taken:
+            raise DeclarationError(f"'{path}': a file of effects cannot be called '{path.stem}'")
+        if not path.is_file():
+            raise DeclarationError(f"no such Python file of effects: '{path}'")
+        # The same name may mean another file for another ship of this process.
+        digest = hashlib.sha256(str(path.resolve()).encode() + path.read_bytes()).hexdigest()[:8]
+        name = f"{__package__}.{path.stem}_{digest}"
+        module = sys.modules.get(name) or _imported(name, path)
+        found = effects_of(module)
+        if not found:
+            raise DeclarationError(
+                f"'{path}' registers no effect; decorate a function with @effect(...)"
+            )
+        try:
+            return self.plus(found, path)
+        except DeclarationError as error:
+            raise DeclarationError(f"'{path}': {error}") from error
+
+
+def _imported(name: str, path: Path) -> ModuleType:
+    """The module of a user's file; no bytecode is kept beside it, which could be of an older one."""
+    module = ModuleType(name)
+    module.__file__, module.__package__ = str(path), __package__
+    sys.modules[name] = module
+    try:
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise DeclarationError(f"'{path}' fails when imported: {error!r}") from error
+    return module
+
+
+# Motion and thrust at which effects are compared, so large that squares and products all count.
+_AT = (
+    (Motion(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0), Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5)),
+    (Motion(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0), Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5)),
+)
+
+
+def is_linear(e: Effect) -> bool:
+    """Whether each coefficient's effect grows in proportion with it, as far as two motions show.
+
+    Of effects with a memory, on inertia or on the measurement it is not known, and taken to be so.
+    """
+    if e.memory is not None or e.kind not in ("force", "environment", "actuator"):
+        return True
+    for motion, running in _AT:
+        thrust = Thrust(0.7, -0.5, 1.3) if running.u_vsp_x > 0.0 else Thrust(-0.7, 0.5, -1.3)
+        at = (thrust, running) if e.kind == "actuator" else (motion,)
+        for name in e.coefficients:
+            none, once, twice = (_flat(e, at, {name: k * _unit(e, name)}) for k in (0.0, 0.5, 1.0))
+            size = max(abs(b - a) for a, b in zip(none, twice, strict=True))
+            off = [abs(a - 2.0 * b + c) for a, b, c in zip(none, once, twice, strict=True)]
+            if max(off) > 1e-6 * size:
+                return False
+    return True
+
+
+def _unit(e: Effect, name: str) -> float:
+    """One, or the end of a coefficient's range if that is nearer."""
+    limits = next(p.range for p in e.parameters if p.name == name)
+    return 1.0 if limits.max is None else min(1.0, limits.max)
+
+
+def _flat(e: Effect, at: tuple[Any, ...], values: Mapping[str, float]) -> list[float]:
+    """What an effect gives with some values of its parameters, as floats."""
+    return [float(x) for x in e(*at, *[values.get(p.name, p.start) for p in e.parameters])]
+
+
+def effects_of(module: ModuleType) -> list[Effect]:
+    """The effects that a module declares, single ones and those in tuples, in the order of names."""
+    found: dict[int, Effect] = {}
+    for value in vars(module).values():
+        for e in value if isinstance(value, tuple) else (value,):
+            if isinstance(e, Effect) and _declared_in(e, module):
+                found[id(e)] = e
+    return list(found.values())
+
+
+def _declared_in(e: Effect, module: ModuleType) -> bool:
+    """Whether a module declares an effect, rather than imports it."""
+    return e.function is None or e.function.__module__ == module.__name__

@@ -1,0 +1,78 @@
+"""What the sentences of all effects share: the finding, and how numbers read."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import atan2, degrees
+
+from .effect import Effect
+
+SIDES = {"X": ("ahead", "astern"), "Y": ("to starboard", "to port"), "N": ("to starboard", "to port")}
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that was found.
+
+    Attributes:
+        effect: which.
+        values: of its parameters: of coefficients additions to the nominal ones. One that is not given
+            is as it is declared, which for a coefficient is 0.
+        speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
+    """
+
+    effect: Effect
+    values: Mapping[str, float]
+    speeds: tuple[float, float, float] = (0.1, 0.05, 0.1)
+
+    def __getitem__(self, name: str) -> float:
+        declared = {p.name: p.start for p in self.effect.parameters}
+        return self.values.get(name, declared[name])
+
+
+def number(x: float) -> str:
+    """The size of a number."""
+    return f"{abs(x):.3g}"
+
+
+def percent(x: float) -> str:
+    """The size of a share."""
+    return f"{100.0 * abs(x):.3g} %"
+
+
+def towards(x: float, unit: str, axis: str) -> str:
+    """A force or a way with its direction, such as ``0.3 N astern``."""
+    return f"{number(x)} {unit} {SIDES[axis][x < 0.0]}"
+
+
+def compass(north: float, east: float) -> str:
+    """The direction of a vector, such as ``90°``."""
+    return f"{degrees(atan2(east, north)) % 360.0:.0f}°"
+
+
+def capital(text: str) -> str:
+    """The text with a capital letter at its start."""
+    return text[:1].upper() + text[1:]
+
+
+def lost(name: str, less: str, more: str) -> Callable[[Found], str]:
+    """The sentence of a share that is lost, or gained where it is negative."""
+    return lambda f: (less if f[name] > 0.0 else more).format(percent(f[name]))
+
+
+def offset(f: Found, name: str) -> str:
+    """A place on the ship, by the parameters ``name_dx`` and ``name_dy`` [m]."""
+    ways = (towards(100.0 * f[f"{name}_dx"], "cm", "X"), towards(100.0 * f[f"{name}_dy"], "cm", "Y"))
+    return " and ".join(ways)
+
+
+def peak(f: Found) -> tuple[float, float]:
+    """Where a curve is furthest from zero, as a share of its way from the first node, and its value."""
+    nodes = [f[name] for name in f.effect.coefficients]
+    k = max(range(len(nodes)), key=lambda i: abs(nodes[i]))
+    return k / (len(nodes) - 1), nodes[k]
+
+
+def reach(f: Found) -> float:
+    """The range of a curve's nodes."""
+    (setting,) = (p for p in f.effect.parameters if p.name in f.effect.settings)
+    return f[setting.name]

@@ -1,0 +1,105 @@
+"""Thrusters that follow their commands late or slowly."""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import Range
+from ..hull import Triple
+from ..ops import Number, exp, floor, fmax, pick, when, where
+from .effect import Memory, Search, Wording, effect
+from .families import SYNC_PULSE, TIMING
+from .text import number
+
+# Commands that a delay keeps; a longer one is remembered in coarser steps.
+SLOTS = 64
+# Values to try [s]: from a sample or two to the longest that a ship of this size could be steered with.
+TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5)
+AT_REST = (0.0, 0.0, 0.0)
+FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier command is left
+LONGEST = Range(0.0, 60.0)  # s
+
+
+@effect(
+    "lag",
+    "actuator",
+    "XYN",
+    formula="T df/dt = f_cmd - f",
+    symbol="T",
+    sign="0: none",
+    source="6.4.5",
+    linear=False,
+    description="first-order lag of all thrusters",
+    memory=Memory(
+        AT_REST,
+        "force",
+        lambda lag: FORGOTTEN * lag,
+        idle=lambda before, wanted: wanted,
+    ),
+    search=Search(tries=[{"lag": T} for T in (*TIMES, 2.0)]),
+    wording=Wording(
+        lambda f: (
+            f"The thrusters follow their commands slowly, with a time constant of {number(f['lag'])} s."
+        ),
+        TIMING,
+        {
+            "delay": "give steps in the commands, and measure faster",
+            "clock_offset": "give steps in the commands; " + SYNC_PULSE,
+        },
+    ),
+)
+def lag(
+    before: Triple,
+    wanted: Triple,
+    h: Number,
+    lag: Annotated[float, "s", "first-order lag of all thrusters", LONGEST] = 0.0,
+) -> tuple[Triple, Triple]:
+    """First-order lag, exact at the step's end for an input that is held over it."""
+    share = 1.0 - exp(-h / fmax(lag, 1e-9))
+    a, b, c = (x + share * (w - x) for x, w in zip(before, wanted, strict=True))
+    return (a, b, c), (a, b, c)
+
+
+class Kept(NamedTuple):
+    """Commands that a delay remembers, the latest first, and the time since the latest [s]."""
+
+    since: Any = 0.0
+    commands: tuple[Triple, ...] = (AT_REST,) * SLOTS
+
+
+@effect(
+    "delay",
+    "actuator",
+    "XYN",
+    formula="f(t) = f_cmd(t - T)",
+    symbol="T",
+    sign="0: none",
+    source="6.4.5",
+    linear=False,
+    description="pure delay of all thrusters",
+    memory=Memory(Kept(), "command", lambda delay: delay, keeps=SLOTS),
+    search=Search(tries=[{"delay": T} for T in TIMES]),
+    wording=Wording(
+        lambda f: f"The thrusters act {number(f['delay'])} s after they are commanded.",
+        TIMING,
+        {"clock_offset": SYNC_PULSE},
+    ),
+)
+def delay(
+    kept: Kept,
+    command: Triple,
+    h: Number,
+    delay: Annotated[float, "s", "pure delay of all thrusters", LONGEST] = 0.0,
+) -> tuple[Kept, Triple]:
+    """Pure delay: the mean over the step of held commands of some time ago."""
+    since = kept.since + h
+    # Time between two remembered commands: a step, or more where the delay is long.
+    tick = fmax(fmax(h, delay / (SLOTS - 1.0)), 1e-9)
+    due = (h > 0.0) & (since >= tick - 1e-9)
+    commands = when(due, lambda: (command, *kept.commands[:-1]), lambda: kept.commands)
+    place = delay / tick
+    ago = floor(place + 1e-6)
+    part = fmax(0.0, place - ago)
+    arriving = tuple(
+        (1.0 - part) * a + part * b
+        for a, b in zip(pick(commands, ago), pick(commands, ago + 1.0), strict=True)
+    )
+    return Kept(where(due, since - tick, since), commands), arriving

@@ -1,0 +1,120 @@
+"""A component's modelDescription.xml, FMI 2.0.4, from its declaration and nothing else."""
+
+from xml.etree.ElementTree import Element, SubElement
+
+from ..base_units import base_exponents
+from ..declare import Component, Variable, width
+from .trace import initial_dependencies, output_dependencies
+
+LOG_CATEGORIES = {
+    "logStatusWarning": "A value was refused or replaced.",
+    "logStatusError": "A step failed; the state is the one before it.",
+    "logAll": "Everything else.",
+}
+
+
+def model_description(component: Component, guid: str, version: str) -> Element:
+    """The XML description of the FMU of a component.
+
+    Args:
+        component: the declaration.
+        guid: identifies code and declaration.
+        version: of the project.
+
+    Returns:
+        Root element. Value references count parameters, inputs and outputs, in this order.
+    """
+    root = Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=component.name,
+        guid=guid,
+        description=component.description,
+        version=version,
+        generationTool="pythonfmu",
+        variableNamingConvention="flat",
+        numberOfEventIndicators="0",
+    )
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=component.name,
+        needsExecutionTool="true",
+        canHandleVariableCommunicationStepSize="true",
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
+    )
+    _units(root, component)
+    categories = SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=name, description=text)
+    SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize="0.01")
+    _variables(root, component)
+    return root
+
+
+def _units(root: Element, component: Component) -> None:
+    definitions = SubElement(root, "UnitDefinitions")
+    for unit in sorted({v.unit for v in component.variables}):
+        exponents = {base: str(e) for base, e in base_exponents(unit).items()}
+        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+
+
+def _variables(root: Element, component: Component) -> None:
+    parameters, inputs = width(component.params), width(component.inputs)
+    outputs = width(component.outputs)
+    listed = SubElement(root, "ModelVariables")
+    for reference, v in enumerate(component.variables):
+        if reference < parameters:
+            kind = {"causality": "parameter", "variability": "fixed" if v.fixed else "tunable"}
+        elif reference < parameters + inputs:
+            # What only counts at communication points is what the standard calls discrete.
+            held = v.name in component.held
+            kind = {"causality": "input", "variability": "discrete" if held else "continuous"}
+        else:
+            kind = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+        scalar = SubElement(
+            listed,
+            "ScalarVariable",
+            name=v.name,
+            valueReference=str(reference),
+            description=v.description,
+        )
+        scalar.attrib.update(kind)
+        SubElement(scalar, "Real", _real(v, start=reference < parameters + inputs))
+
+    structure = SubElement(root, "ModelStructure")
+    first = parameters + inputs
+    for tag, depends in (
+        ("Outputs", output_dependencies(component)),
+        ("InitialUnknowns", initial_dependencies(component)),
+    ):
+        if not outputs:
+            continue
+        unknowns = SubElement(structure, tag)
+        for k, names in enumerate(depends):
+            indices = sorted(_index(name, parameters) for name in names)
+            SubElement(
+                unknowns,
+                "Unknown",
+                index=str(first + k + 1),
+                dependencies=" ".join(map(str, indices)),
+            )
+
+
+def _index(name: str, parameters: int) -> int:
+    """The one-based index of a traced variable among the ScalarVariables."""
+    group, _, number = name.rstrip("]").partition("[")
+    return int(number) + 1 + (parameters if group == "inputs" else 0)
+
+
+def _real(v: Variable, start: bool) -> dict[str, str]:
+    attributes = {"unit": v.unit}
+    if v.range.min is not None:
+        attributes["min"] = repr(v.range.min)
+    if v.range.max is not None:
+        attributes["max"] = repr(v.range.max)
+    if start:
+        attributes["start"] = repr(v.start)
+    return attributes

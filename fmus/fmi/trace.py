@@ -1,0 +1,258 @@
+"""Run a component on symbols: what its functions compute, as an expression graph.
+
+Tracing shows which outputs use which inputs (the ``dependencies`` of an FMU), and it proves that a
+component keeps to the style that makes one source run everywhere: branching on a value, ``float()``
+or ``math.sin()`` of one raises :class:`TraceError`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .. import ops
+from ..declare import Component, flatten, packer, rebuild, variables
+
+OPERATIONS = {
+    "sin": ops.sin,
+    "cos": ops.cos,
+    "exp": ops.exp,
+    "log": ops.log,
+    "sqrt": ops.sqrt,
+    "floor": ops.floor,
+    "atan2": ops.atan2,
+    "where": ops.where,
+    "fmin": ops.fmin,
+    "fmax": ops.fmax,
+    "logical_not": ops.not_,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "abs": abs,
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "gt": lambda a, b: a > b,
+    "ge": lambda a, b: a >= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+    "and": lambda a, b: a & b,
+    "or": lambda a, b: a | b,
+}
+
+
+class TraceError(Exception):
+    """A component does with a value what cannot be traced."""
+
+
+class Symbol:
+    """A value that is not known yet: a variable, or an operation on other values."""
+
+    __slots__ = ("args", "operation")
+    __array_ufunc__ = None
+
+    def __init__(self, operation: str, args: Sequence[Any]) -> None:
+        self.operation = operation
+        self.args = tuple(args)
+
+    def apply_operation(self, name: str, args: Sequence[Any]) -> Symbol:
+        """The hook that :mod:`fmus.ops` looks for."""
+        return Symbol(name, args)
+
+    def __add__(self, other: Any) -> Symbol:
+        return Symbol("add", (self, other))
+
+    def __radd__(self, other: Any) -> Symbol:
+        return Symbol("add", (other, self))
+
+    def __sub__(self, other: Any) -> Symbol:
+        return Symbol("sub", (self, other))
+
+    def __rsub__(self, other: Any) -> Symbol:
+        return Symbol("sub", (other, self))
+
+    def __mul__(self, other: Any) -> Symbol:
+        return Symbol("mul", (self, other))
+
+    def __rmul__(self, other: Any) -> Symbol:
+        return Symbol("mul", (other, self))
+
+    def __truediv__(self, other: Any) -> Symbol:
+        return Symbol("div", (self, other))
+
+    def __rtruediv__(self, other: Any) -> Symbol:
+        return Symbol("div", (other, self))
+
+    def __neg__(self) -> Symbol:
+        return Symbol("neg", (self,))
+
+    def __abs__(self) -> Symbol:
+        return Symbol("abs", (self,))
+
+    def __lt__(self, other: Any) -> Symbol:
+        return Symbol("lt", (self, other))
+
+    def __le__(self, other: Any) -> Symbol:
+        return Symbol("le", (self, other))
+
+    def __gt__(self, other: Any) -> Symbol:
+        return Symbol("gt", (self, other))
+
+    def __ge__(self, other: Any) -> Symbol:
+        return Symbol("ge", (self, other))
+
+    def __eq__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return Symbol("eq", (self, other))
+
+    def __ne__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return Symbol("ne", (self, other))
+
+    def __and__(self, other: Any) -> Symbol:
+        return Symbol("and", (self, other))
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Symbol:
+        return Symbol("or", (self, other))
+
+    __ror__ = __or__
+
+    __hash__ = object.__hash__
+
+    def _refuse(self, *_: Any) -> Any:
+        raise TraceError(
+            "a component may not branch on a value, convert it, raise it by **, or pass it to math or "
+            "numpy; use where, clip, fmin, fmax, power and the functions of fmus.ops"
+        )
+
+    __bool__ = __float__ = __int__ = __index__ = __iter__ = __len__ = _refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __pow__ = __rpow__ = _refuse
+    __invert__ = __round__ = __array__ = _refuse
+
+
+def variable(name: str) -> Symbol:
+    """A symbol that stands for a value from outside."""
+    return Symbol("variable", (name,))
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A component's state and outputs as expressions of its variables.
+
+    The variables are called ``params[k]``, ``inputs[k]``, ``state[k]`` (k counts scalars) and ``h``.
+    """
+
+    state: list[Any]
+    outputs: list[Any]
+
+
+def _symbols(group: str, count: int) -> list[Symbol]:
+    return [variable(f"{group}[{k}]") for k in range(count)]
+
+
+def trace_init(component: Component) -> Trace:
+    """The initial state, and the outputs that belong to it (a step with h = 0)."""
+    params = _pack(component.params, "params")
+    inputs = _pack(component.inputs, "inputs")
+    state = component.init(inputs, params)
+    _, outputs = component.step(state, inputs, params, 0.0)
+    return Trace(flatten(state), flatten(outputs))
+
+
+def trace_step(component: Component, h: Any = None) -> Trace:
+    """State and outputs after a step of ``h`` (default: a symbol) from a state of symbols."""
+    start = component.init(packer(component.inputs)(_starts(component.inputs)), component.params())
+    symbols = _symbols("state", len(flatten(start)))
+    state, outputs = component.step(
+        rebuild(start, symbols),
+        _pack(component.inputs, "inputs"),
+        _pack(component.params, "params"),
+        variable("h") if h is None else h,
+    )
+    return Trace(flatten(state), flatten(outputs))
+
+
+def _starts(cls: type[Any]) -> list[float]:
+    return flatten(cls())
+
+
+def _pack(cls: type[Any], group: str) -> Any:
+    return packer(cls)(_symbols(group, len(_starts(cls))))
+
+
+def ordered(results: Iterable[Any]) -> list[Symbol]:
+    """Every symbol that the results need, arguments before what uses them."""
+    order: list[Symbol] = []
+    seen: set[int] = set()
+    pending: list[tuple[Any, bool]] = [(r, False) for r in results]
+    while pending:
+        node, ready = pending.pop()
+        if not isinstance(node, Symbol) or (id(node) in seen):
+            continue
+        if ready or node.operation == "variable":
+            seen.add(id(node))
+            order.append(node)
+        else:
+            pending.append((node, True))
+            pending += [(arg, False) for arg in node.args]
+    return order
+
+
+def evaluate(results: Sequence[Any], values: dict[str, Any]) -> list[Any]:
+    """The numbers that traced results take for given values of the variables."""
+    known: dict[int, Any] = {}
+    for node in ordered(results):
+        if node.operation == "variable":
+            known[id(node)] = values[node.args[0]]
+        else:
+            args = [known[id(a)] if isinstance(a, Symbol) else a for a in node.args]
+            known[id(node)] = OPERATIONS[node.operation](*args)
+    return [known[id(r)] if isinstance(r, Symbol) else r for r in results]
+
+
+def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
+    """Names of the variables that each result depends on; a factor that is exactly 0 cuts."""
+    known: dict[int, frozenset[str] | float] = {}
+    nothing: frozenset[str] = frozenset()
+
+    def of(arg: Any) -> frozenset[str] | float:
+        return known[id(arg)] if isinstance(arg, Symbol) else arg
+
+    for node in ordered(results):
+        if node.operation == "variable":
+            known[id(node)] = frozenset(node.args)
+            continue
+        args = [of(a) for a in node.args]
+        if all(not isinstance(a, frozenset) for a in args):
+            known[id(node)] = OPERATIONS[node.operation](*args)
+        elif 0.0 in {"mul": args, "div": args[:1]}.get(node.operation, ()):
+            known[id(node)] = 0.0
+        elif node.operation == "where" and not isinstance(args[0], frozenset):
+            known[id(node)] = args[1] if args[0] else args[2]
+        elif node.operation == "and" and any(a is False for a in args):
+            known[id(node)] = False
+        else:
+            known[id(node)] = nothing.union(*[a for a in args if isinstance(a, frozenset)])
+    found = [of(r) for r in results]
+    return [r if isinstance(r, frozenset) else nothing for r in found]
+
+
+def output_dependencies(component: Component) -> list[frozenset[str]]:
+    """Inputs that each output follows at the same communication point.
+
+    A sampled law uses the input of the instant at which it acts, unless it is held. A plant's state at
+    the end of a step of vanishing length does not depend on the input, so there only direct feedthrough
+    is left.
+    """
+    trace = trace_step(component, None if component.sampled else 0.0)
+    followed = {
+        f"inputs[{k}]" for k, v in enumerate(variables(component.inputs)) if v.name not in component.held
+    }
+    return [names & followed for names in used_variables(trace.outputs)]
+
+
+def initial_dependencies(component: Component) -> list[frozenset[str]]:
+    """Parameters and inputs that each output depends on at initialisation."""
+    return used_variables(trace_init(component).outputs)

@@ -1,0 +1,70 @@
+"""The model effects that act on a vessel: their parameters, and their forces as outputs."""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from ..declare import variables, vector
+from ..effects import Effect, EffectSet, Motion
+from ..effects.group import Group, group
+from ..hull import Damping
+
+NONE = (0.0, 0.0, 0.0)
+
+
+class VesselEffects(NamedTuple):
+    """The effects of a set that act on a vessel, by what they act on.
+
+    Attributes:
+        water: velocity of the water.
+        changes: additions to damping coefficients, in the order of :class:`~fmus.hull.Damping`.
+        outside: all other forces on the hull.
+        inertia, measurement: what changes mass and inertia, and the measured pose.
+        change_forces, outside_forces: NamedTuple classes of the force outputs.
+    """
+
+    water: Group
+    changes: Group
+    outside: Group
+    inertia: Group
+    measurement: Group
+    change_forces: type[Any]
+    outside_forces: type[Any]
+
+
+@cache
+def vessel_effects(effects: EffectSet) -> VesselEffects:
+    """The groups of a set of effects."""
+    order = [v.name for v in variables(Damping)]
+    forces = effects.of_kind("force", "environment")
+    changes = sorted((e for e in forces if e.gives in order), key=lambda e: order.index(e.gives))
+    outside = [e for e in forces if e.gives == "force"]
+    return VesselEffects(
+        group("Current", [e for e in forces if e.gives == "water velocity"]),
+        group("DampingChanges", changes),
+        group("OutsideForces", outside),
+        group("InertiaEffects", effects.of_kind("inertia")),
+        group(
+            "MeasurementEffects",
+            [e for e in effects.of_kind("measurement") if e.function is not None],
+        ),
+        vector("ChangeForces", [o for e in changes for o in _outputs_of(e)]),
+        vector("OutsideForces", [o for e in outside for o in _outputs_of(e)]),
+    )
+
+
+def _outputs_of(e: Effect) -> list[tuple[str, str, str, float]]:
+    """The force outputs of an effect, one for each axis that it acts on."""
+    names = [f"force_{e.slug}"] if len(e.axis) == 1 else [f"force_{e.slug}_{a}" for a in e.axis]
+    return [
+        (name, "N.m" if axis == "N" else "N", f"force of the effect {e.id}, {axis}", 0.0)
+        for name, axis in zip(names, e.axis, strict=True)
+    ]
+
+
+def forces_of(group: Group, acting: tuple[Any, ...], values: Any, ship: Motion) -> list[Any]:
+    """The force of each effect of a group [N, N m], on the axes that it acts on."""
+    found: list[Any] = []
+    for member, acts in zip(group.members, acting, strict=True):
+        force = member.apply(acts, values, NONE, ship)
+        found += [force["XYN".index(axis)] for axis in member.effect.axis]
+    return found

@@ -1,0 +1,122 @@
+"""The report of a study: Markdown with tables and figures, and all numbers as JSON beside it."""
+
+import json
+import math
+import os
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim import atomic_write
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REPORT, RESULTS = "report.md", "results.json"
+PACKAGES = ("cybership", "numpy", "scipy", "matplotlib")
+DPI = 150
+
+
+def machine() -> str:
+    """One line: what the numbers were made with."""
+    versions = []
+    for name in PACKAGES:
+        try:
+            versions.append(f"{name} {metadata.version(name)}")
+        except metadata.PackageNotFoundError:
+            versions.append(f"{name} not installed")
+    return (
+        f"{platform.python_implementation()} {platform.python_version()} on {platform.machine()} "
+        f"{platform.system()}, {os.cpu_count()} cores; {', '.join(versions)}"
+    )
+
+
+def seeds_line(seeds: Sequence[int]) -> str:
+    """The seeds for people: ``seeds 0-9``."""
+    gapless = list(seeds) == list(range(seeds[0], seeds[0] + len(seeds)))
+    if gapless and len(seeds) > 1:
+        return f"seeds {seeds[0]}-{seeds[-1]}"
+    return f"seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))}"
+
+
+def cell(value: Any) -> str:
+    """A table cell: a number to four digits, anything else as it prints."""
+    if isinstance(value, float):
+        return f"{value:.4g}" if math.isfinite(value) else "–"
+    return str(value).replace("|", "\\|")
+
+
+def _jsonable(value: Any) -> Any:
+    """Named tuples as objects, arrays as lists, NaN and infinity as null."""
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    elif hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(k): _jsonable(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_jsonable(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+class Report:
+    """Collects pieces and writes them at the end; figures are written as they come.
+
+    Args:
+        folder: where the report goes, made when missing.
+        title: heading of the report.
+        seeds: of the runs; empty where nothing is random.
+    """
+
+    def __init__(self, folder: Path, title: str, seeds: Sequence[int] = ()) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder = folder
+        self._pieces = [f"# {title}"]
+        self._results: dict[str, Any] = {"title": title, "seeds": list(seeds), "machine": machine()}
+        ran = f"{seeds_line(seeds).capitalize()}. " if seeds else ""
+        self.text(f"{ran}{machine()}.")
+
+    def heading(self, text: str) -> None:
+        self._pieces.append(f"## {text}")
+
+    def text(self, paragraph: str) -> None:
+        self._pieces.append(" ".join(paragraph.split()))
+
+    def items(self, lines: Iterable[str]) -> None:
+        """A list with a point before each line."""
+        self._pieces.append("\n".join(f"- {' '.join(line.split())}" for line in lines))
+
+    def table(self, header: Sequence[str], rows: Iterable[Sequence[Any]], words: bool = False) -> None:
+        """A table; all columns but the first stand to the right, unless they hold words."""
+        side = ":--" if words else "--:"
+        lines = [header, [":--", *[side] * (len(header) - 1)], *([cell(c) for c in r] for r in rows)]
+        self._pieces.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
+
+    def figure(self, name: str, figure: "Figure", caption: str) -> None:
+        """Write ``<name>.png`` and embed it."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        FigureCanvasAgg(figure)
+        with atomic_write(self.folder / f"{name}.png") as scratch:
+            figure.savefig(scratch, format="png", dpi=DPI)
+        self.picture(f"{name}.png", caption)
+
+    def picture(self, path: str, caption: str) -> None:
+        """Embed a picture that lies in the report's folder already."""
+        self._pieces.append(f"![{caption}]({path})\n\n*{caption}*")
+
+    def result(self, name: str, value: Any) -> None:
+        """Numbers for ``results.json``: nested mappings, sequences, named tuples, arrays."""
+        self._results[name] = _jsonable(value)
+
+    def write(self) -> Path:
+        """Write ``results.json``, then ``report.md``; returns the latter's path."""
+        text = json.dumps(self._results, indent=2, ensure_ascii=False, allow_nan=False)
+        for name, content in ((RESULTS, text), (REPORT, "\n\n".join(self._pieces))):
+            with atomic_write(self.folder / name) as scratch:
+                scratch.write_text(content + "\n", encoding="utf-8")
+        return self.folder / REPORT

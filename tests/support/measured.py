@@ -1,0 +1,81 @@
+"""Measured runs whose truth is known: the ship under open-loop commands, and what a camera saw of it."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis import Run, clean, smooth
+from diagnosis.model.ship_model import parameters
+from fmus.signals import Force, Velocity
+from fmus.thrusters.chain import Inputs
+from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
+from fmus.vessel import vessel
+from support.shared import kept
+
+DATA = Path(os.environ.get("CYBERSHIP_DATA", Path(__file__).parents[3] / "shared" / "data"))
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="no measured runs: CYBERSHIP_DATA names no folder that exists"
+)
+START = {"psi_0": 3.1}  # soon wraps
+NOISE = np.array([5e-4, 5e-4, 9e-4])
+
+
+def commands(t, quick=0.0):
+    """tau [N, N, N m] that turns the ship about and moves it in all directions; quick [N] of it at 0.85 Hz."""
+    X = 0.3 + 0.3 * np.sin(0.31 * t) + 0.2 * np.sin(0.83 * t)
+    Y = 0.3 * np.sin(0.47 * t + 1.0) + 0.15 * np.sin(1.13 * t)
+    N = 0.15 * np.sin(0.39 * t + 2.0) + 0.08 * np.sin(0.97 * t)
+    slow = np.column_stack([X, Y, N])
+    return slow + quick * np.sin(2.0 * np.pi * 0.85 * t)[:, None] * [1.0, 1.0, 0.3]
+
+
+def sail(seconds=64.0, h=0.02, ship=None, thrusters=None, noise=1.0, seed=1, quick=0.0, craft=None):
+    """A run, and the true nu (n, 3): one sample each h [s], pose in (-pi, pi] with noise.
+
+    ``ship`` and ``thrusters`` are their parameters; ``craft`` is a ship with a user's effects.
+    """
+    given = (seconds, h, ship or {}, thrusters or {}, quick)
+    time, true, nu, tau_cmd = voyage(*given, craft) if craft else kept(voyage, *given)
+    pose = true + noise * NOISE * np.random.default_rng(seed).standard_normal(true.shape)
+    pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
+    return Run("made", time, pose, tau_cmd), nu
+
+
+def voyage(seconds, h, ship, thrusters, quick, craft=None):
+    """Time (n,), pose and nu (n, 3) of the ship under the commands, and these."""
+    t = np.arange(round(seconds / h)) * h
+    tau_cmd = commands(t, quick)
+    hull, drive = (craft.vessel, craft.thrusters) if craft else (vessel.COMPONENT, THRUSTERS)
+    p = parameters(hull, START | ship)
+    plan = parameters(drive, thrusters)
+    body, machine = hull.prepared(p), drive.prepared(plan)
+    s, past = hull.init(Force(), p), drive.init(Inputs(), plan)
+    _, seen = hull.advance(s, Force(), body, 0.0)
+    poses, nu, before = [], [], 0.0
+    for tau in tau_cmd.tolist():
+        poses.append(tuple(seen.measured))
+        nu.append((s.u, s.v, s.r))
+        inputs = Inputs(Force(*tau), Velocity(s.u, s.v, s.r))
+        past, out = drive.advance(past, inputs, machine, before)
+        s, seen = hull.advance(s, Force(*out[3 + 3 :]), body, h)
+        before = h
+    return t, np.array(poses), np.array(nu), tau_cmd
+
+
+def smoothed(run):
+    """The run judged and smoothed; for tests of what comes after."""
+    return kept(_smoothed, run)
+
+
+def _smoothed(run):
+    return smooth(clean(run))
+
+
+def changed(run, rows, pose):
+    """The run with another pose in some rows."""
+    new = run.pose.copy()
+    new[rows] = pose
+    return replace(run, pose=new)

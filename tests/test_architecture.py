@@ -1,0 +1,335 @@
+"""Imports between the packages go one way, in the order stated here, and use public names only.
+
+Imports are read from the source: also those inside functions, those for type checking only, and the names that
+an ``__init__`` imports on demand (``lazy_names``).
+"""
+
+import ast
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+from support.project import ROOT
+
+# Each may import those before it, and nothing else of the project.
+PACKAGES = ("fmus", "cosim", "diagnosis", "studies", "benchmarks")
+
+# The modules and packages directly in cosim, lowest first; each line may import the lines before it only.
+COSIM_LAYERS = (
+    ("lazy", "errors", "files", "process"),
+    ("interrupts", "conversion"),
+    ("command",),
+    ("fmu",),
+    ("formats",),
+    ("scenario",),
+    ("system",),
+    ("results",),
+    ("master", "watch"),
+    ("export",),
+    ("run", "metrics", "plots", "interface"),  # commands
+)
+
+# The same of diagnosis: the steps of the work, in their order.
+DIAGNOSIS_LAYERS = (
+    ("progress", "result_folder"),
+    ("data",),
+    ("smoothing",),
+    ("model",),
+    ("gathering",),
+    ("identification", "assessment"),
+    ("session",),
+    ("report",),
+    ("command_line",),
+    ("compare", "learn"),  # commands
+)
+# And of fmus: what all components share, effects, components, the ship of them, their FMI face, the tools.
+FMUS_LAYERS = (
+    ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
+    ("frames", "hull"),
+    ("effects",),
+    ("controller", "guidance", "observer", "thrusters", "vessel"),
+    ("ship",),
+    ("fmi",),
+    ("build",),
+    ("check",),
+)
+LAYERS = {"cosim": COSIM_LAYERS, "diagnosis": DIAGNOSIS_LAYERS, "fmus": FMUS_LAYERS}
+
+# What other packages may import of cosim: these modules, with their ``__all__``.
+PUBLIC = (
+    "cosim",
+    "cosim.command",
+    "cosim.errors",
+    "cosim.export",
+    "cosim.fmu",
+    "cosim.master",
+    "cosim.results",
+    "cosim.scenario",
+    "cosim.system",
+)
+# diagnosis reads logs and parameter sets; it runs nothing.
+PUBLIC_TO_DIAGNOSIS = (
+    "cosim",
+    "cosim.command",
+    "cosim.errors",
+    "cosim.interrupts",
+    "cosim.lazy",
+    "cosim.results",
+)
+# What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
+# components and effects of a user's own. A module without ``__all__`` offers what it defines.
+PUBLIC_OF_FMUS = (
+    "fmus.build",
+    "fmus.declare",
+    "fmus.effects",
+    "fmus.frames",
+    "fmus.hull",
+    "fmus.ops",
+    "fmus.ship",
+    "fmus.signals",
+    "fmus.thrusters.allocation",
+    "fmus.thrusters.chain",
+)
+COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel")
+PUBLIC_OF_DIAGNOSIS = (
+    "diagnosis",
+    "diagnosis.assessment",
+    "diagnosis.data",
+    "diagnosis.identification",
+    "diagnosis.model",
+    "diagnosis.progress",
+    "diagnosis.report",
+    "diagnosis.smoothing",
+)
+
+# File names that Python demands in several packages.
+SHARED_NAMES = ("__init__", "__main__")
+
+
+def module_name(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@cache
+def sources(package):
+    """Module -> path of each file of a package."""
+    return {module_name(path): path for path in sorted((ROOT / package).rglob("*.py"))}
+
+
+@cache
+def known():
+    return {name for package in PACKAGES for name in sources(package)}
+
+
+def absolute(module, node, path):
+    """The module that ``from ... import`` names."""
+    if not node.level:
+        return node.module or ""
+    parts = module.split(".")
+    base = parts[: len(parts) - node.level + (path.name == "__init__.py")]
+    return ".".join([*base, *([node.module] if node.module else [])])
+
+
+def on_demand(module, node):
+    """Modules that a call ``lazy_names(__name__, {name: module})`` or ``import_module`` names."""
+    if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+        return
+    if node.func.id == "lazy_names":
+        for value in targets_of(node.args[1]):
+            yield f"{module}.{value}"
+    elif node.func.id == "import_module" and isinstance(node.args[0], ast.Constant):
+        name = node.args[0].value
+        yield f"{module}{name}" if name.startswith(".") else name
+
+
+def targets_of(node):
+    """Modules of a table of names, also of one that has the same module for all: ``dict.fromkeys``."""
+    if isinstance(node, ast.Call):
+        return [ast.literal_eval(node.args[1])]
+    return ast.literal_eval(node).values()
+
+
+@cache
+def imports(module, path):
+    """(imported module, imported name or "") of each import of a file, of this project only."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, "") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = absolute(module, node, path)
+            for alias in node.names:
+                inner = f"{base}.{alias.name}"
+                found.append((inner, "") if inner in known() else (base, alias.name))
+        else:
+            found += [(name, "") for name in on_demand(module, node)]
+    return [(name, what) for name, what in found if name in known()]
+
+
+def graph(package):
+    return {
+        module: {name for name, _ in imports(module, path)} for module, path in sources(package).items()
+    }
+
+
+def layer_of(module):
+    package, head = module.split(".")[:2]
+    return next((k for k, names in enumerate(LAYERS[package]) if head in names), None)
+
+
+@cache
+def public_names(module):
+    """The ``__all__`` of a module; without one what it defines, but for names that begin with an underscore."""
+    path = sources(module.partition(".")[0])[module]
+    tree = ast.parse(path.read_text())
+    defined = []
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and ast.unparse(targets[0]) == "__all__":
+            assert node.value is not None
+            return ast.literal_eval(node.value)
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+            defined.append(node.name)
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            defined += [n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+    assert path.name != "__init__.py", f"{module} has no __all__"
+    return [name for name in defined if not name.startswith("_")]
+
+
+def module_aliases(module, path):
+    """Local name -> module of this project that an import statement binds to it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name in known() and (alias.asname or "." not in alias.name):
+                    yield alias.asname or alias.name, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            base = absolute(module, node, path)
+            for alias in node.names:
+                if f"{base}.{alias.name}" in known():
+                    yield alias.asname or alias.name, f"{base}.{alias.name}"
+
+
+def attributes(module, path):
+    """(module, attribute) of each ``module.attribute`` where the module is one of this project."""
+    aliases = dict(module_aliases(module, path))
+    for node in ast.walk(ast.parse(path.read_text())):
+        if (
+            isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and node.value.id in aliases
+        ):
+            yield aliases[node.value.id], node.attr
+
+
+def foreign_uses(package, other, allowed):
+    """What a package uses of another one besides public names of the allowed modules."""
+    for module, path in sources(package).items():
+        for name, what in [*imports(module, path), *attributes(module, path)]:
+            if name.partition(".")[0] != other:
+                continue
+            if name not in allowed:
+                yield f"{module} imports {name}"
+            elif what and what not in public_names(name):
+                yield f"{module} uses {name}.{what}"
+
+
+@pytest.mark.parametrize("package", ["cosim", "fmus", "diagnosis"])
+def test_no_import_circles(package):
+    try:
+        TopologicalSorter(graph(package)).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_packages_import_one_way(package):
+    wrong = []
+    for module, targets in graph(package).items():
+        if module in (package, f"{package}.__main__"):
+            continue
+        own = layer_of(module)
+        assert own is not None, f"{module} is in no layer"
+        for target in (t for t in targets if t.startswith(f"{package}.")):
+            same = module.split(".")[1] == target.split(".")[1]
+            # Modules that lie directly in a package may use others of their layer; circles have a test.
+            beside = layer_of(target) == own and module.count(".") == target.count(".") == 1
+            if not same and not beside and layer_of(target) >= own:
+                wrong.append(f"{module} -> {target}")
+        if package in targets:
+            wrong.append(f"{module} -> {package}")
+    assert not wrong
+
+
+def test_modules_import_modules_inside_cosim():
+    """A package's lazy ``__init__`` would hide which of its modules is meant, and so hide circles."""
+    packages = {name for name, path in sources("cosim").items() if path.name == "__init__.py"}
+    for module, targets in graph("cosim").items():
+        assert not targets & packages, module
+
+
+@pytest.mark.parametrize("package", ["fmus", "cosim"])
+def test_packages_below_import_nothing_of_others(package):
+    for module, targets in graph(package).items():
+        assert {name.partition(".")[0] for name in targets} <= {package}, module
+
+
+@pytest.mark.parametrize(
+    ("package", "allowed"),
+    [("diagnosis", PUBLIC_TO_DIAGNOSIS), ("studies", PUBLIC), ("benchmarks", PUBLIC)],
+)
+def test_other_packages_use_public_names_of_cosim(package, allowed):
+    assert list(foreign_uses(package, "cosim", allowed)) == []
+
+
+@pytest.mark.parametrize("package", ["studies", "benchmarks"])
+def test_studies_and_benchmarks_use_public_names(package):
+    components = [
+        name for name in sources("fmus") if name.split(".")[1:2] and name.split(".")[1] in COMPONENTS
+    ]
+    assert list(foreign_uses(package, "fmus", (*PUBLIC_OF_FMUS, *components))) == []
+    assert list(foreign_uses(package, "diagnosis", PUBLIC_OF_DIAGNOSIS)) == []
+
+
+@pytest.mark.parametrize("module", PUBLIC_OF_DIAGNOSIS)
+def test_public_names_of_diagnosis_exist(module):
+    names = public_names(module)
+    found = __import__(module, fromlist=names)
+    assert all(hasattr(found, name) for name in names)
+
+
+@pytest.mark.parametrize(
+    "module", [name for name, path in sources("cosim").items() if path.name == "__init__.py"]
+)
+def test_public_names_exist_and_are_sorted(module):
+    names = public_names(module)
+    assert names == sorted(names)
+    found = __import__(module, fromlist=names)
+    assert all(hasattr(found, name) for name in names)
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        found.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_file_names_are_unique(package):
+    """Against every other package too: a name in a traceback or an editor's tab means one file."""
+    own = [path.stem for path in sources(package).values()]
+    others = [path.stem for other in PACKAGES if other != package for path in sources(other).values()]
+    names = [name for name in own if name not in SHARED_NAMES]
+    assert sorted(names) == sorted(set(names))
+    assert not set(names) & set(others) - ALSO_ELSEWHERE
+
+
+# cosim.command is a public path; studies.allocation and benchmarks.ellipse are commands, fmus has components of
+# these names.
+ALSO_ELSEWHERE = {"command", "allocation", "ellipse"}
+
+
+@pytest.mark.parametrize(
+    "folder", [p for p in sources("cosim").values() if p.name == "__init__.py"], ids=str
+)
+def test_a_folder_is_a_table_of_contents(folder: Path):
+    assert len(list(folder.parent.glob("*.py"))) <= 12

@@ -1,0 +1,132 @@
+"""The response to the commands: known motions, gains found again, and no harm where nothing is known."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.cases import slow
+from support.measured import DATA, NOISE, needs_data, sail
+
+from diagnosis import Run, clean, read, smooth
+from diagnosis.smoothing.command_response import FORGETTING, Commands
+from diagnosis.smoothing.spline import knots
+
+N = 3000
+INNER = slice(100, -100)
+
+
+@cache
+def sailed():
+    """The run that is varied, and its true velocity (n, 3)."""
+    return sail(60.0)
+
+
+def base():
+    return sailed()[0]
+
+
+def true_nu():
+    return sailed()[1]
+
+
+def commands(track, psi):
+    span = track.run.time[-1] - track.run.time[0]
+    return Commands(track, psi, knots(np.array([0.0]), np.array([span]), 0.05))
+
+
+def rms(x):
+    return np.sqrt(np.mean(np.square(x), axis=0))
+
+
+def test_constant_force_moves_a_critically_damped_mass():
+    run = replace(base(), tau_cmd=np.tile([1.0, -2.0, 0.5], (N, 1)))
+    t, T = base().time, FORGETTING
+    pushed = commands(clean(run), np.zeros(N)).response(np.eye(3), 0.0)
+    expected = T**2 * (1.0 - (1.0 + t / T) * np.exp(-t / T))
+    np.testing.assert_allclose(pushed.eta, np.outer(expected, [1.0, -2.0, 0.5]), rtol=1e-9, atol=1e-9)
+
+
+def test_pose_velocity_and_acceleration_belong_together():
+    time = 100.0 + np.arange(N) * 0.02
+    force = np.column_stack([np.sin(time), np.cos(0.7 * time), np.sin(0.3 * time)])
+    run = replace(base(), time=time, tau_cmd=force)
+    pushed = commands(clean(run), 0.4 * np.sin(0.2 * time)).response(np.eye(3), 0.0)
+    for value, rate in ((pushed.eta, pushed.eta_dot), (pushed.eta_dot, pushed.eta_ddot)):
+        between = np.diff(value, axis=0) / 0.02
+        np.testing.assert_allclose(between, 0.5 * (rate[1:] + rate[:-1]), atol=2e-2)
+        assert np.abs(between.mean(axis=0) - rate.mean(axis=0)).max() < 1e-3
+
+
+def test_heading_turns_the_response():
+    track = clean(replace(base(), tau_cmd=np.random.default_rng(0).standard_normal((N, 3))))
+    ahead, aside = (
+        commands(track, np.full(N, psi)).response(np.eye(3), 0.0) for psi in (0.0, 0.5 * np.pi)
+    )
+    for a, b in zip(ahead[:3], aside[:3], strict=True):
+        np.testing.assert_allclose(b, np.column_stack([-a[:, 1], a[:, 0], a[:, 2]]), atol=1e-12)
+
+
+def test_delayed_commands_have_a_delayed_response():
+    track = clean(base())
+    now, late = (commands(track, np.zeros(N)).response(np.eye(3), by) for by in (0.0, 0.5))
+    np.testing.assert_allclose(late.eta_ddot[25:], now.eta_ddot[:-25], atol=0.06)
+
+
+def driven(seed, gains, late=0.0):
+    """A run, and its true velocity in NED, that nothing but jumping commands drives at zero heading."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(N) * 0.02
+    tau = np.repeat(rng.standard_normal((N // 20, 3)), 20, axis=0)
+    a = tau[np.maximum(np.arange(N) - round(late / 0.02), 0)] @ np.array(gains).T
+    eta_dot = np.cumsum(np.vstack([np.zeros((1, 3)), a[:-1] * 0.02]), axis=0)
+    eta = np.cumsum(np.vstack([np.zeros((1, 3)), eta_dot[:-1] * 0.02 + 0.5 * a[:-1] * 0.02**2]), axis=0)
+    return Run("driven", time, eta + NOISE * rng.standard_normal((N, 3)), tau), eta_dot
+
+
+@pytest.mark.parametrize("late", [0.0, 0.34])
+def test_motion_by_commands_alone_is_found_again(late):
+    run, eta_dot = driven(3, [[0.05, 0.0, 0.0], [0.0, 0.04, 0.01], [0.0, 0.0, 0.0]], late)
+    knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+    better = rms((blind.eta_dot - eta_dot)[INNER]) / rms((knowing.eta_dot - eta_dot)[INNER])
+    assert (better[:2] > 4.0).all()
+    assert smooth(clean(run)).delay == pytest.approx(late, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [2, slow(3), slow(4)])
+def test_commands_that_do_nothing_do_no_harm(seed):
+    tau = np.random.default_rng(seed).standard_normal((N, 3))
+    for command in (0.0 * tau, 0.0 * tau + 0.3, tau):
+        run = replace(base(), tau_cmd=command)
+        knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+        assert (rms((knowing.nu - true_nu())[INNER]) < 1.05 * rms((blind.nu - true_nu())[INNER])).all()
+
+
+@needs_data
+def test_every_run_of_the_real_ship_says_how_late_its_thrusters_are():
+    late = [smooth(clean(read(path))).delay for path in sorted((DATA / "cse1").glob("*.mat"))]
+    assert len(late) == 4
+    assert 0.35 <= min(late) <= max(late) <= 0.45
+
+
+def test_commands_that_are_the_same_are_no_trouble():
+    run, eta_dot = driven(4, 0.02 * np.eye(3))
+    same = replace(run, tau_cmd=run.tau_cmd[:, [0, 0, 2]])
+    found = smooth(clean(same))
+    assert np.isfinite(found.nu).all()
+    assert rms((found.eta_dot - eta_dot)[INNER])[0] < 2e-3
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_unit_of_the_commands_does_not_matter(unit):
+    scaled = replace(base(), tau_cmd=unit * base().tau_cmd)
+    np.testing.assert_allclose(smooth(clean(scaled)).nu, smooth(clean(base())).nu, atol=1e-4)
+
+
+def test_parts_far_apart_are_smoothed_each_by_itself():
+    half = N // 2
+    later = replace(base(), time=base().time + np.where(np.arange(N) < half, 0.0, 100.0))
+    apart, whole = (smooth(clean(run)).nu for run in (later, base()))
+    assert np.isfinite(apart).all()
+    inner = np.r_[100 : half - 100, half + 100 : N - 100]
+    assert (rms((apart - true_nu())[inner]) < 1.2 * rms((whole - true_nu())[inner])).all()

@@ -1,0 +1,129 @@
+"""What is said of a finding: every effect has its sentence, every pair its advice."""
+
+import re
+from itertools import combinations
+
+import pytest
+
+from diagnosis.report.finding_text import (
+    advice,
+    equation,
+    sentence,
+    separation_note,
+    tell_apart,
+    unit,
+)
+from fmus.effects import STANDARD, Effect
+from fmus.effects.families import UNKNOWN
+from fmus.effects.text import Found
+
+
+def values(effect, x):
+    return dict.fromkeys(effect.coefficients, x)
+
+
+@pytest.mark.parametrize("name", STANDARD)
+def test_every_effect_has_a_sentence_of_its_own_with_numbers(name):
+    effect = STANDARD[name]
+    assert effect.wording.sentence is not None
+    said = sentence(Found(effect, values(effect, 0.25)))
+    assert said[0].isupper()
+    assert said.endswith(".")
+    assert "{" not in said
+    if name != "waves":
+        assert re.search(r"\d", said)
+
+
+SIGNS = (
+    "mass added_mass_X loss_bow loss_surge attack_point earth_force body_bias current heading_offset X_u"
+)
+
+
+@pytest.mark.parametrize("name", [*SIGNS.split(), "marker_offset", "clock_offset", "Y_ur", "curve_X(u)"])
+def test_the_other_sign_says_the_other(name):
+    effect = STANDARD[name]
+    more, less = (sentence(Found(effect, values(effect, x))) for x in (0.25, -0.25))
+    assert more != less
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("mass", {"mass": 3.1}, "The ship has 3.1 kg more mass than the model believes."),
+        ("bow_failure", {"bow_failure_time": 118.0}, "The bow thruster is dead from t = 118 s on."),
+        ("loss_surge", {"loss_surge": 0.3}, "Of the commanded surge force 30 % do not arrive."),
+        ("current", {"V_n": 0.0, "V_e": 0.05}, "The water moves at 0.05 m/s towards 90°."),
+        (
+            "heading_offset",
+            {"heading_offset": -0.0349066},
+            "The heading is measured 2° to port of the true one.",
+        ),
+        ("delay", {"delay": 0.4}, "The thrusters act 0.4 s after they are commanded."),
+    ],
+)
+def test_sentences(name, given, said):
+    assert sentence(Found(STANDARD[name], given)) == said
+
+
+def test_force_of_a_damping_term_is_that_at_the_speeds_reached():
+    said = sentence(Found(STANDARD["X_|u|u"], {"delta_X_absu_u": -20.0}, (0.2, 0.0, 0.0)))
+    assert said == "The ship has more surge drag than the model believes: 0.8 N at 0.2 m/s."
+
+
+def test_an_effect_of_a_user_says_what_it_says_of_itself():
+    mine = Effect("mine", "force", "N", "A moment that I suspect.", "N = k", "k", "", "", True, (), None)
+    assert (
+        sentence(Found(mine, {}))
+        == "The ship has an effect that the model lacks: A moment that I suspect."
+    )
+    assert mine.wording.family is UNKNOWN
+    assert UNKNOWN.excite in tell_apart(mine, STANDARD["mass"])
+
+
+@pytest.mark.parametrize("name", STANDARD)
+def test_equation_has_every_number_with_its_unit(name):
+    effect = STANDARD[name]
+    given = values(effect, 0.25)
+    text = equation(effect, given, dict.fromkeys(given, (0.125, 0.375)))
+    assert effect.formula in text
+    assert text.count("0.25") == len(given)
+    for n in given:
+        assert unit(effect, n) in text or unit(effect, n) == "1"
+    if len(given) < 9:
+        assert text.count("(0.125 to 0.375)") == len(given)
+
+
+def test_every_effect_has_a_family_and_every_pair_an_advice():
+    assert all(e.wording.family is not UNKNOWN for e in STANDARD.values())
+    for a, b in combinations(STANDARD.values(), 2):
+        assert tell_apart(a, b)
+        same_family = a.wording.family is b.wording.family
+        assert tell_apart(a, b) == tell_apart(b, a) or not same_family
+
+
+def test_what_tells_effects_apart_names_effects_and_families_that_there_are():
+    families = {e.wording.family.name for e in STANDARD.values()}
+    for e in STANDARD.values():
+        assert set(e.wording.apart) <= set(STANDARD)
+        assert set(e.wording.family.apart) <= families
+
+
+def test_known_pairs():
+    def apart(a, b):
+        return tell_apart(STANDARD[a], STANDARD[b])
+
+    assert "astern" in apart("X_u", "body_bias")
+    assert "sync pulse" in apart("delay", "clock_offset")
+    assert "turn on the spot" in apart("N_ur", "N_r")
+    assert advice("X_u", [], STANDARD) == separation_note("X_u", []) == ""
+    said = advice("lag", ["delay", "clock_offset"], STANDARD)
+    assert said.count("To tell lag from") == 2
+    assert separation_note("lag", ["delay", "mass", "X_u"]).endswith("from delay, mass or X_u.")
+
+
+def test_of_many_others_the_likeliest_are_told():
+    others = [name for name in STANDARD if name != "X_u"]
+    assert separation_note("X_u", others).endswith(f"or {len(others) - 4} others.")
+    said = advice("X_u", others, STANDARD)
+    assert said.count("To tell") <= 4
+    assert said.endswith("vary speed, turn and drift more.")

@@ -1,0 +1,58 @@
+"""The smoother gives the same on every processor: kernels of the linear algebra, and their threads, differ
+by rounding alone, and rounding must not show."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+HERE = Path(__file__).parent
+SMOOTH = """
+import numpy as np
+from support.measured import sail
+from diagnosis import clean, smooth
+
+for seconds, seed in ((60.0, 1), (40.0, 2)):
+    s = smooth(clean(sail(seconds, seed=seed)[0]))
+    print(*s.jerk, s.delay, *s.counts, *s.nu[::50].ravel(), *s.nu_std[::50].ravel())
+"""
+# OpenBLAS' kernels, and the flag of a processor that can run them.
+KERNELS = {"SkylakeX": "avx512f", "Haswell": "avx2", "Zen": "avx2", "Sandybridge": "avx"}
+
+
+def kernels():
+    info = Path("/proc/cpuinfo")
+    flags = set(info.read_text().split()) if info.exists() else set()
+    return [name for name, flag in KERNELS.items() if flag in flags]
+
+
+def numbers(kernel, threads):
+    """What a process prints with a kernel and a number of threads, and what OpenBLAS says it uses."""
+    env = {"OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": str(threads), "OPENBLAS_VERBOSE": "2"}
+    env["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parent)])
+    done = subprocess.run(
+        [sys.executable, "-c", SMOOTH], env=os.environ | env, capture_output=True, text=True, check=True
+    )
+    text = (done.stdout + done.stderr).splitlines()
+    lines = [np.array(line.split(), float) for line in text if not line.startswith("Core:")]
+    return lines, {line for line in text if line.startswith("Core:")}
+
+
+@pytest.mark.slow
+def test_kernel_and_threads_do_not_show():
+    names = kernels()
+    if len(names) < 2:
+        pytest.skip("no binary for this processor's linear algebra to choose kernels from")
+    cases = [(name, threads) for k, name in enumerate(names) for threads in ((1, 2) if k < 2 else (2,))]
+    found = [numbers(*case) for case in cases]
+    if len(set().union(*(used for _, used in found))) < 2:
+        pytest.skip("no binary of OpenBLAS that heeds OPENBLAS_CORETYPE")
+    (first, _), *others = found
+    for lines, _ in others:
+        for a, b in zip(lines, first, strict=True):
+            jerk, rest = slice(0, 3), slice(3, None)
+            np.testing.assert_allclose(a[jerk], b[jerk], rtol=1e-9)
+            np.testing.assert_allclose(a[rest], b[rest], rtol=0.0, atol=1e-9)

@@ -1,0 +1,119 @@
+"""The force of the thrusters along a run: from series the same as from the steps of their FMU."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from support.measured import sail
+
+from diagnosis import Model, Run
+from diagnosis.model.thrust import Integral, Response, thrust
+from fmus.declare import variables
+from fmus.effects import STANDARD
+from fmus.signals import Force, Velocity
+from fmus.thrusters.chain import Inputs
+from fmus.thrusters.thrusters import COMPONENT
+
+# Of every effect on thrusters, and of every other parameter of the plant's, a value that matters.
+VALUES = {
+    "thrust_curve_ahead": -0.3,
+    "thrust_curve_astern": 0.2,
+    "thrust_curve_deadband": 0.1,
+    "bow_failure_time": 11.0,
+    "deadband": 0.05,
+    "saturation_vsp": 0.4,
+    "saturation_bow": 0.3,
+    "bow_speed_loss": 2.0,
+    "lag": 0.7,
+    "delay": 0.36,
+    "plant_rate": 0.2,
+    "plant_l_vsp": -0.4,
+    "plant_l_bow": 0.3,
+    "plant_F_vsp": 0.9,
+    "plant_F_bow": 2.0,
+    "power_vsp": 0.7,
+    "power_bow": 0.6,
+}
+EFFECTS = STANDARD.of_kind("actuator")
+BY_EFFECT = {e.id: {n: VALUES.get(n, 0.1) for n in e.coefficients} for e in EFFECTS}
+OTHERS = [
+    n
+    for n in (v.name for v in variables(COMPONENT.params))
+    if n.startswith(("plant_", "power_")) and n not in BY_EFFECT
+]
+BY_PARAMETER = {n: {n: VALUES.get(n, 0.02)} for n in OTHERS}
+TOGETHER = {"delay and lag": {"delay": 0.36, "lag": 0.7}, "all": {**VALUES, "loss_bow": 0.2}}
+
+
+@cache
+def sailed():
+    """The run that is varied, and its true velocity (n, 3)."""
+    return sail(40.0, noise=0.0)
+
+
+def base():
+    return sailed()[0]
+
+
+def true_nu():
+    return sailed()[1]
+
+
+def by_steps(run, nu, values):
+    """tau_act (n, 3) of the thrusters' FMU, stepped from sample to sample."""
+    model = Model(thrusters=values)
+    h = float(np.median(np.diff(run.time)))
+    # The force over the step that begins at a sample follows from the command of that sample.
+    past, out = COMPONENT.init(Inputs(), model.drive.params)._replace(t=run.time[0] - h), []
+    for tau, velocity in zip(run.tau_cmd.tolist(), nu.tolist(), strict=True):
+        inputs = Inputs(Force(*tau), Velocity(*velocity))
+        past, outputs = COMPONENT.advance(past, inputs, model.drive, h)
+        out.append(outputs[6:])
+    return np.array(out)
+
+
+@pytest.mark.parametrize("values", (cases := BY_EFFECT | BY_PARAMETER | TOGETHER).values(), ids=cases)
+def test_mean_force_over_each_interval_from_series_is_that_of_the_steps(values):
+    """Within 1e-9 N; of a lag 6e-6 of what was commanded twelve time constants ago is forgotten."""
+    expected = by_steps(base(), true_nu(), values)
+    force = thrust(base(), Response(base(), Model(thrusters=values)), true_nu())
+    forgotten = 2e-5 if values.get("lag") else 1e-9
+    np.testing.assert_allclose(force, expected, atol=forgotten)
+    assert np.abs(expected - by_steps(base(), true_nu(), {})).max() > 1e-3, "the value matters"
+
+
+@pytest.mark.parametrize("period", [0.02, 0.05, 0.1])
+@pytest.mark.parametrize("delay", [0.013, 0.1, 0.33, 1.2, 3.0])
+def test_delay_is_that_of_the_held_commands_whatever_the_period(period, delay):
+    t = np.arange(round(20.0 / period)) * period
+    tau = np.column_stack([np.sign(np.sin(0.7 * t)), 0.0 * t, 0.0 * t])
+    run = Run("steps", t, np.zeros((t.size, 3)), tau)
+    given, acting = Response(run, Model(thrusters={"delay": delay})).between_samples
+    np.testing.assert_array_equal(given, acting)
+    nominal = Response(run, Model()).between_samples[0]
+    held = Integral(np.append(t, t[-1] + period), nominal, 0.0 * nominal[0])
+    ends = np.append(t, t[-1] + period) - delay
+    exact = np.diff(held(ends), axis=0) / period
+    # What a delay remembers lies a step apart, so that an edge is smeared over a step of the grid.
+    smeared = np.abs(np.cumsum(given - exact, axis=0) * period).max()
+    assert smeared <= max(0.02, delay / 60.0) * np.abs(nominal).max()
+
+
+def test_a_run_that_begins_under_way_had_its_first_command_before():
+    model = Model(thrusters={"lag": 1.0})
+    rest, moving = (Response(base(), model, moving=m).between_samples[1] for m in (False, True))
+    first = Response(base(), Model()).between_samples[0][0]
+    np.testing.assert_allclose(moving[0], first, rtol=1e-5)
+    assert np.abs(rest[0]).max() < 0.05 * np.abs(first).max()
+
+
+def test_a_long_gap_takes_neither_time_nor_memory():
+    later = np.where(base().time > 20.0, base().time + 1e9, base().time)
+    run = Run("gap", later, base().pose, base().tau_cmd)
+    model = Model(thrusters={"lag": 0.5})
+    with_gap = Response(run, model).between_samples[1]
+    without = Response(base(), model).between_samples[1]
+    before = base().time < 19.9
+    np.testing.assert_allclose(with_gap[before], without[before], atol=1e-9)
+    after = base().time > 27.0  # twelve time constants later the gap is forgotten
+    np.testing.assert_allclose(with_gap[after], without[after], atol=1e-4)

@@ -1,0 +1,89 @@
+"""The pages of docs: what they name exists, and their links lead somewhere."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SYMBOLS = (ROOT / "docs" / "symbols.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def rows():
+    """Names and files of each row of the tables of symbols."""
+    for line in SYMBOLS.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) == 4 and "/" in cells[3]:
+            yield re.findall(r"`([\w.]+)`", cells[2]), re.findall(r"`([\w./]+)`", cells[3])
+
+
+def defined(path):
+    """Names of a module's functions, classes and constants, and of the classes' members."""
+    found = set()
+    for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        if isinstance(node, ast.ClassDef):
+            members = [m.name for m in node.body if isinstance(m, ast.FunctionDef)]
+            members += [m.target.id for m in node.body if isinstance(m, ast.AnnAssign)]
+            found |= {f"{node.name}.{m}" for m in members}
+    return found
+
+
+def test_there_are_symbols():
+    assert len(list(rows())) > 50
+
+
+@pytest.mark.parametrize(("names", "files"), [*rows()], ids=lambda x: x[0])
+def test_symbols_are_where_the_page_says(names, files):
+    assert names
+    there = set().union(*map(defined, files))
+    assert set(names) <= there
+    for file in files:
+        assert defined(file) & set(names), f"none of them is in {file}"
+
+
+def constants():
+    """Names and values of the table of constants of the diagnosis."""
+    table = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8").partition("## Constants")[2]
+    for names, values in re.findall(r"^\| ([A-Z_0-9, ]+) \| ([^|]+) \|", table, re.MULTILINE):
+        yield from zip(names.split(", "), re.findall(r"[\d.]+", values), strict=True)
+
+
+@pytest.mark.parametrize(("name", "value"), [*constants()])
+def test_constants_of_the_diagnosis_are_those_of_the_page(name, value):
+    files = [*(ROOT / "diagnosis" / "smoothing").glob("*.py"), ROOT / "diagnosis/model/weak_form.py"]
+    files += [f for f in (ROOT / "diagnosis/identification").glob("*.py") if f.name != "peers.py"]
+    found = []
+    for file in files:
+        for node in ast.parse(file.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.Assign):
+                names, given = node.targets[0], node.value
+                pairs = [(names, given)]
+                if isinstance(names, ast.Tuple) and isinstance(given, ast.Tuple):
+                    pairs = zip(names.elts, given.elts, strict=True)
+                found += [
+                    x.value
+                    for n, x in pairs
+                    if getattr(n, "id", "") == name and isinstance(x, ast.Constant)
+                ]
+    assert float(value) in found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_to_files(page):
+    for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if "://" not in link:
+            assert (page.parent / link).exists(), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_files_that_a_page_names_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"`((?:fmus|cosim|diagnosis|tests|studies|benchmarks)/[\w./]+)`", text):
+        assert (ROOT / name).exists() or name in EXAMPLES, name
+
+
+EXAMPLES = {"fmus/controller/pull.py"}  # a newcomer's

@@ -1,0 +1,157 @@
+"""Interrupts: held while files are made, and a command that is interrupted leaves nothing, whenever it is."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from support.project import ROOT
+from test_diagnosis_commands import frame
+
+from cosim.interrupts import Held
+from diagnosis import result_folder
+from diagnosis.result_folder import together
+
+posix = pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
+
+
+def interrupt():
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_a_held_interrupt_acts_at_the_end():
+    before, done = signal.getsignal(signal.SIGINT), []
+
+    def work():
+        with Held():
+            interrupt()
+            done.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == [1]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_held_interrupt_acts_where_it_may():
+    with Held() as interrupts:
+        interrupt()
+        with pytest.raises(KeyboardInterrupt):
+            interrupts.allow()
+        with pytest.raises(KeyboardInterrupt):
+            interrupt()
+        interrupts.hold()
+        interrupt()
+        interrupts.finish()
+
+
+def test_an_interrupt_after_the_end_of_the_inner_comes_too_late():
+    before = signal.getsignal(signal.SIGINT)
+    with Held() as outer:
+        outer.allow()
+        with Held() as inner:
+            inner.finish()
+        interrupt()
+        outer.finish()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+LOST = """
+import signal, sys
+from contextlib import suppress
+from rich.console import Console
+from cosim.command import run_command
+from diagnosis.progress import progress
+
+def main():
+    with progress(Console(stderr=True)) as advance:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        advance("on")
+    return 0
+
+run_command(main)
+"""
+
+
+def test_an_interrupt_that_was_lost_acts_at_the_next_step():
+    done = subprocess.run([sys.executable, "-c", LOST], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_other_threads_hold_nothing():
+    thread = threading.Thread(target=lambda: Held().__enter__().__exit__(None, None, None))
+    thread.start()
+    thread.join()
+    assert Held._innermost is None
+
+
+@pytest.mark.parametrize("step", ["mkdtemp", "rmtree"])
+def test_interrupt_while_folders_come_and_go(step, tmp_path, monkeypatch):
+    home = result_folder if step == "mkdtemp" else result_folder.shutil
+    original = getattr(home, step)
+
+    def interrupted(*args, **kwargs):
+        interrupt()
+        result = original(*args, **kwargs)
+        interrupt()
+        return result
+
+    monkeypatch.setattr(home, step, interrupted)
+    out = tmp_path / "a" / "b"
+    made = []
+    try:
+        with together(out, ["file"]) as new:
+            (new / "file").write_text("x")
+            made.append(new)
+    except KeyboardInterrupt:
+        assert step == "mkdtemp"
+        assert not made
+        assert not list(tmp_path.iterdir())
+    else:
+        assert [p.name for p in out.iterdir()] == ["file"]
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+
+
+@pytest.mark.slow
+@posix
+def test_interrupts_at_any_time_leave_nothing(tmp_path):
+    frame(48.0).to_csv(tmp_path / "a.csv", index=False)
+    command = [sys.executable, "-m", "diagnosis.compare", str(tmp_path / "a.csv"), "--out"]
+
+    def start(out):
+        return subprocess.Popen(
+            [*command, str(out)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    began = time.perf_counter()
+    assert start(tmp_path / "whole").wait() == 0
+    whole = time.perf_counter() - began
+    rng = random.Random(0)
+    load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(3)]
+    try:
+        for k in range(12):
+            out = tmp_path / str(k) / "deep"
+            process = start(out)
+            time.sleep(rng.uniform(0.0, whole))
+            sent = time.perf_counter()
+            process.send_signal(signal.SIGINT)
+            text, said = process.communicate(timeout=120)
+            if process.returncode == 0:
+                assert len(list(out.iterdir())) == 2, "it came too late"
+                assert time.perf_counter() - sent < 0.5 * whole
+                continue
+            assert not out.parent.exists()
+            if process.returncode != 130:  # before the first line of ours
+                assert str(ROOT) not in said
+                continue
+            assert (text, said) == ("", "interrupted\n")
+    finally:
+        for each in load:
+            each.kill()
+            each.wait()
