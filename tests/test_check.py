@@ -1,6 +1,7 @@
 """The checker: each rule fires on an FMU that breaks it, none on ours nor on one without a fault."""
 
 import json
+import logging
 import os
 import stat
 import subprocess
@@ -135,6 +136,14 @@ def test_each_rule_fires_on_a_description_that_breaks_it(rule, edits, text, tmp_
         pytest.importorskip("fmu_manipulation_toolbox")
     said = found(lag.pack(tmp_path, edits, compiled=False), rule)
     assert any(text in line for line in said[rule]), said
+
+
+def test_a_toolbox_that_was_silenced_is_heard(tmp_path):
+    pytest.importorskip("fmu_manipulation_toolbox")
+    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
+    assert found(lag.pack(tmp_path, [('name="direct"', 'name="y"')], compiled=False), "fmutool")[
+        "fmutool"
+    ]
 
 
 def test_a_description_without_a_fault_passes(tmp_path):

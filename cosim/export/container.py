@@ -37,11 +37,13 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         raise InputError(
             "a container FMU needs fmu-manipulation-toolbox: pip install 'cybership[export]'"
         ) from None
-    # It logs every unconnected variable; errors are exceptions.
-    logging.getLogger("fmu_manipulation_toolbox").setLevel(logging.CRITICAL)
     by_name = {part.name: part for part in parts}
     # Every link becomes a local variable named after the FMU; the plain names are for outputs.
     files = {part.name: f"link_{part.file}" for part in parts}
+    # It logs every unconnected variable; errors are exceptions.
+    logger = logging.getLogger("fmu_manipulation_toolbox")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
     try:
         identifier = re.sub(r"^(?=\d)|\W", "_", fmu.stem, flags=re.ASCII)
         container = _without_claims(FMUContainer, _convention(parts))(identifier, folder)
@@ -64,6 +66,8 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         )
     except FMUContainerError as error:
         raise InputError(f"the container cannot be made: {error.reason}") from None
+    finally:
+        logger.setLevel(level)
 
 
 def _convention(parts: Sequence[Part]) -> str:

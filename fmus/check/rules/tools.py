@@ -47,6 +47,8 @@ def fmutool(fmu: Fmu) -> Iterator[str]:
         raise NotInstalledError("fmu-manipulation-toolbox") from None
     heard = _Ear()
     logger = logging.getLogger("fmu_manipulation_toolbox")
+    if not logger.isEnabledFor(logging.ERROR):  # somebody has silenced the toolbox
+        logger.setLevel(logging.ERROR)
     logger.addHandler(heard)
     try:
         opened = FMU(str(fmu.path))
