@@ -183,7 +183,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         default=PROBLEMS,
         metavar="DIR",
-        help=f"where simulated runs are kept, 3 MB a cell, for all versions of the diagnosis ({PROBLEMS})",
+        help=f"simulated runs, 3 MB a cell, for any version of the diagnosis ({PROBLEMS})",
     )
     parser.add_argument("--no-peers", action="store_true", help="without PySINDy and PLS")
     parser.add_argument(

@@ -81,7 +81,8 @@ def bins(findings: Sequence[Told], least: int = LEAST) -> list[Bin]:
         if len(groups[-1]) >= least and edge > EDGES[0]:
             groups.append([])
     if len(groups) > 1 and len(groups[-1]) < least:
-        groups[-2] += groups.pop()
+        few = groups.pop()
+        groups[-1] += few
     return [_bin(g) for g in groups if g]
 
 

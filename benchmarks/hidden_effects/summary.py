@@ -111,8 +111,9 @@ def write(folder: Path, rows: Rows, cost: Cost | None) -> Path:
             ("hidden", "coefficients", "noise", "separable", "right", "found", "verdict"), several(rows)
         ),
         "## Are confidences what they say?\n",
-        "Findings of cells that no calibration was fitted on, other seeds and other effects: how often "
-        "those of a confidence are true causes, with the binomial 95 % interval. [Diagram](reliability.png)\n",
+        "Findings of cells that no calibration was fitted on, other seeds and other effects: how "
+        "often those of a confidence are true causes, with the binomial 95 % interval. "
+        "[Diagram](reliability.png)\n",
         table(("cells", "confidence", "right", "interval", "within"), reliability(tables(rows))),
     ]
     if failed:
