@@ -81,7 +81,7 @@ def _one_way(prepared: Any) -> Any:
 
 def _lanes(declared: Any, values: Sequence[dict[str, float]]) -> Any:
     """A parameter of all runs: a float where all have the same, so that what is off costs nothing."""
-    found = [float(v.get(declared.name, declared.start)) for v in values]
+    found = [v.get(declared.name, declared.start) for v in values]
     return found[0] if len(set(found)) == 1 else np.array(found)
 
 
@@ -99,7 +99,7 @@ class Fleet:
             n: [dict(c["fmus"][n].get("parameters", {})) for c in content] for n in content[0]["fmus"]
         }
         ship, machine = ships(effects)[orders[0].hidden.other]
-        zero = np.zeros(len(orders))
+        zero: Any = np.zeros(len(orders))
         self.vessel = Part(ship, given["vessel"], Force(zero, zero, zero))
         measured = self._measured(0.0)
         self.observer = Part(kalman.COMPONENT, given["observer"], kalman.Inputs(measured))

@@ -117,12 +117,12 @@ def make(cells: Sequence[Cell], folder: Path) -> Iterator[Key]:
         pilot = pilots([c.seed % 100 for c in some], folder)
         for tries in range(TRIES + 1):
             drawn = {c: _drawn(c, pilot[c.seed % 100], LESS**tries) for c in some}
-            if tries < TRIES:
-                sailed = sail_all([o for c in some for o in _orders(c, drawn[c])])
+            wanted = some if tries < TRIES else ()  # at last they are given up
+            sailed = sail_all([o for c in wanted for o in _orders(c, drawn[c])])
             left = []
             for k, cell in enumerate(some):
                 runs = sailed[RUNS * k : RUNS * (k + 1)]
-                lost = any(isinstance(v, RunawayError) for v in runs)
+                lost = not runs or any(isinstance(v, RunawayError) for v in runs)
                 if lost and tries < TRIES:
                     left.append(cell)
                     continue
@@ -181,7 +181,7 @@ def keep(problem: Problem, folder: Path) -> None:
     """Write a problem to a file of its own."""
     told = asdict(problem)
     del told["runs"]
-    columns = {
+    columns: dict[str, Any] = {
         f"run{k}": np.column_stack([r.time, r.pose, r.tau_cmd]) for k, r in enumerate(problem.runs)
     }
     names = json.dumps([r.name for r in problem.runs])
