@@ -10,7 +10,7 @@ from benchmarks.hidden_effects import fleet, simulated_runs
 from benchmarks.hidden_effects.__main__ import main, scored
 from benchmarks.hidden_effects.answers import judge
 from benchmarks.hidden_effects.cells import KINDS, PAIRS, Cell, cells, for_fitting, for_showing, kind_of
-from benchmarks.hidden_effects.confidence_fit import calibrated, fitted
+from benchmarks.hidden_effects.confidence_fit import Judged, confidence, fitted
 from benchmarks.hidden_effects.draw import (
     LARGEST,
     SINGLE,
@@ -428,14 +428,22 @@ def test_binomial_interval_is_that_of_the_tables(right, low, high):
     assert interval(right, 10) == pytest.approx((low, high), abs=1e-4)
 
 
-def test_calibration_takes_back_what_is_told_too_surely():
-    """Findings that are right less often than told: the fitted map gives their rate."""
-    rng = np.random.default_rng(1)
-    rate = rng.uniform(0.2, 0.95, 4000)
-    told = [Told(float(r**0.25), bool(rng.random() < r)) for r in rate]
-    p = fitted(told)
-    assert calibrated(0.8**0.25, *p) == pytest.approx(0.8, abs=0.05)
-    assert calibrated(0.3**0.25, *p) == pytest.approx(0.3, abs=0.08)
+def test_calibration_finds_the_constants_that_made_the_findings():
+    """Findings drawn by known constants: their confidences come back, to what the sample tells."""
+    rng, known = np.random.default_rng(1), (3.0, 8.0, 4.0)
+    bagged, left, varies = (
+        rng.uniform(0.7, 1.0, 4000),
+        rng.uniform(0, 0.7, 4000),
+        rng.uniform(0, 0.5, 4000),
+    )
+    rate = confidence(bagged, left, varies, known)
+    true = rng.random(4000) < rate
+    found = fitted(
+        [Judged(*map(float, e), bool(t)) for *e, t in zip(bagged, left, varies, true, strict=True)]
+    )
+    assert confidence(bagged, left, varies, found) == pytest.approx(rate, abs=0.05)
+    none_wrong = fitted([Judged(1.0, 0.0, 0.0, True)] * 50)
+    assert 0.9 < confidence(np.ones(1), np.zeros(1), np.zeros(1), none_wrong)[0] < 0.99
 
 
 def test_diagram_shows_only_cells_that_nothing_was_fitted_to(tmp_path):

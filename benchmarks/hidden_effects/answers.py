@@ -34,8 +34,9 @@ def answer(problem: Problem, peers: bool) -> Answer:
     """What the diagnosis says of the measured runs of a problem; it gets nothing else.
 
     Returns:
-        ``diagnosis.json`` without what no score needs; besides ``seconds`` of processor time from three
-        measured runs to the answer, ``truth_mm``, the window position error of the true model on the run
+        ``diagnosis.json`` without what no score needs; besides ``evidence``, what the confidence of each
+        finding is made of (None where the method has none), ``seconds`` of processor time from measured
+        runs to the answer, ``truth_mm``, the window position error of the true model on the run
         held out (None where the diagnosis has none of its form), and ``peers``, what others find first.
     """
     if problem.note:
@@ -49,6 +50,8 @@ def answer(problem: Problem, peers: bool) -> Answer:
         return {"note": str(error)}
     seconds = time.process_time() - begun
     found = {name: value for name, value in content.items() if name not in LEFT_OUT}
+    told = [getattr(f, "evidence", None) for f in diagnosis.learned.effects]
+    found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
     found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
     if peers and problem.hidden:
         found["peers"] = {peer: first_effect(peer, train) for peer in PEERS}

@@ -177,11 +177,11 @@ def _faults(content: dict) -> list[Any]:
 
 
 @cache
-def _target(kind: str, given: tuple[tuple[str, float], ...]) -> np.ndarray:
+def _target(kind: str, given: tuple[tuple[str, float], ...], steps: int) -> np.ndarray:
     path, values = PATHS[kind], dict(given)
     p = packer(path.params)([values.get(v.name, v.start) for v in variables(path.params)])
     state, rows = path.init(path.inputs(), p), []
-    for k in range(round(STOP / STEP) + 1):
+    for k in range(steps + 1):
         state, found = path.step(state, path.inputs(), p, STEP if k else 0.0)
         rows.append(flatten(found))
     return np.array(rows)
@@ -189,7 +189,7 @@ def _target(kind: str, given: tuple[tuple[str, float], ...]) -> np.ndarray:
 
 def target(m: Manoeuvre) -> np.ndarray:
     """(steps + 1, signals): the target of every step."""
-    return _target(m.kind, tuple(m.parameters.items()))
+    return _target(m.kind, tuple(m.parameters.items()), round(STOP / STEP))
 
 
 def sail_all(orders: Sequence[Order]) -> list[Voyage | RunawayError]:

@@ -28,6 +28,7 @@ class Row:
         found: ids in order of acceptance.
         confidences: of each; empty where the method has none.
         true: for each whether it is a true cause, "1" or "0".
+        evidence: for each what its confidence is made of; empty where that is not told.
         reported: the first id, and those that the data do not distinguish from it.
         suspects: nominal coefficients that it says are wrong.
         withdrawn: ids that were accepted, and made unseen data worse.
@@ -56,6 +57,7 @@ class Row:
     found: list[str] = field(default_factory=list)
     confidences: list[str] = field(default_factory=list)
     true: list[str] = field(default_factory=list)
+    evidence: list[str] = field(default_factory=list)
     reported: list[str] = field(default_factory=list)
     suspects: list[str] = field(default_factory=list)
     withdrawn: list[str] = field(default_factory=list)

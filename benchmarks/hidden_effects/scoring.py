@@ -60,6 +60,8 @@ def _told(made: Row, answer: Answer) -> None:
     made.found = [e["id"] for e in effects]
     sure = [e["confidence"] for e in effects]
     made.confidences = [f"{0.0 if c is None else c:.4g}" for c in sure]
+    told = answer.get("evidence", [None] * len(effects))
+    made.evidence = ["" if e is None else " ".join(f"{x:.5g}" for x in e) for e in told]
     made.reported = [effects[0]["id"], *effects[0]["indistinguishable"]] if effects else []
     made.suspects = [s["name"] for s in answer["suspect_coefficients"]]
     made.withdrawn = [w["id"] for w in answer.get("withdrawn", [])]
