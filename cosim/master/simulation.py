@@ -141,9 +141,17 @@ def _run(
         try:
             owner.leave_copies()
             _clear(folder, show)
-            return _record(system, master, folder, realtime, progress, description, interrupted)
+            result, recorder = _record(
+                system, master, folder, realtime, progress, description, interrupted
+            )
         finally:
             master.close()
+        if interrupted() and result.status == "done":  # while an FMU terminated
+            result.status = "interrupted"
+            with _disk(result):
+                sidecar = folder / logs.SIDECAR
+                update_json(sidecar, json.loads(sidecar.read_text("utf-8")), {"status": result.status})
+        return result, recorder
 
 
 def _clear(folder: Path, show: Callable[[str], None]) -> None:
