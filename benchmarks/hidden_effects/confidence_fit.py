@@ -1,6 +1,7 @@
 """Fits the constants of the map from evidence to confidence, ``diagnosis/identification/confidence.py``.
 
-There a finding has the confidence ``bagged / (1 + exp(PER_LEFT left + PER_VARIATION varies - SURE))``. The
+There a finding has the confidence
+``bagged / (1 + exp(PER_LEFT left + PER_VARIATION varies - SURE))``. The
 three constants are fitted by maximum likelihood to findings of the cells that are set aside for it
 (:func:`.cells.for_fitting`), which no diagram shows. They are written to a file, and entered there by
 hand.

@@ -156,25 +156,28 @@ def _problem(cell: Cell, hidden: Sequence[Draw], redrawn: int, voyages: Sequence
     ship = plant(cell, hidden)
     # The diagnosis has no model of waves that are known, nor of a ship of another form.
     known = not (ship.other or "wave_force" in ship.vessel or {d.effect for d in hidden} & set(UNKNOWN))
-    alike = [sorted(confusable(d, hidden, voyages[:-1], cell.wrong)) for d in hidden]
+    alike = confusable(hidden, voyages[:-1], cell.wrong)
     true = (ship.vessel, ship.thrusters, ship.clock) if known else (None, None, 0.0)
     return Problem(*cell.key, hidden, redrawn, alike, *true, "", [v.measured for v in voyages])
 
 
-def confusable(d: Draw, hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> set[str]:
-    """Ids that could do what a hidden effect does, by the truth.
+def confusable(hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> list[list[str]]:
+    """For each hidden effect the ids that could do the same, by the truth.
 
     Args:
-        d: the effect.
         hidden: all that is hidden in the runs.
         runs: of the training.
         wrong: whether nominal coefficients may change by 10 %.
     """
-    measurement = {name: x for other in hidden for name, x in other.measured.items()}
+    if not hidden:
+        return []
+    measurement = {name: x for d in hidden for name, x in d.measured.items()}
     motions = [motion(v, measurement) for v in runs]
-    force = added_force(motions, d.effect, d.values)
-    found = Rivals(motions, wrong).separations(force, d.right)
-    return {effect for effect, share in found.items() if share < SEPARABLE}
+    rivals, found = Rivals(motions, wrong), []
+    for d in hidden:
+        left = rivals.separations(added_force(motions, d.effect, d.values), d.right)
+        found.append(sorted(effect for effect, share in left.items() if share < SEPARABLE))
+    return found
 
 
 def keep(problem: Problem, folder: Path) -> None:
