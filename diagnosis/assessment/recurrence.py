@@ -70,7 +70,8 @@ def recurrence(data: Sequence[Integrals], left: np.ndarray, seed: int = 0) -> li
     for k in range(3):
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
-        found.append(Recurrence(shares, float(lasts[k]), _in_part(error, command[:, k], run)))
+        in_part = _in_part(error, command[:, k], run, shares["command"])
+        found.append(Recurrence(shares, float(lasts[k]), in_part))
     return found
 
 
@@ -112,8 +113,10 @@ def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.n
     return share if all(foretold(np.roll(error, int(n))) < share for n in offsets) else 0.0
 
 
-def _in_part(error: np.ndarray, command: np.ndarray, run: np.ndarray) -> bool:
-    """Whether an amplitude of its own for each stretch fits the command far better than a constant."""
+def _in_part(error: np.ndarray, command: np.ndarray, run: np.ndarray, always: float) -> bool:
+    """Whether the command with an amplitude of its own for each stretch gives far more of an error than
+    a constant force for each stretch, and than the command gives ``always``.
+    """
     number = np.arange(error.size) // STRETCH + run * error.size
 
     def explained(x: np.ndarray) -> float:
@@ -121,4 +124,4 @@ def _in_part(error: np.ndarray, command: np.ndarray, run: np.ndarray) -> bool:
         top, bottom = np.bincount(at, x * error), np.bincount(at, x * x)
         return float(np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0]) / max(error @ error, 1e-300))
 
-    return explained(command) > explained(np.ones_like(error)) + CLEARER
+    return explained(command) > max(explained(np.ones_like(error)), always) + CLEARER

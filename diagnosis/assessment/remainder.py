@@ -53,6 +53,11 @@ class AxisRemainder:
     least: float
     significant: bool
 
+    @property
+    def beyond_chance(self) -> bool:
+        """Whether more is left than noise gives, be it so little that it does not matter."""
+        return self.p_value < CHANCE / TESTS
+
 
 def axis_remainders(
     data: Sequence[Integrals],
@@ -79,11 +84,11 @@ def axis_remainders(
         rms, start = _rms(left[:, k]), _rms(first[:, k])
         least = max(SHARE_OF_FIRST * start, SHARE_OF_COMMAND * _rms(command[:, k]))
         level = CHANCE / TESTS
-        beyond = (by_size < level and rms > least) or (by_slowness < level and slow > least)
+        matters = (by_size < level and rms > least) or (by_slowness < level and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         p_value = min(by_size, by_slowness)
         uncertainty = _rms(noise[:, k])
-        found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, beyond)
+        found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
     return found
 
 
@@ -131,3 +136,8 @@ class Remainder:
     def significant(self) -> bool:
         """Whether more is left on some axis than chance gives, and it matters."""
         return any(a.significant for a in self.axes.values())
+
+    @property
+    def beyond_chance(self) -> bool:
+        """Whether more is left on some axis than chance gives."""
+        return any(a.beyond_chance for a in self.axes.values())

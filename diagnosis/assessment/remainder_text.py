@@ -8,7 +8,11 @@ from .recurrence import Recurrence
 from .regions import NAMES, UNITS, Region
 from .remainder import AxisRemainder
 
-NOTHING_LEFT = "Nothing that matters: what the model leaves is within its uncertainty, or small."
+NOTHING_LEFT = "What the model leaves is within the uncertainty of the measurement."
+LITTLE_LEFT = (
+    "What the model leaves is beyond the noise of the measurement, but less than 5 % of the first error "
+    "or 2 % of the commanded force."
+)
 # Space in which most repeats -> how, and what kind of cause does so.
 REPEATS = {
     "place": (
@@ -40,7 +44,7 @@ BRIEF = (
     "repeats with neither place, motion, command nor time, and is over within seconds",
     "waves, or a disturbance of the measurement",
 )
-BRIEFLY = 4.0  # s: little longer than a window, which makes what is brief last for 3 s
+BRIEFLY = 3.0  # s: a window makes what is brief last for 2 s; chosen
 
 
 def remainder_sentence(
@@ -59,7 +63,7 @@ def remainder_sentence(
     """
     left = [axis for axis in axes if axes[axis].significant]
     if not left or how is None:
-        return NOTHING_LEFT
+        return LITTLE_LEFT if any(a.beyond_chance for a in axes.values()) else NOTHING_LEFT
     parts: dict[tuple[str, str], list[str]] = {}
     for k, axis in enumerate(axes):
         if axis in left:

@@ -57,7 +57,7 @@ def diagnosis_content(
     suspects = [result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects]
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
-        sentence=headline(diagnosis.verdict, effects, suspects),
+        sentence=headline(diagnosis.verdict, effects, suspects, diagnosis.remainder.beyond_chance),
         remainder=_remainder(diagnosis.remainder),
         effects=effects,
         withdrawn=[result_keys.WithdrawnResult(id=w.id, reason=w.reason) for w in diagnosis.withdrawn],

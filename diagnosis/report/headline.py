@@ -8,7 +8,18 @@ from .result_keys import EffectResult, SuspectResult
 # Confidence from which on a finding is told as a fact; chosen: nobody may act on less as on one.
 SURE = 0.8
 NOTHING_FOUND = "Nothing is missing that these data show."
+TOO_LITTLE = "What is missing is more than noise, but too little to matter."
 UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
+
+
+MOST_NAMED = 4  # of the coefficients; chosen
+
+
+def _names(suspects: Sequence[SuspectResult]) -> str:
+    names = [s.name for s in suspects]
+    more = [f"{len(names) - MOST_NAMED} others"] if len(names) > MOST_NAMED else []
+    *most, last = [*names[:MOST_NAMED], *more]
+    return f"{', '.join(most)} and {last}" if most else last
 
 
 def is_sure(e: EffectResult) -> bool:
@@ -28,19 +39,27 @@ def told(e: EffectResult) -> str:
     return e.sentence if is_sure(e) else possibility(e)
 
 
-def headline(verdict: str, effects: Sequence[EffectResult], suspects: Sequence[SuspectResult]) -> str:
+def headline(
+    verdict: str,
+    effects: Sequence[EffectResult],
+    suspects: Sequence[SuspectResult],
+    something: bool,
+) -> str:
     """The result in a few sentences.
 
     Args:
         verdict: that of the diagnosis.
         effects: that were found, in the order of acceptance.
         suspects: nominal coefficients that are wrong.
+        something: whether more than noise is left.
     """
     if effects:
         return " ".join(told(e) for e in sorted(effects, key=lambda e: not is_sure(e)))
     if verdict == "coefficients":
-        names = f", above all {listed([s.name for s in suspects])}" if suspects else ""
+        names = f", above all {_names(suspects)}" if suspects else ""
         return (
             f"Other values of the nominal coefficients explain these data{names}; no effect is missing."
         )
-    return UNEXPLAINED if verdict == "unexplained" else NOTHING_FOUND
+    if verdict == "unexplained":
+        return UNEXPLAINED
+    return TOO_LITTLE if something else NOTHING_FOUND
