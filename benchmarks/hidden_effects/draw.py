@@ -24,7 +24,8 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "bow exp(-(u/u0)^2)": ("bow_speed_loss", "curve_bow(|u|)"),
     "delay off the grid": ("delay",),
 }
-SINGLE = [*STANDARD, *FOREIGN]
+# One of two propellers that have no commands of their own here cannot be told from the other.
+SINGLE = [*(e.id for e in STANDARD.values() if "each vsp" not in e.needs), *FOREIGN]
 # Physics of which the diagnosis has nothing: no id is a right answer.
 UNKNOWN = [e.id for e in FOREIGN_PHYSICS]
 MOST_PLAY = 0.12  # of the full command: about the largest size, 40 % of the force on an axis
@@ -67,6 +68,8 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     """
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
+    elif effect.endswith("_outage"):  # and so are these
+        values = outages([p.name for p in STANDARD[effect].parameters], rng)
     elif effect == "backlash":  # so is its play, of which a series takes seconds
         values = {"backlash": less * MOST_PLAY * float(rng.uniform(0.25, 1.0))}
     else:
@@ -74,6 +77,15 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
         size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
         values = scaled(_solve(lambda s: share(pilot, effect, scaled(s)), size))
     return Draw(effect, values, share(pilot, effect, values))
+
+
+def outages(names: Sequence[str], rng: np.random.Generator) -> dict[str, float]:
+    """One to four intervals without thrust, from a twentieth to two fifths of the time in all."""
+    count = int(rng.integers(1, 5))
+    room = 0.8 * STOP / count  # s; nothing fails in the first and last tenth
+    starts = [0.1 * STOP + room * (k + float(rng.uniform(0.0, 0.5))) for k in range(count)]
+    times = [t for start in starts for t in (start, start + room * float(rng.uniform(0.06, 0.5)))]
+    return dict(zip(names, times, strict=False))
 
 
 def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:

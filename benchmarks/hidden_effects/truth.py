@@ -136,7 +136,7 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
         shares = np.where((m.time >= delay)[:, None], held(m.time, shares, delay), 0.0)
     if "backlash" in values:
         shares = followed(shares, values["backlash"])
-    now = Running._make([m.time, *nu.T, *shares.T])
+    now = Running(m.time, *nu.T, *shares.T)
     if lag:
         step = 1.0 - np.exp(-STEP / lag)
         shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)
