@@ -84,7 +84,7 @@ def cells(
         wrong: kinds of coefficients.
         seeds: of everything that is drawn.
     """
-    hidden = {
+    hidden: dict[str, Sequence[tuple[str, ...]]] = {
         "single": [(e,) for e in effects],
         "none": [()],
         "pair": list(PAIRS),
@@ -93,8 +93,8 @@ def cells(
     for seed, (noise, off), kind in product(seeds, product(noises, wrong), kinds):
         # The manoeuvres are those of the seed; where nothing is hidden, all else is drawn anew.
         again = [seed + 100 * k for k in range(NONES)] if kind == "none" else [seed]
-        for each, chosen in product(again, hidden[kind]):
-            yield Cell(chosen, noise, off, each)
+        for each in again:
+            yield from (Cell(chosen, noise, off, each) for chosen in hidden[kind])
 
 
 def kind_of(name: str) -> str:

@@ -37,12 +37,13 @@ class Judged(NamedTuple):
 
 def judged(rows: Iterable[Row]) -> list[Judged]:
     """All findings of some cells of which the diagnosis tells the evidence."""
-    return [
-        Judged(*map(float, told.split()), true == "1")
-        for r in rows
-        for told, true in zip(r.evidence, r.true, strict=True)
-        if told
-    ]
+    found = []
+    for r in rows:
+        for told, true in zip(r.evidence, r.true, strict=True):
+            if told:
+                bagged, left, varies = map(float, told.split())
+                found.append(Judged(bagged, left, varies, true == "1"))
+    return found
 
 
 def confidence(

@@ -38,6 +38,7 @@ from .simulated_runs import (
     scenario,
 )
 
+OBSERVER = kalman.COMPONENT
 TOGETHER = 128  # runs at once: more take more memory (2.2 MB each) and hardly less time; chosen
 
 
@@ -102,7 +103,7 @@ class Fleet:
         zero: Any = np.zeros(len(orders))
         self.vessel = Part(ship, given["vessel"], Force(zero, zero, zero))
         measured = self._measured(0.0)
-        self.observer = Part(kalman.COMPONENT, given["observer"], kalman.Inputs(measured))
+        self.observer = Part(OBSERVER, given["observer"], OBSERVER.inputs(measured))
         self.controller = Part(controller.COMPONENT, given["controller"], self._seen(0))
         self.thrusters = Part(machine, given["thrusters"], self._request())
         self._measurement = measured
@@ -143,7 +144,7 @@ class Fleet:
             if part == self.parts - 1:
                 held = Force(f.tau_cmd_X, f.tau_cmd_Y, f.tau_cmd_N)
                 self._measurement = self._measured(round(k * STEP, 12))
-                self.observer.advance(kalman.Inputs(self._measurement, held), STEP)
+                self.observer.advance(OBSERVER.inputs(self._measurement, held), STEP)
                 self.controller.advance(self._seen(k), STEP)
             self.thrusters.advance(self._request(), self.h)
 

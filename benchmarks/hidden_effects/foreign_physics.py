@@ -8,8 +8,9 @@ to them.
 
 from typing import Annotated, Any
 
+from fmus import effects
 from fmus.declare import POSITIVE, Range
-from fmus.effects import STANDARD, Memory, Motion, effect
+from fmus.effects import STANDARD, Memory, Motion
 from fmus.frames import rotate_to_body
 from fmus.hull import Triple
 from fmus.ops import Number, clip, cos, exp, fmax, sin, sqrt, where
@@ -22,7 +23,7 @@ PERIODS = (31.7, 19.3, 13.1, 8.9)
 SINES = tuple(6.283185307179586 / period for period in PERIODS)
 
 
-@effect(
+@effects.effect(
     "slow gusts",
     "environment",
     "XY",
@@ -45,7 +46,7 @@ def slow_gusts(
     return X, Y, 0.0 * X
 
 
-@effect(
+@effects.effect(
     "bank",
     "environment",
     "YN",
@@ -67,7 +68,7 @@ def bank(
     return 0.0 * Y, Y, bank_arm * Y
 
 
-@effect(
+@effects.effect(
     "shallow water",
     "environment",
     "XYN",
@@ -87,7 +88,7 @@ def shallow_water(
     return -on * m.u, -3.0 * on * m.v, -0.3 * on * m.r
 
 
-@effect(
+@effects.effect(
     "tether",
     "environment",
     "XYN",
@@ -112,7 +113,7 @@ def tether(
     return X, Y, -stern * Y
 
 
-@effect(
+@effects.effect(
     "backlash",
     "actuator",
     "XYN",
@@ -136,7 +137,7 @@ def backlash(
     return (a, b, c), (a, b, c)
 
 
-@effect(
+@effects.effect(
     "bias by place",
     "measurement",
     "XYN",
