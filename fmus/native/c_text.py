@@ -7,6 +7,7 @@ returns 1 at once.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -68,8 +69,8 @@ class Writer:
         """A kernel as a static function of its arguments and results."""
         name = f"kernel_{len(self._kernels) + 1}"
         self._kernels[id(recording)] = name
-        body = _Body(self._kernels).text(recording, [("results", recording.results)])
-        return f"static int {name}(const double *given, double *results)\n{body}"
+        head = f"static int {name}(const double *given, double *results)"
+        return self.function(head, recording, [("results", recording.results)])
 
     def function(
         self, head: str, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]
@@ -81,7 +82,9 @@ class Writer:
             recording: what it does.
             targets: (array, the results that it gets), together all results.
         """
-        return f"{head}\n{_Body(self._kernels).text(recording, targets)}"
+        unused = ", ".join(f"(void){name}" for name in re.findall(r"(\w+)[,)]", head))
+        body = _Body(self._kernels).text(recording, targets)
+        return f"{head}\n{{\n    {unused};{body[1:]}"
 
 
 class _Body:
@@ -113,10 +116,10 @@ class _Body:
                 self.needed.add(id(statement))
                 self.need(statement.args)
             return wanted
+        if isinstance(statement, Call):  # may fail
+            self.need(statement.args)
+            return True
         wanted = any(id(x) in self.needed for x in statement.results)
-        if isinstance(statement, Call):
-            self.need(statement.args if wanted else ())
-            return wanted
         for block, given in zip(statement.blocks, statement.given, strict=True):
             self.need(x for x, to in zip(given, statement.results, strict=True) if id(to) in self.needed)
             wanted = any([self._mark(inner) for inner in reversed(block)]) or wanted
@@ -143,8 +146,7 @@ class _Body:
                 if id(statement) in self.needed:
                     self._branch(statement, depth)
             elif isinstance(statement, Call):
-                if any(id(x) in self.needed for x in statement.results):
-                    self.lines += [indent + line for line in self._call(statement)]
+                self.lines += [indent + line for line in self._call(statement)]
             elif id(statement) in self.needed:
                 self.lines += [indent + line for line in self._operation(statement)]
 

@@ -1,7 +1,7 @@
 /* The FMI 2.0 co-simulation face of a component whose functions and tables "tables.h" declares.
 
    It behaves as the project's Python face does (fmus/fmi/slave.py): a value that is out of place is told and
-   changes nothing; a step that fails is told with its cause, is discarded and leaves the state as it was.
+   changes nothing; a step that fails is told with its cause and leaves the state as it was.
    All that an instance knows lies in one block of memory, so that instances do not meet. */
 
 #include <math.h>
@@ -273,18 +273,18 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
     (void)no_return;
     if (!(h >= 0.0 && is_finite(h))) {
         tell(m, fmi2Error, "step at t = %.15g s: %.15g s is no step size", t, h);
-        return fmi2Discard;
+        return fmi2Error;
     }
     if (m->stale || m->failed) return refuse(m, "there is no state to step from");
     if (MAX_STEP > 0.0 && h > MOST_PARTS * MAX_STEP) {
         tell(m, fmi2Error, "step at t = %.15g s failed: a step of %.15g s is too long: %.15g s are integrated at once",
              t, h, MAX_STEP);
-        return fmi2Discard;
+        return fmi2Error;
     }
     after = prepare(m) ? NULL : advance(m, h);
     if (!after) {
         tell(m, fmi2Error, "step at t = %.15g s failed: division by zero", t);
-        return fmi2Discard;
+        return fmi2Error;
     }
     for (k = 0; k < OUTPUTS; k++) bad |= !is_finite(m->outputs[k]);
     if (bad) {
@@ -293,7 +293,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
             if (!is_finite(m->outputs[k]) && strlen(text) + strlen(names[FIRST_OUTPUT + k]) + 3 < sizeof text)
                 strcat(strcat(text, *text ? ", " : ""), names[FIRST_OUTPUT + k]);
         tell(m, fmi2Error, "step at t = %.15g s failed: %s not finite", t, text);
-        return fmi2Discard;
+        return fmi2Error;
     }
     memcpy(m->now.state, after, STATES * sizeof(double));
     memcpy(outputs(m), m->outputs, OUTPUTS * sizeof(double));

@@ -15,6 +15,8 @@ from typing import Any
 from ..fmi.trace import Symbol, TraceError
 
 _CONDITIONS = frozenset({"lt", "le", "gt", "ge", "eq", "ne", "and", "or", "logical_not"})
+# The truth value of one side that decides for both.
+_DECIDED = {"and": False, "or": True}
 
 
 class Value(Symbol):
@@ -34,7 +36,7 @@ class Value(Symbol):
         self.block = tape.block
         self.condition = condition
 
-    def apply_operation(self, name: str, args: Sequence[Any]) -> Value:
+    def apply_operation(self, name: str, args: Sequence[Any]) -> Any:
         """The hook of operators and of :mod:`fmus.ops`."""
         return self.tape.operation(name, args)
 
@@ -94,10 +96,16 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """The kernels that some functions call; those that a kernel calls come before it."""
+    """The kernels that some functions call.
+
+    Attributes:
+        recordings: those that a kernel calls come before it.
+        known: function and shape of its arguments -> kernel, its result, and the arguments, which keeps
+            the objects among them from making way for others in their place.
+    """
 
     recordings: list[Recording] = field(default_factory=list)
-    known: dict[Any, tuple[Recording, Any]] = field(default_factory=dict)
+    known: dict[Any, tuple[Recording, Any, Any]] = field(default_factory=dict)
 
 
 class Tape:
@@ -121,9 +129,12 @@ class Tape:
         self._check(results)
         return Recording(self.body, results)
 
-    def operation(self, name: str, args: Sequence[Any]) -> Value:
-        """Record an operation."""
+    def operation(self, name: str, args: Sequence[Any]) -> Any:
+        """Record an operation, but for one with a known truth value."""
         self._check(args)
+        if name in _DECIDED and any(isinstance(x, bool) for x in args):
+            known, other = args if isinstance(args[0], bool) else args[::-1]
+            return known if known is _DECIDED[name] else other
         condition = name in _CONDITIONS or (name == "where" and all(map(is_condition, args[1:])))
         value = Value(self, name, args, condition)
         self.block.append(value)
@@ -170,11 +181,12 @@ class Tape:
         if key not in self.kernels.known:
             tape = Tape(self.kernels)
             inner = iter([tape.variable(f"given[{k}]", is_condition(x)) for k, x in enumerate(flat)])
-            given = function(*refilled(args, inner))
+            refilled_args = refilled(args, inner)
+            given = function(*refilled_args)
             recording = tape.recording(list(leaves(given)))
             self.kernels.recordings.append(recording)
-            self.kernels.known[key] = recording, given
-        recording, given = self.kernels.known[key]
+            self.kernels.known[key] = recording, given, refilled_args
+        recording, given, _ = self.kernels.known[key]
         results = [Value(self, "called", (), is_condition(x)) for x in recording.results]
         self.block.append(Call(recording, flat, results))
         return refilled(given, iter(results))
@@ -191,12 +203,17 @@ def is_condition(x: Any) -> bool:
     return x.condition if isinstance(x, Value) else isinstance(x, bool)
 
 
+def is_number(x: Any) -> bool:
+    """Whether something is a number or a truth value, known or not."""
+    return isinstance(x, (Value, float, int))
+
+
 def leaves(value: Any) -> Iterator[Any]:
-    """What nested tuples and lists hold, in order."""
+    """The numbers that nested tuples and lists hold, in order."""
     if isinstance(value, (tuple, list)):
         for item in value:
             yield from leaves(item)
-    else:
+    elif is_number(value):
         yield value
 
 
@@ -208,14 +225,14 @@ def like(template: Any, items: list[Any]) -> Any:
 
 
 def refilled(template: Any, values: Iterator[Any]) -> Any:
-    """Values in the shape of nested tuples and lists: the inverse of :func:`leaves`."""
+    """Numbers in place of those in nested tuples and lists: the inverse of :func:`leaves`."""
     if isinstance(template, (tuple, list)):
         return like(template, [refilled(item, values) for item in template])
-    return next(values)
+    return next(values) if is_number(template) else template
 
 
 def shape(value: Any) -> Any:
-    """What tells nested tuples of other lengths, classes or kinds of leaves apart."""
+    """What tells nested tuples of other lengths, classes, kinds of numbers or objects apart."""
     if isinstance(value, (tuple, list)):
         return type(value), tuple([shape(item) for item in value])
-    return is_condition(value)
+    return is_condition(value) if is_number(value) else id(value)
