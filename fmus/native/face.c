@@ -84,7 +84,8 @@ static void tell(Instance *m, fmi2Status status, const char *format, ...) {
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    m->logger(m->environment, m->name, status, categories[category], "%s", text);
+    /* The text is the format: it holds no "%", and many a host does not read what would follow. */
+    m->logger(m->environment, m->name, status, categories[category], text);
 }
 
 static int is_finite(double x) { return x - x == 0.0; }
