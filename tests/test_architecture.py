@@ -43,7 +43,8 @@ DIAGNOSIS_LAYERS = (
     ("command_line",),
     ("compare", "learn"),  # commands
 )
-# And of fmus: what all components share, effects, components, the ship of them, their FMI face, the tools.
+# And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
+# the tools.
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
     ("frames", "hull"),
@@ -51,6 +52,7 @@ FMUS_LAYERS = (
     ("controller", "guidance", "observer", "thrusters", "vessel"),
     ("ship",),
     ("fmi",),
+    ("native",),
     ("build",),
     ("check",),
 )
