@@ -17,9 +17,9 @@ from support.project import COMPONENTS, ROOT
 
 from cosim.run import main as run_scenario
 from fmus.build import build
-from fmus.build import native_targets as choosing
+from fmus.build import platforms
 from fmus.build.__main__ import main
-from fmus.build.native_targets import native_targets
+from fmus.build.platforms import native_targets
 from fmus.check.checking import main as check
 from fmus.declare import flatten, width
 from fmus.effects import STANDARD
@@ -80,7 +80,8 @@ def test_description_is_that_of_the_python_fmu(name, native, fmus):
     assert not [entry for entry in inside if "python" in entry or entry.endswith(".py")]
 
 
-@pytest.mark.parametrize("name", ["vessel", pytest.param("thrusters", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["vessel", "thrusters"])
+@pytest.mark.slow
 def test_no_rule_finds_anything(name, native):
     done = command(check, native[name])
     assert done.returncode == 0, done.stdout
@@ -101,7 +102,7 @@ def content(stop):
         {"kind": "dropout", "signals": pose, "at": [0.3 * stop], "duration": 0.5, "value": "nan"},
         {"kind": "dropout", "signals": ["vessel.tau_X"], "at": [0.6 * stop], "duration": 0.1, "value": "nan"},
     ]
-    changes = [("vessel", "delta_X_u", -4.0), ("thrusters", "delay", 0.07), ("vessel", "current_V_n", 0.02),
+    changes = [("vessel", "delta_X_u", -4.0), ("thrusters", "delay", 0.07), ("vessel", "V_n", 0.02),
                ("thrusters", "curve_bow_u_3", -0.4), ("thrusters", "lag", 0.2), ("vessel", "mass", 1.5)]  # fmt: skip
     scenario["events"] = [
         {"time": stop * (k + 1) / 8, "model": model, "variable": name, "action": "override", "value": value}
@@ -281,9 +282,9 @@ def test_without_a_compiler_one_line_says_what_to_install(monkeypatch, tmp_path)
 
 
 def test_compiler_that_fails_is_told(monkeypatch, tmp_path):
-    broken = compilers.Compiler(("false",), "broken")
-    monkeypatch.setattr(choosing, "compiler_for", lambda target: broken)
-    monkeypatch.setattr(compilers, "compiler_for", lambda target: compilers.Compiler((("false",),), ""))
+    broken = compilers.Compiler((("false",),), (), "")
+    for module in (platforms, compilers):
+        monkeypatch.setattr(module, "compiler_for", lambda target: broken)
     monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
     done = command(main, "--native", "observer_mdf")
     assert done.returncode == 2

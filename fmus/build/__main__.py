@@ -18,7 +18,7 @@ from ..interruption import run_interruptible
 from . import ledger
 from .building import build, cache_folder, export
 from .finding import BuildError, load, which
-from .native_targets import native_targets
+from .platforms import native_targets
 from .start_values_file import read_starts
 
 

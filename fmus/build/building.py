@@ -19,7 +19,7 @@ from ..native.export_source import export_source
 from ..native.native_fmu import native_fmu
 from . import ledger
 from .finding import ROOT, BuildError, load, which
-from .native_targets import Native
+from .platforms import Native
 from .packing import changes, pack
 from .start_values_file import Starts
 

@@ -35,12 +35,12 @@ class Target:
     Attributes:
         suffix: of a shared library there.
         triples: the machines that its library runs on, as zig calls them.
-        options: of the linker.
+        linked: options behind the files, where a linker looks for libraries.
     """
 
     suffix: str
     triples: tuple[str, ...]
-    options: tuple[str, ...] = ()
+    linked: tuple[str, ...] = ()
 
 
 TARGETS = {
@@ -70,10 +70,12 @@ class Compiler:
 
     Attributes:
         commands: one for each machine that the library is for, without files.
+        linked: options behind the files.
         version: what it says of itself.
     """
 
     commands: tuple[tuple[str, ...], ...]
+    linked: tuple[str, ...]
     version: str
 
 
@@ -83,19 +85,19 @@ def compiler_for(target: str) -> Compiler:
     Raises:
         CompilerError: there is none.
     """
-    options = TARGETS[target].options
+    linked = TARGETS[target].linked
     if target == this_platform():
         for name in SYSTEM:
             if path := shutil.which(name):
                 machines = ("-arch", "x86_64", "-arch", "arm64") if target == "darwin64" else ()
-                return Compiler(((path, *OPTIONS, *machines, *options),), _version([path]))
+                return Compiler(((path, *OPTIONS, *machines),), linked, _version([path]))
     if importlib.util.find_spec("ziglang") is None:
         missing = "there is no C compiler (gcc, cc or clang), so this" if target == this_platform() else target
         raise CompilerError(f"{missing} {NO_ZIG}")
     zig = (sys.executable, "-m", "ziglang")
     own = ("-s", "-fno-sanitize=all", "-mcpu=baseline")
-    commands = [(*zig, "cc", "-target", t, *own, *OPTIONS, *options) for t in TARGETS[target].triples]
-    return Compiler(tuple(commands), _version(zig))
+    commands = [(*zig, "cc", "-target", t, *own, *OPTIONS) for t in TARGETS[target].triples]
+    return Compiler(tuple(commands), linked, _version(zig))
 
 
 def _version(command: Sequence[str]) -> str:
@@ -116,11 +118,10 @@ def compiled(source: Path, target: str, work: Path) -> bytes:
         CompilerError: the compiler says no, and what.
     """
     made: list[bytes] = []
-    for k, command in enumerate(compiler_for(target).commands):
+    compiler = compiler_for(target)
+    for k, command in enumerate(compiler.commands):
         library = work / f"{target}_{k}{TARGETS[target].suffix}"
-        # Behind the source, where a linker of old looks for libraries.
-        cut = len(command) - len(TARGETS[target].options)
-        arguments = [*command[:cut], "-I", str(work), "-o", str(library), str(source), *command[cut:]]
+        arguments = [*command, "-I", str(work), "-o", str(library), str(source), *compiler.linked]
         done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=work)
         if done.returncode != 0 or not library.is_file():
             said = [line for line in done.stderr.splitlines() if line.strip()]
