@@ -23,7 +23,8 @@ from rich.progress import (
 
 from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, run_command
 from .errors import InputError
-from .master.simulation import Result, simulate
+from .master.ending import Result
+from .master.simulation import simulate
 from .results.performance import table
 from .scenario.load import load_scenario
 
