@@ -1,8 +1,8 @@
 """What do native FMUs gain, and what do they cost? ``python -m benchmarks.native``.
 
-Steps every component on the same random inputs in Python and in C, in one run and in turns, and builds its
-native FMU; then runs scenarios/ellipse.json with FMUs of both kinds. All times are processor time, medians
-of several repeats. The closed loops must have the same log to the byte.
+Runs scenarios/ellipse.json with FMUs of both kinds, which must give the same log to the byte. Then steps
+every component on the same random inputs in Python and in C, in turns, and builds its native FMU. All
+times are processor time, medians of several repeats.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from fmus.declare import discover, flatten, packer, variables
 SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
 ROWS, STEP = 500, 0.01
 
-# Steps a component over rows of inputs, read from a file, again and again; prints seconds of processor time.
+# Steps a component over rows of inputs from a file, many times; prints the processor time of a step [s].
 TIMING = """\
 #include <stdio.h>
 #include <string.h>
@@ -100,10 +100,8 @@ def step_table(repeats):
                 times.append((in_python(component, rows), float(done.stdout)))
             seconds, size = build_time(component.name, Path(folder) / "cache")
         python, native = (1e6 * median(kind) for kind in zip(*times, strict=True))
-        print(
-            f"{component.name:30}{python:10.1f}{native:8.2f}{python / native:8.0f}{seconds:9.1f}{size / 1e3:8.0f}",
-            flush=True,
-        )
+        numbers = f"{python:10.1f}{native:8.2f}{python / native:8.0f}{seconds:9.1f}{size / 1e3:8.0f}"
+        print(f"{component.name:30}{numbers}", flush=True)
 
 
 def closed_loop(stop, repeats):
@@ -123,7 +121,8 @@ def closed_loop(stop, repeats):
                 logs.add((Path(folder) / "log.csv").read_bytes())
     python, native = (median(times[kind]) for kind in kinds)
     print(f"ellipse, {stop:g} s: {python:.2f} s with Python FMUs, {native:.2f} s with native ones")
-    print(f"ratio {python / native:.2f}; log.csv {'the same to the byte' if len(logs) == 1 else 'DIFFERS'}")
+    same = "the same to the byte" if len(logs) == 1 else "DIFFERS"
+    print(f"ratio {python / native:.2f}; log.csv {same}")
     return len(logs) == 1
 
 

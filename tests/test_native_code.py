@@ -57,7 +57,9 @@ def test_c_gives_the_same_bits(name, tmp_path):
     odd = [0.0, -0.0, 1e3, *([] if component.hold_nonfinite else [math.nan, math.inf])]
     for trial in range(12 if name in LARGE else 40):
         share = rng.random() if trial else 0.0
-        params = [shaken(v, rng) if rng.random() < share else v.start for v in variables(component.params)]
+        params = [
+            shaken(v, rng) if rng.random() < share else v.start for v in variables(component.params)
+        ]
         p = packer(component.params)(params)
         inputs = [rng.uniform(-0.5, 0.5) for _ in range(count)]
         state = component.init(pack(inputs), p)
@@ -94,7 +96,9 @@ def of_inputs(function):
 @compiled
 def test_traps_of_arithmetic(tmp_path):
     """Zeros keep their signs, infinities have no whole part, NaN is not folded away."""
-    component = of_inputs(lambda a, b, c: (a + 0.0 - b * 0.0, floor(a), where(a - a == 0.0, -a, c / 3.0)))
+    component = of_inputs(
+        lambda a, b, c: (a + 0.0 - b * 0.0, floor(a), where(a - a == 0.0, -a, c / 3.0))
+    )
     run = ccode.Compiled(component, tmp_path, "-O2")
     values = [0.0, -0.0, 0.5, -0.5, 1e300, -1e-320, math.inf, -math.inf, math.nan]
     for a in values:

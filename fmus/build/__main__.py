@@ -64,12 +64,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="SSP parameter set whose values become start values (without NAME: of the FMUs it names)",
     )
     parser.add_argument(
-        "--native", action="store_true", help="compile the FMUs: they need no Python to run (docs/native.md)"
+        "--native",
+        action="store_true",
+        help="compile the FMUs, which then need no Python",
     )
     parser.add_argument(
         "--target",
         metavar="PLATFORM,...",
-        help="with --native: linux64, win64, darwin64 (this computer's); python: the rest runs in Python",
+        help="with --native: linux64, win64, darwin64 (this computer); python: all others run in Python",
     )
     parser.add_argument(
         "--source", type=Path, metavar="DIR", help="with --native: write plain C there, build no FMU"

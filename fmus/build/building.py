@@ -19,8 +19,8 @@ from ..native.export_source import export_source
 from ..native.native_fmu import native_fmu
 from . import ledger
 from .finding import ROOT, BuildError, load, which
-from .platforms import Native
 from .packing import changes, pack
+from .platforms import Native
 from .start_values_file import Starts
 
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
@@ -166,7 +166,7 @@ def _compiled(component: Component, native: Native, work: Path, python: Path | N
 def _source_hash(
     own_file: Path | None, effects: EffectSet, starts: Mapping[str, float], native: Native | None = None
 ) -> str:
-    """Hash of everything that a build reads, of the start values that it changes, and of its compilers."""
+    """Hash of all that a build reads, of the start values that it changes, and of its compilers."""
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     own = [*effects.files, *([own_file] if own_file else [])]
     ours = [p for suffix in ("py", "c") for p in ROOT.rglob(f"*.{suffix}") if CHECKER not in p.parents]

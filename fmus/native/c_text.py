@@ -122,7 +122,8 @@ class _Body:
         wanted = any(id(x) in self.needed for x in statement.results)
         for block, given in zip(statement.blocks, statement.given, strict=True):
             self.need(x for x, to in zip(given, statement.results, strict=True) if id(to) in self.needed)
-            wanted = any([self._mark(inner) for inner in reversed(block)]) or wanted
+            for inner in reversed(block):
+                wanted = self._mark(inner) or wanted
         if wanted:
             self.needed.add(id(statement))
             self.need([statement.condition])

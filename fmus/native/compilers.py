@@ -44,7 +44,7 @@ class Target:
 
 
 TARGETS = {
-    # glibc as old as that of the oldest Linux that is still in use; the library binds its own names first.
+    # glibc as old as that of the oldest Linux still in use; the library binds its own names first.
     "linux64": Target(".so", ("x86_64-linux-gnu.2.17",), ("-Wl,-Bsymbolic", "-lm")),
     "win64": Target(".dll", ("x86_64-windows-gnu",)),
     "darwin64": Target(".dylib", ("x86_64-macos", "aarch64-macos")),
@@ -52,7 +52,7 @@ TARGETS = {
 
 
 def this_platform() -> str:
-    """FMI's name of the platform that this runs on; of one that FMI 2.0 has no name for, that of Python."""
+    """FMI's name of the platform that this runs on; Python's where FMI 2.0 has none."""
     machine = platform.machine().lower()
     if sys.platform == "darwin":
         return "darwin64"
@@ -92,8 +92,9 @@ def compiler_for(target: str) -> Compiler:
                 machines = ("-arch", "x86_64", "-arch", "arm64") if target == "darwin64" else ()
                 return Compiler(((path, *OPTIONS, *machines),), linked, _version([path]))
     if importlib.util.find_spec("ziglang") is None:
-        missing = "there is no C compiler (gcc, cc or clang), so this" if target == this_platform() else target
-        raise CompilerError(f"{missing} {NO_ZIG}")
+        here = target == this_platform()
+        what = "there is no C compiler (gcc, cc or clang), so this" if here else target
+        raise CompilerError(f"{what} {NO_ZIG}")
     zig = (sys.executable, "-m", "ziglang")
     own = ("-s", "-fno-sanitize=all", "-mcpu=baseline")
     commands = [(*zig, "cc", "-target", t, *own, *OPTIONS) for t in TARGETS[target].triples]
@@ -126,13 +127,13 @@ def compiled(source: Path, target: str, work: Path) -> bytes:
         if done.returncode != 0 or not library.is_file():
             said = [line for line in done.stderr.splitlines() if line.strip()]
             why = next((line for line in said if "error" in line.lower()), " ".join(said[:1]))
-            raise CompilerError(f"the C compiler '{command[0]}' fails for {target}: {why or 'no message'}")
+            raise CompilerError(f"compiler '{command[0]}' fails for {target}: {why or 'no message'}")
         made.append(library.read_bytes())
     return made[0] if len(made) == 1 else universal(made)
 
 
-# Mach-O files of several machines in one ("universal"): the magic number of the header, and how many bits
-# of a file's offset are zero at least, as macOS wants it for the pages of 16 KiB of arm64.
+# Mach-O files of several machines in one ("universal"): the magic number of the header, and how many low
+# bits of a file's offset are zero, as macOS wants it for the pages of 16 KiB of arm64.
 FAT_MAGIC = 0xCAFEBABE
 ALIGNMENT = 14
 

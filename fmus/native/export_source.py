@@ -1,4 +1,4 @@
-"""Components as plain C for programs of one's own: ``python -m fmus.build --native NAME --source DIR``."""
+"""Components as plain C for users' programs: ``python -m fmus.build --native NAME --source DIR``."""
 
 from __future__ import annotations
 
@@ -9,37 +9,7 @@ from ..declare import Component
 from .model_source import model_source, sizes
 from .program import Program, program
 
-README = """\
-# Components as plain C
-
-Generated from the declarations of the components; the same source as that of their FMUs, and the same results
-to the bit where compiler options, libm and processor are the same.
-
-Each component is a header and a source of C99. It needs no heap, no globals and nothing but libm; all numbers
-are doubles in arrays that the caller keeps. So it runs on a microcontroller, and as many instances of it as
-there is memory for.
-
-| component | parameters | inputs | outputs | state | prepared |
-|---|--:|--:|--:|--:|--:|
-{table}
-
-- `NAME_starts(params, inputs)` fills in the start values.
-- `NAME_prepare(params, prepared)` computes what follows from the parameters alone: once, and again after every
-  change of one.
-- `NAME_init(params, inputs, state)` gives the state at the start.
-- `NAME_step(params, prepared, inputs, state, h, after, outputs)` gives state and outputs after a step of h
-  seconds. `after` is another array than `state`; with h = 0 the outputs are those of the present state. A
-  component with a `NAME_MAX_STEP` takes no longer ones.
-
-The header has the size of each array and the place of each variable in its own. All but `NAME_starts` return 0,
-or 1 where they would divide by zero: then what they have written does not count, and the state is still that
-from before. Outputs that are not finite are the caller's to notice, as are inputs that are not.
-
-Compile with `-ffp-contract=off -fno-builtin`, without `-ffast-math`; other options may change last digits.
-
-```c
-{example}```
-"""
+README = Path(__file__).with_name("source_readme.md")
 
 EXAMPLE = """\
 #include <stdio.h>
@@ -93,4 +63,6 @@ def _readme(recorded: list[Program]) -> str:
         for each in recorded
     ]
     name = recorded[0].component.name
-    return README.format(table="\n".join(rows), example=EXAMPLE.format(name=name))
+    return README.read_text(encoding="utf-8").format(
+        table="\n".join(rows), example=EXAMPLE.format(name=name)
+    )

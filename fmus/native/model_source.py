@@ -69,14 +69,14 @@ def _header(recorded: Program) -> str:
         "/* Start values of parameters and inputs. */",
         f"{heads['starts']};",
         "",
-        "/* What follows from the parameters alone: after every change of one. Like the functions below it",
-        "   gives 0, or 1 where it divides by zero: what it has written so far does not count then. */",
+        "/* What follows from the parameters alone: after every change of one. Like the functions below",
+        "   it gives 0, or 1 where it divides by zero: what it has written does not count then. */",
         f"{heads['prepare']};",
         "",
         "/* The state at the start; the outputs that belong to it are those of a step with h = 0. */",
         f"{heads['init']};",
         "",
-        "/* State and outputs after a step of h [s]. \"after\" is another array than \"state\". */",
+        '/* State and outputs after a step of h [s]. "after" is another array than "state". */',
         f"{heads['step']};",
         "",
         "#endif",
@@ -105,6 +105,7 @@ def _source(recorded: Program) -> str:
     heads, writer = _heads(c.name), Writer()
     cut = recorded.states
     after, outputs = recorded.step.results[:cut], recorded.step.results[cut:]
+    prepared = recorded.prepare.results
     parameters = width(c.params)
     starts = [number(v.start) for v in c.variables[: parameters + width(c.inputs)]]
     return "\n".join(
@@ -118,7 +119,7 @@ def _source(recorded: Program) -> str:
             *[f"    params[{k}] = {x};" for k, x in enumerate(starts[:parameters])],
             *[f"    inputs[{k}] = {x};" for k, x in enumerate(starts[parameters:])],
             "}\n",
-            writer.function(heads["prepare"], recorded.prepare, [("prepared", recorded.prepare.results)]),
+            writer.function(heads["prepare"], recorded.prepare, [("prepared", prepared)]),
             writer.function(heads["init"], recorded.init, [("state", recorded.init.results)]),
             writer.function(heads["step"], recorded.step, [("after", after), ("outputs", outputs)]),
         ]
@@ -149,4 +150,3 @@ def tables(recorded: Program, guid: str) -> str:
 def fmu_source(recorded: Program, guid: str) -> dict[str, str]:
     """All source of a component's FMU but its face, which is the same for all: file name -> text."""
     return {**model_source(recorded), TABLES: tables(recorded, guid)}
-

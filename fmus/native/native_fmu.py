@@ -25,7 +25,9 @@ ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 FACE_FILE = Path(__file__).with_name(FACE)
 
 
-def native_fmu(component: Component, targets: Sequence[str], work: Path, python: Path | None = None) -> Path:
+def native_fmu(
+    component: Component, targets: Sequence[str], work: Path, python: Path | None = None
+) -> Path:
     """Build one FMU in a scratch folder.
 
     Args:
@@ -75,4 +77,3 @@ def _python_body(python: Path, targets: Sequence[str]) -> dict[str, bytes]:
             for name in archive.namelist()
             if not name.endswith("/") and not name.startswith(native)
         }
-

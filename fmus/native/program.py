@@ -1,4 +1,4 @@
-"""A component's three functions as recordings: the initial state, what follows from parameters, a step."""
+"""A component's functions as recordings: the initial state, what follows from parameters, a step."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _params(tape: Tape, component: Component) -> Any:
 
 
 class _Kept:
-    """The values in what ``prepare`` gives that are computed, each once; in any tuples, lists and dicts."""
+    """The values that ``prepare`` computes, each once; it gives them in any tuples, lists and dicts."""
 
     def __init__(self) -> None:
         self.values: dict[int, Value] = {}

@@ -1,9 +1,9 @@
 """What a pure function does with numbers, recorded in the order in which it does it.
 
 :mod:`fmus.fmi.trace` keeps expressions, which is enough to see what depends on what. Code that behaves
-like the Python function to the bit, its failures included, needs the order of the operations as well, and
-which of them belong to a branch: ``when`` becomes a branch here, and a function marked as ``kernel`` is
-recorded once and called.
+like the Python function to the bit, its failures included, needs the order of the operations as well,
+and which of them belong to a branch: ``when`` becomes a branch here, and a function marked as ``kernel``
+is recorded once and called.
 """
 
 from __future__ import annotations
@@ -50,9 +50,7 @@ class Value(Symbol):
 
 
 class Block(list["Value | Branch | Call"]):
-    """Statements in their order; operations are statements that bear their values."""
-
-    __hash__ = object.__hash__
+    """Statements in their order; an operation is the value that it gives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +116,7 @@ class Tape:
     def __init__(self, kernels: Kernels) -> None:
         self.kernels = kernels
         self.body = self.block = Block()
-        self._open = {self.body}
+        self._open = {id(self.body)}
 
     def variable(self, name: str, condition: bool = False) -> Value:
         """A value from outside."""
@@ -164,13 +162,13 @@ class Tape:
 
     def _inner(self, case: Callable[[], Any]) -> tuple[Block, Any]:
         outer, self.block = self.block, Block()
-        self._open.add(self.block)
+        self._open.add(id(self.block))
         try:
             result = case()
             self._check(leaves(result))
             return self.block, result
         finally:
-            self._open.remove(self.block)
+            self._open.remove(id(self.block))
             self.block = outer
 
     def call(self, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
@@ -194,7 +192,7 @@ class Tape:
     def _check(self, used: Sequence[Any] | Iterator[Any]) -> None:
         """Refuse a value that is not there: of another function, or of a branch that is over."""
         for x in used:
-            if isinstance(x, Symbol) and (not isinstance(x, Value) or x.block not in self._open):
+            if isinstance(x, Symbol) and (not isinstance(x, Value) or id(x.block) not in self._open):
                 raise TraceError("a value is used outside of the branch or the function that it is from")
 
 
@@ -221,7 +219,7 @@ def like(template: Any, items: list[Any]) -> Any:
     """Items as a list or a tuple of the template's class."""
     if isinstance(template, list):
         return items
-    return type(template)._make(items) if hasattr(template, "_make") else tuple(items)  # pyright: ignore
+    return type(template)._make(items) if hasattr(template, "_make") else tuple(items)
 
 
 def refilled(template: Any, values: Iterator[Any]) -> Any:

@@ -24,7 +24,16 @@ class Compiled:
         for name, text in model_source(recorded).items():
             (folder / name).write_text(text)
         library = folder / f"{component.name}.so"
-        command = [COMPILER, optimise, "-w", "-std=c99", "-ffp-contract=off", "-fno-builtin", "-shared", "-fPIC"]
+        command = [
+            COMPILER,
+            optimise,
+            "-w",
+            "-std=c99",
+            "-ffp-contract=off",
+            "-fno-builtin",
+            "-shared",
+            "-fPIC",
+        ]
         subprocess.run([*command, "-o", library, folder / f"{component.name}.c", "-lm"], check=True)
         dll = ctypes.CDLL(str(library))
         names = ("init", "prepare", "step")
