@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.parameters,
                 options.realtime,
                 pictures=not options.no_plots,
-                native=not options.no_native,
+                only_own=options.only_own,
                 show=show,
                 progress=progress,
             )
@@ -131,7 +131,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="examples:  python -m cosim.run scenarios/ellipse.json\n"
         "           python -m cosim.run scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters model.ssv\n"
-        "           python -m cosim.run theirs.json --no-native\n"
+        "           python -m cosim.run theirs.json --only-own\n"
         "           python -m cosim.run system.ssp --stop 100\n"
         "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -154,7 +154,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
-        "--no-native",
+        "--only-own",
         action="store_true",
         help="refuse FMUs with programs that python -m fmus.build has not built on this computer",
     )

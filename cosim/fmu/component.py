@@ -22,7 +22,7 @@ from fmpy.logging import addLoggerProxy
 
 from ..errors import InputError, SimulationError
 from ..process.run_state import STATE
-from .fmu_model import Model
+from .fmu_model import PYTHON_SYMBOL, Model
 from .instance import OnMessage
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -135,7 +135,7 @@ class Component:
 
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others may
         # work in threads of their own and must not find it held.
-        self.is_python = hasattr(self.slave.dll, "finalizePythonInterpreter")
+        self.is_python = hasattr(self.slave.dll, PYTHON_SYMBOL)
         if self.is_python and not (folder / SLAVE_MODULE).is_file():
             raise InputError(f"'{model.path}' is a Python FMU without its {SLAVE_MODULE}")
         # A Python FMU saves its state in many small pieces, and does not report how far it got.
@@ -230,7 +230,7 @@ class Component:
         # The first pythonfmu library in a process cannot be unloaded. Without this call it would
         # finalise when the process exits, after its own memory is gone, and now and then abort the
         # process.
-        finalize = getattr(self.slave.dll, "finalizePythonInterpreter", None)
+        finalize = getattr(self.slave.dll, PYTHON_SYMBOL, None)
         if self.is_python and finalize is not None:
             finalize()
         self.slave.freeLibrary()

@@ -37,7 +37,7 @@ def simulate(
     parameters: Sequence[str | Path] = (),
     realtime: float | None = None,
     pictures: bool = False,
-    native: bool = True,
+    only_own: bool = False,
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Result:
@@ -49,7 +49,7 @@ def simulate(
         parameters: SSP parameter sets whose values override the scenario's.
         realtime: simulated seconds per second of wall time; None runs as fast as it can.
         pictures: whether to draw.
-        native: whether FMUs may hold programs that were not built on this computer.
+        only_own: whether to refuse FMUs with programs that were not built on this computer.
         show: receives warnings and messages, a line each.
         progress: receives the simulated time [s] several times a second.
 
@@ -69,7 +69,7 @@ def simulate(
     owner = Owner()
     sweep()
     try:
-        system = prepare(scenario, overrides, native)
+        system = prepare(scenario, overrides, only_own)
         try:
             result, recorder = _run(system, folder, realtime, show, progress)
         finally:

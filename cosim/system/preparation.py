@@ -18,20 +18,20 @@ from .wiring import connect
 RATIO_TOLERANCE = 1e-6
 
 
-def prepare(scenario: Scenario, overrides: Overrides = (), native: bool = True) -> System:
+def prepare(scenario: Scenario, overrides: Overrides = (), only_own: bool = False) -> System:
     """Read the FMUs of a scenario and check all that can be checked without running.
 
     Args:
         scenario: what to run.
         overrides: parameter sets whose values override the scenario's.
-        native: whether FMUs may run programs that were not built on this computer.
+        only_own: whether to refuse FMUs with programs that were not built on this computer.
 
     Raises:
         InputError: the first error.
     """
     warnings: list[str] = []
     system = System(scenario, read_models(scenario, warnings), warnings=warnings)
-    if not native:
+    if only_own:
         run_builder("--verify", "--", *{str(model.path) for model in system.models.values()})
     check_processes(system)
     check_window(scenario)
