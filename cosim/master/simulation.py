@@ -68,6 +68,7 @@ def simulate(
     folder = Path(os.path.abspath(given))
     owner = Owner()
     sweep()
+    result: Result | None = None
     try:
         system = prepare(scenario, overrides, only_own)
         try:
@@ -77,11 +78,11 @@ def simulate(
             system.close()
             os.chdir(here)
         if recorder is not None:
-            try:
-                finish(system, result, recorder, pictures, show)
-            except KeyboardInterrupt:
-                interrupted_late(result)
-                raise
+            finish(system, result, recorder, pictures, show)
+    except KeyboardInterrupt:
+        if result is not None:
+            interrupted_late(result)
+        raise
     finally:
         STATE.finish()
     result.folder = given
