@@ -165,7 +165,7 @@ class Model:
             OSError,
             KeyError,
             zipfile.BadZipFile,
-        ):  # the file is gone, or the library elsewhere in it
+        ):  # gone, or the library is elsewhere in it
             return False
         return PYTHON_SYMBOL.encode() not in content
 
