@@ -24,6 +24,7 @@ from ..scenario.schema import Scenario
 from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
+from .instance_pool import InstancePool
 from .loop_surroundings import interruptible, quiet_collector
 from .real_time import Pace
 from .recorder import Recorder
@@ -65,6 +66,7 @@ def simulate(
     native: bool = True,
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
+    pool: InstancePool | None = None,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
@@ -77,6 +79,7 @@ def simulate(
         native: whether FMUs may hold programs that were not built on this computer.
         show: receives warnings and messages, a line each.
         progress: receives the simulated time [s] several times a second.
+        pool: FMUs that serve several runs, for a scenario whose paths are all files.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -94,12 +97,14 @@ def simulate(
     owner = Owner()
     sweep()
     try:
-        system = prepare(scenario, overrides, native)
+        models = None if pool is None else pool.models(scenario)
+        system = prepare(scenario, overrides, native, models)
         try:
-            result, recorder = _run(system, folder, realtime, show, progress)
+            result, recorder = _run(system, folder, realtime, show, progress, pool)
         finally:
             owner.leave_copies()
-            system.close()
+            if pool is None:
+                system.close()
             os.chdir(here)
         if recorder is not None:
             _finish(system, result, recorder, pictures, show)
@@ -115,6 +120,7 @@ def _run(
     realtime: float | None,
     show: Callable[[str], None],
     progress: Callable[[float], None],
+    pool: InstancePool | None,
 ) -> tuple[Result, Recorder | None]:
     """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log."""
     scenario, owner = system.scenario, Owner()
@@ -128,7 +134,7 @@ def _run(
     STATE.begin(str(folder), json.dumps(description), system.order)
     with interruptible() as interrupted:
         try:
-            master = Master(system, lambda text: show(f"warning: {text}"), interrupted)
+            master = Master(system, lambda text: show(f"warning: {text}"), interrupted, pool)
         except (SimulationError, InputError) as error:
             if interrupted():  # an FMU may report the interrupt as an error of its own
                 raise KeyboardInterrupt from None

@@ -1,0 +1,228 @@
+"""The runs of a campaign on the workers of a Dask scheduler, on this computer or elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import os
+import statistics
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+from distributed import (
+    Client,
+    Future,
+    KilledWorker,
+    LocalCluster,
+    Worker,
+    WorkerPlugin,
+    as_completed,
+    get_worker,
+)
+
+from ..errors import InputError, SimulationError
+from ..interrupts import UninterruptedProcesses
+from .case_scenarios import Job
+from .single_run import Row, Workplace
+from .travelling_files import Files, put
+
+# Wall time that one task of Dask should last [s], so that what Dask does for it is below one percent of it
+# (a few ms); chosen: little is lost with a worker.
+TASK_TIME = 1.0
+# Runs in one task; chosen: the request stays small.
+MOST_IN_TASK = 64
+# Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
+AHEAD = 2
+# Wall time that a worker waits for a file [s] (it gets all files when it starts), and time between two looks.
+PATIENCE, LOOK = 60.0, 0.05
+# Wall time until a scheduler has to answer [s]; chosen.
+ANSWER = 10.0
+FOLDER = "cybership"  # below a worker's own folder
+
+
+class Request(NamedTuple):
+    """What a task of Dask gets.
+
+    Attributes:
+        contents: scenarios with files named by their contents.
+        files: those names.
+        resettable: SHA-256 of the FMUs that may be reset.
+        keep_log: whether the logs come back.
+        version: of the package, without which equal numbers are not certain.
+    """
+
+    contents: list[dict[str, Any]]
+    files: tuple[str, ...]
+    resettable: frozenset[str]
+    keep_log: bool
+    version: str
+
+
+class OneFile(WorkerPlugin):
+    """A file on every worker, also on those that start later.
+
+    Args:
+        file: its name by content.
+        content: of the file.
+    """
+
+    def __init__(self, file: str, content: bytes) -> None:
+        self.name = f"cybership-{file}"
+        self._file, self._content = file, content
+
+    def setup(self, worker: Worker) -> None:
+        put(_folder(worker), self._file, self._content)
+
+
+def _folder(worker: Worker) -> Path:
+    return Path(worker.local_directory) / FOLDER
+
+
+# The workplace of this process, if it is that of a worker.
+_workplaces: dict[Path, Workplace] = {}
+_making = threading.Lock()
+
+
+def _run(request: Request) -> list[Row]:
+    """A task on a worker."""
+    if request.version != _version():
+        raise InputError(f"a worker has cybership {_version()}, and here it is {request.version}")
+    folder = _folder(get_worker())
+    with _making:
+        work = _workplaces.setdefault(folder, Workplace(folder))
+    work.pool.resettable |= request.resettable
+    until = time.monotonic() + PATIENCE
+    while missing := [name for name in request.files if not (folder / name).is_file()]:
+        if time.monotonic() > until:
+            raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
+        time.sleep(LOOK)
+    return [work.run(content, request.keep_log) for content in request.contents]
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("cybership")
+
+
+class DaskWorkers:
+    """Runs on the workers of a Dask scheduler.
+
+    Args:
+        files: what the runs need; each is sent once to each worker.
+        keep_log: whether the logs come back.
+        address: of a scheduler; None starts one with workers on this computer.
+        workers: how many, without an address; None is one for each core.
+
+    Raises:
+        InputError: no scheduler answers at the address.
+    """
+
+    def __init__(self, files: Files, keep_log: bool, address: str | None, workers: int | None) -> None:
+        self._files, self._keep_log, self._address = files, keep_log, address
+        self._cluster: LocalCluster | None = None
+        self._scratch = TemporaryDirectory(prefix="campaign_")
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            if address is None:
+                # A Ctrl-C is for this process alone; the workers end with it.
+                with UninterruptedProcesses():
+                    self._cluster = LocalCluster(
+                        n_workers=workers or os.cpu_count() or 1,
+                        threads_per_worker=1,  # FMUs of one process cannot run side by side
+                        processes=True,
+                        host="127.0.0.1",
+                        dashboard_address=None,
+                        memory_limit=0,  # what FMUs allocate is not Dask's to manage
+                        local_directory=self._scratch.name,
+                        silence_logs=logging.CRITICAL,
+                    )
+                    self._client = Client(self._cluster)
+            else:
+                self._client = Client(address, timeout=ANSWER, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            self._scratch.cleanup()
+            raise InputError(f"no Dask scheduler answers at '{address}': {error}") from None
+        except BaseException:
+            self._close_cluster()
+            raise
+        self._walls: deque[float] = deque(maxlen=20)
+
+    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+        waiting, again = iter(jobs), deque[Job]()
+        running: dict[str, tuple[Future, list[Job]]] = {}
+        ended = as_completed()
+
+        def fill() -> None:
+            # One that died with others in its task goes alone, to find the one that ends its process.
+            while len(running) < AHEAD * max(1, sum(self._client.nthreads().values())):
+                batch = [again.popleft()] if again else list(islice(waiting, self._in_task()))
+                if not batch:
+                    return
+                future = self._submit(batch)
+                running[future.key] = future, batch
+                ended.add(future)
+
+        try:
+            fill()
+            while running:
+                future = next(ended)
+                _, batch = running.pop(future.key)
+                try:
+                    found = future.result()
+                except KilledWorker as error:
+                    if len(batch) > 1:
+                        again.extend(batch)
+                        found = []
+                    else:
+                        died = 1 + int(error.allowed_failures)
+                        found = [Row("lost", f"its worker died {died} times", 0.0, {}, {})]
+                except InputError:
+                    raise
+                except Exception as error:
+                    raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+                self._walls.extend(row.wall_s for row in found)
+                yield from zip(batch, found, strict=False)
+                fill()
+        finally:
+            self._client.cancel([future for future, _ in running.values()])
+
+    def _in_task(self) -> int:
+        """How many runs make a task of about ``TASK_TIME``."""
+        if not self._walls:
+            return 1
+        return max(1, min(MOST_IN_TASK, int(TASK_TIME / max(statistics.median(self._walls), 1e-3))))
+
+    def _submit(self, batch: list[Job]) -> Future:
+        names = dict.fromkeys(name for job in batch for name in job.files)
+        for name in names:
+            self._send(name)
+        request = Request(
+            [job.content for job in batch],
+            tuple(names),
+            frozenset(self._files.resettable),
+            self._keep_log,
+            _version(),
+        )
+        return self._client.submit(_run, request, pure=False)
+
+    def _send(self, name: str) -> None:
+        """Have a file on all workers, unless the scheduler has sent it before."""
+        if not self._client.get_metadata(["cybership", name], False):
+            content = self._files.paths[name].read_bytes()
+            self._client.register_plugin(OneFile(name, content))
+            self._client.set_metadata(["cybership", name], True)
+
+    def close(self) -> None:
+        self._client.close()
+        self._close_cluster()
+
+    def _close_cluster(self) -> None:
+        if self._cluster is not None:
+            self._cluster.close()
+        self._scratch.cleanup()
