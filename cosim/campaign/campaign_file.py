@@ -29,7 +29,9 @@ class Axis(Strict):
     set: str | Annotated[list[str], Field(min_length=1)] = Field(
         description="path of a value in the scenario, or several that get the same value"
     )
-    values: Annotated[list[Any], Field(min_length=1)] | None = Field(None, description="one after the other")
+    values: Annotated[list[Any], Field(min_length=1)] | None = Field(
+        None, description="one after the other"
+    )
     labels: list[str] | None = Field(None, description="what the table shows in place of the values")
     uniform: Pair | None = Field(None, description="lowest and highest")
     normal: Pair | None = Field(None, description="mean and standard deviation")
@@ -111,7 +113,9 @@ class Campaign(Strict):
                     'give it values, or "design": {"latin": 100}'
                 )
             if axis.cross and not sampled:
-                raise ValueError(f"axes.{name}: cross is for latin and sobol; a grid has all combinations")
+                raise ValueError(
+                    f"axes.{name}: cross is for latin and sobol; a grid has all combinations"
+                )
         lengths = {name: len(axis.values or ()) for name, axis in self.axes.items()}
         if self.design == "list" and len(set(lengths.values())) > 1:
             told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
@@ -131,7 +135,6 @@ class LoadedCampaign:
         campaign: what the file says.
         base: the scenario.
         folder: to which paths in the campaign are relative.
-        name: of the file, without its ending.
 
     Raises:
         InputError: no such file, an unknown key, a value that cannot be, or a path that the scenario
@@ -139,7 +142,6 @@ class LoadedCampaign:
     """
 
     def __init__(self, source: str | Path | dict[str, Any]) -> None:
-        self.name = "campaign" if isinstance(source, dict) else Path(source).stem
         self.folder = Path.cwd() if isinstance(source, dict) else Path(source).resolve().parent
         shown = "campaign" if isinstance(source, dict) else f"'{source}'"
         content = source if isinstance(source, dict) else _read(Path(source))
@@ -178,7 +180,9 @@ def _read(path: Path) -> Any:
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line."""
     first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("literal", "list[")))
+    place = ".".join(
+        str(part) for part in first["loc"] if not str(part).startswith(("literal", "list["))
+    )
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         fields = (Axis if first["loc"][0] == "axes" else Campaign).model_fields

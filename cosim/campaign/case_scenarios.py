@@ -64,7 +64,9 @@ class CaseScenarios:
         try:
             return with_settings(self._loaded.base, settings, self._loaded.folder, told(case))
         except InputError as error:
-            raise InputError(str(error).replace(f"{told(case)}: ", "") + f" (in the run {told(case)})") from None
+            raise InputError(
+                str(error).replace(f"{told(case)}: ", "") + f" (in the run {told(case)})"
+            ) from None
 
     def job(self, case: Case) -> Job:
         """What travels to a worker.

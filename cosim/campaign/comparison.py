@@ -1,4 +1,4 @@
-"""Differences between the values of an axis over the same other values, and when they are known well enough."""
+"""Paired differences between the values of an axis, and when they are known well enough."""
 
 from __future__ import annotations
 
@@ -68,7 +68,9 @@ class StopRule:
     def __init__(self, text: str, cases: Sequence[Case], seed: int) -> None:
         words = text.split()
         if len(words) != 3:
-            raise InputError(f"'{text}' is no rule: it takes the form 'axis metric width', as in 'K e_pos_rms 2%'")
+            raise InputError(
+                f"'{text}' is no rule: it takes the form 'axis metric width', as in 'K e_pos_rms 2%'"
+            )
         self.axis, self.metric, width = words
         axes = list(cases[0].shown)
         if self.axis not in axes:
@@ -99,8 +101,8 @@ class StopRule:
         values = dict.fromkeys(_shown(case.shown[self.axis]) for case in cases)
         if len(values) < 2 or any(len(block) < len(values) for block in blocks.values()):
             raise InputError(
-                f"'{text}': nothing to compare: each value of '{self.axis}' has to meet the same values of "
-                'the other axes, in a grid, or with "cross": true in a sample'
+                f"'{text}': nothing to compare: each value of '{self.axis}' has to meet the same values "
+                'of the other axes, in a grid, or with "cross": true in a sample'
             )
         order = np.random.default_rng(seed).permutation(len(blocks))
         found = [*blocks.values()]
@@ -133,7 +135,9 @@ class StopRule:
         if not self.relative:
             return other - first
         if min(first, other) <= 0.0:
-            raise InputError(f"{self.metric} is not positive, so that a share has no meaning; give a width")
+            raise InputError(
+                f"{self.metric} is not positive, so that a share has no meaning; give a width"
+            )
         return math.log(other / first)
 
     def counted(self, row: Callable[[int], Row | None]) -> set[int] | None:
@@ -143,7 +147,7 @@ class StopRule:
         return {case.number for block in self._blocks[: self._seen] for case in block.values()}
 
     def verdict(self, row: Callable[[int], Row | None]) -> dict[str, Any]:
-        """What is known, for campaign.json: differences from the first value, or ratios to it less one."""
+        """What is known, for campaign.json: differences from the first value, or ratios less one."""
         told: dict[str, Any] = {"known": self.satisfied(row), "pairs": self._seen - self._failed}
         told |= {"axis": self.axis, "metric": self.metric, "against": next(iter(self._blocks[0]))}
         for name, differences in self._differences.items():
@@ -184,7 +188,11 @@ def differences(
         raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
     others = [name for name in axes if name != axis]
     values = list(dict.fromkeys(made[axis]))
-    keyed = made[made["status"] == "done"].set_index(others) if others else made.assign(all=0).set_index("all")
+    keyed = (
+        made[made["status"] == "done"].set_index(others)
+        if others
+        else made.assign(all=0).set_index("all")
+    )
     rows: list[dict[str, Any]] = []
     for value in values[1:]:
         a, b = (keyed[keyed[axis] == v][list(metrics)] for v in (values[0], value))
@@ -205,15 +213,17 @@ def differences(
     return pandas.DataFrame(rows)
 
 
-def pareto(made: pandas.DataFrame, axes: Sequence[str], metrics: Sequence[str], over: Sequence[str]) -> pandas.DataFrame:
+def pareto(
+    made: pandas.DataFrame, axes: Sequence[str], metrics: Sequence[str], over: Sequence[str]
+) -> pandas.DataFrame:
     """The choices that no other one beats in all metrics; smaller is better.
 
     Args:
         made: the table of the campaign.
         axes: all axes.
         metrics: columns.
-        over: axes over which metrics are averaged first, as over seeds; a choice of which a run failed is
-            left out.
+        over: axes over which metrics are averaged first, as over seeds; a choice of which a run failed
+            is left out.
 
     Returns:
         One row for each such choice: its axes, the means of the metrics, ``runs``.
@@ -228,7 +238,9 @@ def pareto(made: pandas.DataFrame, axes: Sequence[str], metrics: Sequence[str], 
     groups = made.assign(_ok=made["status"] == "done").groupby(by, sort=False) if by else None
     if groups is None:
         raise InputError("there is one choice only: all axes are averaged over")
-    means = groups[list(metrics)].mean(numeric_only=True).assign(runs=groups.size(), ok=groups["_ok"].all())
+    means = (
+        groups[list(metrics)].mean(numeric_only=True).assign(runs=groups.size(), ok=groups["_ok"].all())
+    )
     means = means[means["ok"]].drop(columns="ok").dropna().reset_index()
     points = means[list(metrics)].to_numpy()
     kept = [not ((points <= p).all(axis=1) & (points < p).any(axis=1)).any() for p in points]

@@ -77,7 +77,7 @@ def run_campaign(
     if missing:
         raise InputError(f"a campaign needs {', '.join(missing)}: pip install 'cybership[campaign]'")
     loaded = LoadedCampaign(campaign)
-    folder = Path(os.path.abspath(out or Path("results") / loaded.name))
+    folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
         raise InputError(f"'{campaign}' would be overwritten by the results; give another --out")
     sweep()
@@ -100,6 +100,12 @@ def run_campaign(
             return work.run(partial(_place, files, keep_logs, scheduler, workers), told, progress)
     finally:
         files.close()
+
+
+def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None) -> Path:
+    """Where the results go if ``out`` does not say: ``results/<name of the file>``."""
+    name = "campaign" if isinstance(campaign, dict) else Path(campaign).stem.removesuffix(".campaign")
+    return Path(out) if out is not None else Path("results") / name
 
 
 def _place(files: Files, keep_logs: bool, scheduler: str | None, workers: int | None) -> Place:
@@ -127,7 +133,9 @@ class _Work:
     keep_logs: bool
     known: dict[int, tuple[Case, str]] = field(default_factory=dict)
 
-    def run(self, place: Callable[[], Place], told: dict[str, Any], progress: Progress) -> pandas.DataFrame:
+    def run(
+        self, place: Callable[[], Place], told: dict[str, Any], progress: Progress
+    ) -> pandas.DataFrame:
         """Make the runs that are missing, and write the table however that ends."""
         started, status = time.time(), "failed"
         jobs = self._missing()

@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import InputError
 from .campaign_file import MOST_RUNS, Axis, Campaign, Latin
 
-# Drawn shares stay this far from 0 and 1, where a normal distribution has no finite value; the spacing of
-# doubles below 1.
+# Drawn shares stay this far from 0 and 1, where a normal distribution has no finite value; the spacing
+# of doubles below 1.
 EDGE = 2.0**-53
 
 
@@ -42,7 +42,9 @@ def cases(campaign: Campaign) -> list[Case]:
         chosen = (dict(zip(axes, row, strict=True)) for row in product(*map(_choices, axes.values())))
     elif campaign.design == "list":
         count = len(next(iter(axes.values())).values or ())
-        chosen = (dict(zip(axes, row, strict=True)) for row in zip(*map(_choices, axes.values()), strict=True))
+        chosen = (
+            dict(zip(axes, row, strict=True)) for row in zip(*map(_choices, axes.values()), strict=True)
+        )
     else:
         crossed = {name: axis for name, axis in axes.items() if axis.cross}
         size = campaign.design.latin if isinstance(campaign.design, Latin) else campaign.design.sobol
@@ -51,7 +53,8 @@ def cases(campaign: Campaign) -> list[Case]:
     if count > MOST_RUNS:
         raise InputError(f"{count} runs are more than {MOST_RUNS}")
     return [
-        Case(k, {n: row[n][0] for n in axes}, {n: row[n][1] for n in axes}) for k, row in enumerate(chosen)
+        Case(k, {n: row[n][0] for n in axes}, {n: row[n][1] for n in axes})
+        for k, row in enumerate(chosen)
     ]
 
 
@@ -61,9 +64,7 @@ def _choices(axis: Axis) -> list[tuple[Any, Any]]:
     return list(zip(values, axis.labels or values, strict=True))
 
 
-def _crossed(
-    samples: Iterator[dict[str, Any]], crossed: Mapping[str, Axis]
-) -> Iterator[dict[str, Any]]:
+def _crossed(samples: Iterator[dict[str, Any]], crossed: Mapping[str, Axis]) -> Iterator[dict[str, Any]]:
     for sample in samples:
         for row in product(*map(_choices, crossed.values())):
             yield sample | dict(zip(crossed, row, strict=True))

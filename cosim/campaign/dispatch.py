@@ -31,14 +31,14 @@ from .case_scenarios import Job
 from .single_run import Row, Workplace
 from .travelling_files import Files, put
 
-# Wall time that one task of Dask should last [s], so that what Dask does for it is below one percent of it
-# (a few ms); chosen: little is lost with a worker.
+# Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
+# percent of it; chosen: little is lost with a worker.
 TASK_TIME = 1.0
 # Runs in one task; chosen: the request stays small.
 MOST_IN_TASK = 64
 # Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
 AHEAD = 2
-# Wall time that a worker waits for a file [s] (it gets all files when it starts), and time between two looks.
+# Wall time that a worker waits for a file [s], of which it gets all when it starts; between two looks.
 PATIENCE, LOOK = 60.0, 0.05
 # Wall time until a scheduler has to answer [s]; chosen.
 ANSWER = 10.0
@@ -185,7 +185,9 @@ class DaskWorkers:
                 except InputError:
                     raise
                 except Exception as error:
-                    raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+                    raise SimulationError(
+                        f"the workers were lost: {error!r}; finished runs are kept"
+                    ) from error
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()

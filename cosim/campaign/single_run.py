@@ -1,4 +1,4 @@
-"""Runs of a campaign in one process: in memory, or with a log, on FMUs that stay loaded for the next one."""
+"""Runs of a campaign in one process: in memory, or with a log, on FMUs that stay loaded."""
 
 import os
 import threading
@@ -21,7 +21,6 @@ from ..scenario.schema import Scenario
 from ..system.preparation import prepare
 from .case_scenarios import Job
 from .travelling_files import Files, copy_all
-
 
 
 class Row(NamedTuple):

@@ -1,8 +1,8 @@
 """FMUs that serve several runs, so that each is read, unpacked and loaded once in a process.
 
 Between two runs an instance is reset. FMI promises that fmi2Reset leaves it as instantiation does, but
-nothing can prove that of an unknown FMU, which may keep numbers in global variables. So only FMUs that are
-known to hold nothing outside of what a reset makes anew are kept; any other one is freed and
+nothing can prove that of an unknown FMU, which may keep numbers in global variables. So only FMUs that
+are known to hold nothing outside of what a reset makes anew are kept; any other one is freed and
 instantiated again, library included, as in a process that runs one scenario after the other.
 """
 
@@ -17,8 +17,8 @@ from ..fmu.isolated import TIMEOUT, IsolatedInstance
 from ..fmu.local import LocalInstance
 from ..scenario.schema import FmuEntry, Scenario
 
-# Instances that wait for another run; chosen: beyond what a comparison of controllers needs. The one that
-# has waited longest is freed.
+# Instances that wait for another run; chosen: beyond what a comparison of controllers needs. The one
+# that has waited longest is freed.
 MOST_KEPT = 64
 
 
