@@ -9,6 +9,7 @@ if __name__ == "__main__":
 
 import argparse
 import os
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 # Metrics of tables and pictures where the user names none: an error, its heading, and what it costs.
 USUAL = ("e_pos_rms", "cross_track_rms", "heading_rms", "W", "I_tau_dot")
+
+# Messages of failed runs that are shown; chosen: the table has all.
+MESSAGES = 3
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,8 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 lambda text: None if options.quiet else console.print(printable(text), markup=False),
                 _on(bar) if visible else lambda ended, failed, of: None,
             )
-        failed = made[made["status"] == "failed"]
-        for message, count in failed["message"].value_counts().head(3).items():
+        failed = made.query("status == 'failed'")
+        for message, count in Counter(failed["message"]).most_common(MESSAGES):
             complain(message, kind=f"{count} of {len(made)} runs failed: ")
         if not options.quiet:
             Output(highlight=False).print(printable(f"{len(made)} runs in {out}"), soft_wrap=True)
@@ -106,11 +110,11 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
         _write(found, out / "differences.csv")
         rows = [
             [
-                *(row.value, row.against, row.metric, str(row.pairs)),
-                f"{row.difference:.3g} ± {row.half:.2g}",
-                f"{row.percent:+.2g} ({row.percent_low:+.2g} to {row.percent_high:+.2g})",
+                *(str(row[key]) for key in ("value", "against", "metric", "pairs")),
+                f"{row['difference']:.3g} ± {row['half']:.2g}",
+                "{percent:+.2f} ({percent_low:+.2f} to {percent_high:+.2f})".format(**row),
             ]
-            for row in found.itertuples()
+            for row in found.to_dict("records")
         ]
         header = [options.compare, "against", "metric", "pairs", "difference", "percent"]
         _print("paired differences with 95 % intervals", header, rows)
@@ -154,7 +158,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m cosim.campaign",
         description="Run a scenario many times, and write one table: runs.parquet.",
         epilog="examples:  python -m cosim.campaign scenarios/campaigns/gains.campaign.json\n"
-        "           python -m cosim.campaign scenarios/campaigns/gains.campaign.json --compare controller --plot\n"
+        "           python -m cosim.campaign gains.campaign.json --compare controller --plot\n"
         "           python -m cosim.campaign campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
         "           python -m cosim.campaign campaign.json --scheduler tcp://10.0.0.1:8786\n"
         "exit codes: 0 done, 2 bad input, 3 every run failed or the workers were lost, 130 interrupted\n"

@@ -53,8 +53,8 @@ def draw_campaign(
     for metric in metrics:
         if metric not in made.columns:
             raise InputError(f"no metric '{metric}' in the table")
-    done = made[made["status"] == "done"]
-    choices = [name for name in axes if name not in over and done[name].nunique() > 1]
+    done = made.query("status == 'done'")
+    choices = [name for name in axes if name not in over and len(set(done[name])) > 1]
     figures: dict[str, Figure] = {}
     if choices:
         figures["metrics"] = _against_axes(done, choices, metrics)
@@ -129,7 +129,7 @@ def _differences(found: pandas.DataFrame, axis: str, metrics: Sequence[str]) -> 
     """Mean paired differences with their intervals, a panel for each metric."""
     figure, panels = _panels(1, len(metrics))
     for panel, metric in zip(panels[0], metrics, strict=True):
-        part = found[found["metric"] == metric]
+        part = found.query("metric == @metric")
         places = np.arange(len(part))
         panel.errorbar(part["difference"], places, xerr=part["half"], fmt="o", capsize=3)
         panel.axvline(0.0, color="k", lw=0.8)

@@ -187,22 +187,20 @@ def differences(
     if axis not in axes:
         raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
     others = [name for name in axes if name != axis]
-    values = list(dict.fromkeys(made[axis]))
-    keyed = (
-        made[made["status"] == "done"].set_index(others)
-        if others
-        else made.assign(all=0).set_index("all")
-    )
+    done = made.query("status == 'done'")
+    parts = {value: done.loc[done[axis] == value] for value in dict.fromkeys(made[axis])}
+    against, first_part = next(iter(parts.items()))
     rows: list[dict[str, Any]] = []
-    for value in values[1:]:
-        a, b = (keyed[keyed[axis] == v][list(metrics)] for v in (values[0], value))
+    for value, part in list(parts.items())[1:]:
+        how: dict[str, Any] = {"on": others} if others else {"how": "cross"}
+        both = first_part.merge(part, suffixes=("_a", "_b"), **how)
         for metric in metrics:
-            both = a[[metric]].join(b[[metric]], lsuffix="_a", rsuffix="_b", how="inner").dropna()
-            first, second = both.iloc[:, 0].to_numpy(), both.iloc[:, 1].to_numpy()
+            pair = both.loc[:, [f"{metric}_a", f"{metric}_b"]].to_numpy(float)
+            first, second = pair[np.isfinite(pair).all(axis=1)].T
             mean, half = interval((second - first).tolist())
-            row = {"value": _shown(value), "against": _shown(values[0]), "metric": metric}
-            row |= {"pairs": len(both), "difference": mean, "half": half}
-            if len(both) and min(first.min(), second.min()) > 0.0:
+            row = {"value": _shown(value), "against": _shown(against), "metric": metric}
+            row |= {"pairs": len(first), "difference": mean, "half": half}
+            if len(first) and min(first.min(), second.min()) > 0.0:
                 log = interval(np.log(second / first).tolist())
                 ends = (log.mean, log.mean - log.half, log.mean + log.half)
                 names = ("percent", "percent_low", "percent_high")
@@ -235,15 +233,14 @@ def pareto(
         if metric not in made.columns:
             raise InputError(f"no metric '{metric}'{nearest(metric, [m.name for m in METRICS])}")
     by = [name for name in axes if name not in over]
-    groups = made.assign(_ok=made["status"] == "done").groupby(by, sort=False) if by else None
-    if groups is None:
+    if not by:
         raise InputError("there is one choice only: all axes are averaged over")
-    means = (
-        groups[list(metrics)].mean(numeric_only=True).assign(runs=groups.size(), ok=groups["_ok"].all())
-    )
-    means = means[means["ok"]].drop(columns="ok").dropna().reset_index()
-    points = means[list(metrics)].to_numpy()
+    groups = made.assign(done=made["status"] == "done").groupby(by, sort=False)
+    means = groups.agg(dict.fromkeys(metrics, "mean") | {"done": "all", "hash": "size"})
+    means = means.rename(columns={"hash": "runs"}).reset_index().query("done").dropna()
+    points = means.loc[:, list(metrics)].to_numpy(float)
     kept = [not ((points <= p).all(axis=1) & (points < p).any(axis=1)).any() for p in points]
     if not any(kept):
         raise InputError("no choice is left: of each a run failed")
-    return means[kept].sort_values(metrics[0]).reset_index(drop=True)
+    best = means.iloc[np.flatnonzero(kept)].drop(columns="done")
+    return best.sort_values(by=metrics[0]).reset_index(drop=True)

@@ -8,7 +8,7 @@ import statistics
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -137,7 +137,7 @@ class DaskWorkers:
                         threads_per_worker=1,  # FMUs of one process cannot run side by side
                         processes=True,
                         host="127.0.0.1",
-                        dashboard_address=None,
+                        dashboard_address=None,  # pyright: ignore[reportArgumentType]
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
                         local_directory=self._scratch.name,
                         silence_logs=logging.CRITICAL,
@@ -153,14 +153,14 @@ class DaskWorkers:
             raise
         self._walls: deque[float] = deque(maxlen=20)
 
-    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         waiting, again = iter(jobs), deque[Job]()
-        running: dict[str, tuple[Future, list[Job]]] = {}
+        running: dict[Any, tuple[Future, list[Job]]] = {}
         ended = as_completed()
 
         def fill() -> None:
             # One that died with others in its task goes alone, to find the one that ends its process.
-            while len(running) < AHEAD * max(1, sum(self._client.nthreads().values())):
+            while len(running) < AHEAD * max(1, self._threads()):
                 batch = [again.popleft()] if again else list(islice(waiting, self._in_task()))
                 if not batch:
                     return
@@ -193,6 +193,11 @@ class DaskWorkers:
                 fill()
         finally:
             self._client.cancel([future for future, _ in running.values()])
+
+    def _threads(self) -> int:
+        """Threads of all workers."""
+        threads: Any = self._client.nthreads()
+        return sum(threads.values())
 
     def _in_task(self) -> int:
         """How many runs make a task of about ``TASK_TIME``."""

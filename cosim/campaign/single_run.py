@@ -3,7 +3,7 @@
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, Protocol
@@ -135,7 +135,7 @@ def _leave_if(interrupted: Callable[[], bool]) -> None:
 class Place(Protocol):
     """Where runs are made."""
 
-    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         """Make runs; gives each as it ends, in any order. Closing the iterator abandons the others."""
         ...
 
@@ -152,7 +152,7 @@ class ThisProcess:
         self._scratch = TemporaryDirectory(prefix="campaign_")
         self._work = Workplace(Path(self._scratch.name))
 
-    def rows(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Row]]:
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         for job in jobs:
             copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
             self._work.pool.resettable |= self._files.resettable
