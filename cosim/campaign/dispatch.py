@@ -142,7 +142,7 @@ class DaskWorkers:
                         local_directory=self._scratch.name,
                         silence_logs=logging.CRITICAL,
                     )
-                    self._client = Client(self._cluster)
+                    self._client = Client(self._cluster, set_as_default=False)
             else:
                 self._client = Client(address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
@@ -156,7 +156,7 @@ class DaskWorkers:
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         waiting, again = iter(jobs), deque[Job]()
         running: dict[Any, tuple[Future, list[Job]]] = {}
-        ended = as_completed()
+        ended = as_completed(loop=self._client.loop)
 
         def fill() -> None:
             # One that died with others in its task goes alone, to find the one that ends its process.
