@@ -44,9 +44,9 @@ def campaign(content: dict[str, Any], workers: int) -> tuple[float, Any]:
 def bare(content: dict[str, Any]) -> float:
     """Wall time [s] of the same runs without campaign: prepare, step, compute the metrics."""
     import cosim
-    from cosim.master import InstancePool, Master
+    from cosim.master import Master
     from cosim.results import compute
-    from cosim.system import prepare
+    from cosim.system import InstancePool, prepare
 
     scenario = json.loads(Path(content["scenario"]).read_text())
     scenario["stop"] = content["axes"]["stop"]["values"][0]

@@ -9,6 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -220,10 +221,13 @@ class DaskWorkers:
 
     def _send(self, name: str) -> None:
         """Have a file on all workers, unless the scheduler has sent it before."""
-        if not self._client.get_metadata(["cybership", name], False):
-            content = self._files.paths[name].read_bytes()
-            self._client.register_plugin(OneFile(name, content))
-            self._client.set_metadata(["cybership", name], True)
+        if self._client.get_metadata(["cybership", name], False):
+            return
+        file = OneFile(name, self._files.paths[name].read_bytes())
+        # A worker that dies meanwhile is no reason to end: the scheduler keeps what later ones get.
+        with suppress(OSError):
+            self._client.register_plugin(file)
+        self._client.set_metadata(["cybership", name], True)
 
     def close(self) -> None:
         self._client.close()

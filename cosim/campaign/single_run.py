@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, SimulationError
 from ..master.algorithm import Master
-from ..master.instance_pool import InstancePool
 from ..master.loop_surroundings import interruptible, quiet_collector
 from ..master.recorder import Recorder
 from ..master.simulation import simulate
@@ -18,6 +17,7 @@ from ..process.run_state import STATE
 from ..results import performance
 from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
+from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
 from .case_scenarios import Job
 from .travelling_files import Files, copy_all

@@ -13,8 +13,8 @@ from ..fmu.instance import Instance
 from ..process.run_state import INSTANCE, STATE, Owner
 from ..scenario.faults import TIME_TOLERANCE
 from ..scenario.schema import Event
+from ..system.instance_pool import InstancePool
 from ..system.system import System
-from .instance_pool import InstancePool
 from .messages import Messages
 from .stepper import Stepper
 from .value_table import ValueTable
