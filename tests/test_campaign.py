@@ -317,3 +317,20 @@ def test_processes_of_this_computer_give_the_same(base):
     spread = cosim.run_campaign(path, base / "spread", workers=2)
     here = cosim.run_campaign(path, base / "here", workers=0)
     assert without_time(spread).equals(without_time(here))
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_its_process_is_a_failed_row_and_no_other(base, chain, plain_fmu):
+    init = (
+        "self.y = 0.0\nself.k = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))\n"
+        "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
+        " variability=Fmi2Variability.tunable))"
+    )
+    step = "self.y += h\nif self.k > 2.5: os._exit(0)\nreturn True"
+    chain["fmus"]["ramp"]["path"] = str(plain_fmu("Dies", init, step))
+    (base / "base.json").write_text(json.dumps(chain))
+    path = campaign(base, {"k": {"set": "ramp.k", "values": [3.0, 1.0, 2.0, 1.5, 1.6, 1.7]}})
+    made = cosim.run_campaign(path, base / "out", workers=1)
+    assert list(made["status"]) == ["failed", *["done"] * 5]
+    assert made["message"][0].startswith("it ended every process")
+    assert len((base / "out" / JOURNAL).read_bytes().splitlines()) == 5  # it is tried again

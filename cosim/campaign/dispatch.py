@@ -43,6 +43,8 @@ AHEAD = 2
 PATIENCE, LOOK = 60.0, 0.05
 # Wall time until a scheduler has to answer [s]; chosen.
 ANSWER = 10.0
+# How often the workers of a task may die here before it is suspected; chosen: once by chance.
+DEATHS = 1
 FOLDER = "cybership"  # below a worker's own folder
 
 
@@ -111,6 +113,23 @@ def _version() -> str:
     return version("cybership")
 
 
+def _rows_of(future: Future) -> list[Row] | None:
+    """What a task has made; None if its workers died.
+
+    Raises:
+        InputError: it cannot be run.
+        SimulationError: what ran it is gone.
+    """
+    try:
+        return future.result()
+    except KilledWorker:
+        return None
+    except InputError:
+        raise
+    except Exception as error:
+        raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+
+
 class DaskWorkers:
     """Runs on the workers of a Dask scheduler.
 
@@ -142,58 +161,57 @@ class DaskWorkers:
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
                         local_directory=self._scratch.name,
                         silence_logs=logging.CRITICAL,
+                        scheduler_kwargs={"allowed_failures": DEATHS},
                     )
                     self._client = Client(self._cluster, set_as_default=False)
             else:
                 self._client = Client(address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             self._scratch.cleanup()
-            raise InputError(f"no Dask scheduler answers at '{address}': {error}") from None
+            where = "with processes on this computer" if address is None else f"at '{address}'"
+            raise InputError(f"no Dask scheduler answers {where}: {error}") from None
         except BaseException:
             self._close_cluster()
             raise
         self._walls: deque[float] = deque(maxlen=20)
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
-        waiting, again = iter(jobs), deque[Job]()
-        running: dict[Any, tuple[Future, list[Job]]] = {}
+        waiting = iter(jobs)
+        # Dask counts a worker's death against every task that it had. Those that it gives up go again at
+        # the end, each alone, to find the one that ends its process.
+        suspects: deque[Job] = deque()
+        running: dict[Any, tuple[Future, list[Job], bool]] = {}
         ended = as_completed(loop=self._client.loop)
 
+        def start(batch: list[Job], alone: bool) -> None:
+            future = self._submit(batch)
+            running[future.key] = future, batch, alone
+            ended.add(future)
+
         def fill() -> None:
-            # One that died with others in its task goes alone, to find the one that ends its process.
             while len(running) < AHEAD * max(1, self._threads()):
-                batch = [again.popleft()] if again else list(islice(waiting, self._in_task()))
-                if not batch:
-                    return
-                future = self._submit(batch)
-                running[future.key] = future, batch
-                ended.add(future)
+                if not (batch := list(islice(waiting, self._in_task()))):
+                    break
+                start(batch, False)
+            if suspects and not running:
+                start([suspects.popleft()], True)
 
         try:
             fill()
             while running:
                 future = next(ended)
-                _, batch = running.pop(future.key)
-                try:
-                    found = future.result()
-                except KilledWorker as error:
-                    if len(batch) > 1:
-                        again.extend(batch)
-                        found = []
-                    else:
-                        died = 1 + int(error.allowed_failures)
-                        found = [Row("lost", f"its worker died {died} times", 0.0, {}, {})]
-                except InputError:
-                    raise
-                except Exception as error:
-                    raise SimulationError(
-                        f"the workers were lost: {error!r}; finished runs are kept"
-                    ) from error
+                _, batch, alone = running.pop(future.key)
+                found = _rows_of(future)
+                if found is None and not alone:
+                    suspects.extend(batch)
+                    found = []
+                elif found is None:
+                    found = [Row("lost", "it ended every process that ran it", 0.0, {}, {})]
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()
         finally:
-            self._client.cancel([future for future, _ in running.values()])
+            self._client.cancel([future for future, *_ in running.values()])
 
     def _threads(self) -> int:
         """Threads of all workers."""
