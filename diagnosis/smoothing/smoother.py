@@ -17,7 +17,9 @@ from fmus.frames import rotate_to_body
 
 from ..data import Counts, Track
 from ..data.cleaning import noise
-from .command_response import CommandResponse, Commands, with_commands
+from .command_motion import CommandResponse, Commands
+from .command_response import with_commands
+from .delay import NOTICED
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
 from .spline import Knots, basis, inverse_band, knots, roughness, variance
@@ -26,7 +28,6 @@ from .spline import Knots, basis, inverse_band, knots, roughness, variance
 BREAK = 3.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
-NOTICED = 0.1  # s; a shorter delay is not reported (chosen)
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
