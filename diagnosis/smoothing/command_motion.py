@@ -15,6 +15,8 @@ from scipy.signal import lfilter
 from ..data import Track
 from .spline import Knots
 
+# m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
+IDLE = (0.02, 0.02, 0.05)
 FORGETTING = (
     30.0  # s, T; a slower motion by the commands is no different from any smooth motion (chosen)
 )
@@ -26,12 +28,14 @@ class CommandResponse(NamedTuple):
     Attributes:
         eta, eta_dot, eta_ddot: (n, 3), pose and derivatives [m, m, rad; /s; /s2].
         delay: from a command to its effect [s]; NaN where the commands explain nothing.
+        sure: whether the whole run agrees that there is a delay.
     """
 
     eta: np.ndarray
     eta_dot: np.ndarray
     eta_ddot: np.ndarray
     delay: float = np.nan
+    sure: bool = False
 
     @classmethod
     def none(cls, n: int) -> "CommandResponse":
@@ -48,11 +52,13 @@ class Commands:
         track: the run.
         psi: (n,), its heading [rad], NaN where it is not known.
         grid: knots of the stretches, independent of each other, times counted from the first sample.
+        at_rest: whether the ship hardly moves at first: then nothing was commanded before the run.
     """
 
     track: Track
     psi: np.ndarray
     grid: Knots
+    at_rest: bool = False
 
     @cached_property
     def parts(self) -> list[np.ndarray]:
@@ -99,8 +105,10 @@ class Commands:
         return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
     def _impulse(self, time: np.ndarray) -> np.ndarray:
-        """Integral (m, 3) of the commands until times (m,) [s]; the first one held before, too."""
+        """Integral (m, 3) of the commands until times (m,) [s]."""
         run = self.track.run
+        if self.at_rest:
+            time = np.maximum(time, run.time[0])
         row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
         return self._impulses[row] + run.tau_cmd[row] * (time - run.time[row])[:, None]
 

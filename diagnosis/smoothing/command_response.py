@@ -18,7 +18,7 @@ No model of a ship enters.
 import numpy as np
 
 from .command_motion import CommandResponse, Commands
-from .delay import Regression, evident_delay
+from .delay import Regression, likeliest_delay
 from .likelihood import adapt, likeliest
 from .penalised import Fit, Problem, solve
 
@@ -45,11 +45,11 @@ def with_commands(
     """
     response = CommandResponse.none(commands.psi.size)
     least = likeliest(even, weights, smoothness)[1] - PARAMETERS
-    delay = evident_delay(Regression(even, fit, commands))
+    delay, sure = likeliest_delay(Regression(even, fit, commands))
     rest, smoother, near = even, smoothness, None
     for _ in range(ROUNDS):
         gains = Regression(even, fit, commands).gains(delay)
-        tried = commands.response(gains, delay)
+        tried = commands.response(gains, delay)._replace(sure=sure)
         left = even._replace(z=even.z - tried.eta[even.rows])
         near, cost = likeliest(left, weights, near)
         if cost >= least:

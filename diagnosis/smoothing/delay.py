@@ -6,8 +6,8 @@ makes up for what is missing. Therefore each delay is compared with none *beside
 damping would make of commands that act at once: motions by the commands behind lags of LAGS seconds. A
 slow command cannot tell those from a delay, a jump can.
 
-The likelihood ratio of two delays is a sum over blocks of time. A delay counts if that sum is above zero
-by Student's test over the blocks, which needs no assumption on how residuals are correlated within one.
+The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
+Student's test over the blocks, which needs no assumption on how residuals are correlated within one.
 """
 
 from functools import cache
@@ -56,7 +56,7 @@ class Regression:
         return np.vstack([flat.reshape(2, 3), turn])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r(A) for unit gains of commands tau (m, 3): of the plane, both channels below each other, and yaw."""
+        """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
         commands, rows = self.commands, self.problem.rows
         ahead = commands.sampled(commands.motion(commands.rotation[:, None] * tau)[0], rows)
         yaw = commands.sampled(commands.motion(tau)[0], rows)
@@ -77,10 +77,8 @@ class Regression:
     def block(self) -> np.ndarray:
         """Number of the block of BLOCK seconds of each row of r(x)."""
         grid, run = self.problem.grid, self.commands.track.run
-        middle = [
-            a + (np.arange(n) + 0.5) * grid.spacing
-            for a, n in zip(grid.start, grid.intervals, strict=True)
-        ]
+        stretches = zip(grid.start, grid.intervals, strict=True)
+        middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
         time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
         return np.unique(np.floor(np.concatenate(time) / BLOCK), return_inverse=True)[1]
 
@@ -129,10 +127,12 @@ def orthonormal(a: np.ndarray) -> np.ndarray:
     return scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
 
 
-def evident_delay(regression: Regression) -> float:
-    """From a command to its effect [s], zero where the pose does not prove any.
+def likeliest_delay(regression: Regression) -> tuple[float, bool]:
+    """From a command to its effect [s], and whether the blocks of the run agree that there is a delay.
 
-    The search is over whole sampling periods: coarse at first, then downhill with halved steps.
+    The search is over whole sampling periods: coarse at first, then downhill with halved steps. A delay
+    that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
+    logarithm of their number) is zero.
     """
     period, lateness = regression.commands.track.period, Lateness(regression)
 
@@ -151,8 +151,11 @@ def evident_delay(regression: Regression) -> float:
         near = {max(best - int(step), 0), best + int(step)}
         tried |= near
         best = min((best, *sorted(near)), key=left)
-    prompt = min((k for k in tried if k * period < NOTICED and k != best), key=left, default=0)
-    return best * period if surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried)) else 0.0
+    if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
+        return 0.0, False
+    prompt = min((k for k in tried if k * period < NOTICED), key=left)
+    sure = best != prompt and surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried))
+    return best * period, sure
 
 
 def surely_positive(values: np.ndarray, chance: float) -> bool:
