@@ -34,8 +34,7 @@ from ..model import Integrals, Model, omega
 # Of c: a mass or a thruster that is wrong by ten is still a matter of the diagnosis. Derived: half of
 # the way, in logarithms, to the nearest wrong unit, centimetres.
 LEAST, MOST = 0.1, 10.0
-# Chosen: with a right file no reading came above 1.01 (tests/test_diagnosis_plausibility.py, the real
-# ship, KVLCC2), with a wrong one none below 20.
+# Chosen: with a right file, whatever the effect in it, another reading explains as much at the most.
 FACTOR = 4.0
 # Of U: by so much an axis may be worse in the right reading. Chosen; noise alone changes less.
 WORSE = 0.05

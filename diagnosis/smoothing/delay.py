@@ -29,7 +29,9 @@ RANK = 1e-9  # of the largest singular value; below, commands do not differ and 
 # s, lags of motions that are no delay's. Chosen: a ship's own time constants, by factors of four; no
 # shorter one, as a thruster's lag of half a second is a delay for what follows.
 LAGS = (1.0, 4.0, 16.0)
-BLOCK = 5.0  # s; chosen: residuals of a spline are correlated over less than its time constant, a second
+LATENESS_BLOCK = (
+    5.0  # s; chosen: residuals of a spline are correlated over less than its time constant, a second
+)
 CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
 
 
@@ -75,12 +77,12 @@ class Regression:
 
     @property
     def block(self) -> np.ndarray:
-        """Number of the block of BLOCK seconds of each row of r(x)."""
+        """Number of the block of LATENESS_BLOCK seconds of each row of r(x)."""
         grid, run = self.problem.grid, self.commands.track.run
         stretches = zip(grid.start, grid.intervals, strict=True)
         middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
         time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
-        return np.unique(np.floor(np.concatenate(time) / BLOCK), return_inverse=True)[1]
+        return np.unique(np.floor(np.concatenate(time) / LATENESS_BLOCK), return_inverse=True)[1]
 
 
 def size_of(a: np.ndarray) -> np.ndarray:
