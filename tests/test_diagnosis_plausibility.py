@@ -11,7 +11,7 @@ from support.cases import in_part
 from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
-from diagnosis import InputError, Model, compare, integrals, read
+from diagnosis import InputError, Model, Run, compare, integrals, read
 from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -153,3 +153,15 @@ def test_real_run_is_no_mistake(name):
     run = read(DATA / "cse1" / f"{name}.mat")
     assert same_columns(run) is None
     assert likeliest_mistake(integrals(smoothed(run)), Model()) is None
+
+
+@pytest.mark.slow
+@needs_data
+def test_tanker_with_a_rudder_is_no_mistake():
+    """KVLCC2, its rudder read as a command of yaw, with the model of quite another ship."""
+    data = pd.read_csv(DATA / "kvlcc2_hsva" / "z_05_01.csv")
+    pose = np.column_stack([data.x, data.y, np.radians(data.psi_deg)])
+    for sign in (1.0, -1.0):
+        rudder = np.column_stack([0.0 * data.t, 0.0 * data.t, sign * data.rudder_deg])
+        w = integrals(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
+        assert likeliest_mistake(w, Model()) is None

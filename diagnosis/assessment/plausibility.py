@@ -12,8 +12,9 @@ thrusters or surroundings that differ from the model raise U in every reading, a
 nothing arrives has c = 0 in each; only a mistake lets *another* reading explain the commands.
 
 The likeliest mistake is told if it lowers the product of the three U by FACTOR, and by more than chance
-in so many windows (likelihood ratio), makes no axis worse, and an offset of the heading does not do as
-well. Of runs whose commands hardly show in the motion nothing can be told.
+in so many windows (likelihood ratio), makes no axis worse and leaves none mostly unexplained, and an
+offset of the heading does not do as well. A mistake in the pose needs commands on all three axes: one
+alone is explained by another ship's hull as well.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,6 +41,8 @@ FACTOR = 4.0
 WORSE = 0.05
 # Of U: a run whose commands show in every axis of its motion but for so little needs no other reading.
 MISSING = 0.1
+# Of U: so much an axis may lack in the right reading. Chosen: where more is missing, no model is a judge.
+EXPLAINED = 0.5
 # Windows of the weak form that count as one. Derived: the correlations of their kernel sum to 3.7.
 OVERLAP = 4
 CHANCE = 0.01  # of a mistake where there is none, divided by the number of readings
@@ -174,7 +177,8 @@ def likeliest_mistake(w: Integrals, model: Model) -> Mistake | None:
         z = as_read if still else _needed(w, model, reading.motion)
         then = shares(reading.commands * commands, z)
         better = float(np.log(now / then).sum())
-        if better > max(np.log(FACTOR), least) and (then <= now + WORSE).all():
+        sound = (then <= now + WORSE).all() and then.max() < EXPLAINED
+        if better > max(np.log(FACTOR), least) and sound and (still or heard.all()):
             found.append((better, reading, then))
     if not found:
         return None
