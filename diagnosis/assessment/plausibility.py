@@ -39,7 +39,7 @@ LEAST, MOST = 0.1, 10.0
 FACTOR = 4.0
 # Of U: by so much an axis may be worse in the right reading. Chosen; noise alone changes less.
 WORSE = 0.05
-# Of U: a run whose commands show in every axis of its motion but for so little needs no other reading.
+# Of U: a run whose commands show in every axis but for so little needs no other reading. Chosen.
 MISSING = 0.1
 # Of U: so much an axis may lack in the right reading. Chosen: where more is missing, no model is a judge.
 EXPLAINED = 0.5
