@@ -6,6 +6,8 @@ from . import (
     force,
     inertia,
     measurement,
+    outages,
+    single_propellers,
     thrust_curves,
     thruster_dynamics,
 )
@@ -33,7 +35,9 @@ STANDARD = EffectSet(
     e
     for module in (
         thrust_curves,
+        single_propellers,
         actuator,
+        outages,
         thruster_dynamics,
         environment,
         force,
