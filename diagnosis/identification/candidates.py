@@ -12,8 +12,10 @@ from itertools import combinations
 import numpy as np
 
 from fmus.effects import Effect
+from fmus.effects.effect import EACH_VSP
 
 from ..model import Integrals, Model, omega
+from .segmentation import Interval, intervals, problem
 
 SMALL = (
     1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
@@ -106,6 +108,8 @@ def values_to_try(
     """The values at which a nonlinear effect is tried."""
     times = e.search.change_points
     declared = e.search.values(model.values)
+    if e.search.intervals:
+        return with_intervals(data, model, base, e)
     if times:
         # Of several times as many as there would be of one.
         share = CHANGE_POINTS ** (1.0 - 1.0 / len(times))
@@ -117,6 +121,26 @@ def values_to_try(
     if declared or e.differentiable:
         return declared
     return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
+
+
+def with_intervals(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
+) -> list[Mapping[str, float]]:
+    """The intervals in which an effect seems to act, as additions to a model; none: no values.
+
+    A single one without an end is the effect that lasts, if there is such.
+    """
+    p = problem(data, model, base, e)
+    spans = [] if p is None else intervals(p)
+    if p is None or not spans or (e.search.lasting and len(spans) == 1 and spans[0][1] == p.count):
+        return []
+    return [additions(model, e, named(e, p.seconds(spans)))]
+
+
+def named(e: Effect, found: Sequence[Interval]) -> dict[str, float]:
+    """Intervals [s] by the names of an effect's parameters."""
+    pairs = zip(e.search.intervals, found, strict=False)
+    return {name: time for names, times in pairs for name, time in zip(names, times, strict=True)}
 
 
 def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str, float]:
@@ -158,7 +182,7 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     # By inertia, current and measurement the model error changes smoothly, but not linearly.
     hull = e.kind in ("force", "environment", "actuator") and e.linear
     step = 1.0 if hull or not e.differentiable else SMALL
-    if e.differentiable and not e.search.change_points:
+    if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
         precision = smoothness(base, plain.columns) if e.search.smooth else None
         shapes.append(replace(plain, precision=precision))
@@ -168,8 +192,13 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
 
 
 def candidates(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[Candidate]:
-    """All effects that the ship can have and that a regression can find."""
+    """All effects that the ship can have and that a regression can find.
+
+    Those of a single propeller only where the propellers have commands of their own.
+    """
     ship = model.ship
+    each = any(w.run.five is not None for w in data)
     effects = [ship.effects[name] for name in ship.candidates]
-    found = [candidate(data, model, base, e) for e in effects if e.search.by == "regression"]
+    possible = [e for e in effects if e.search.by == "regression" and (each or EACH_VSP not in e.needs)]
+    found = [candidate(data, model, base, e) for e in possible]
     return [c for c in found if c.shapes]
