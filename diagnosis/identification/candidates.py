@@ -28,6 +28,9 @@ CLOSEST = 5.0  # s, between two of them: the model error is an average over 3 s
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
 SMALLEST, LARGEST = 1e-6, 1e6
 MOST = 0.5  # share of its largest force from which on it counts as saturated; chosen
+# Share of a curve's weight that a node must have: half a second of four minutes.
+INSIDE = 2e-3
+FEWEST = 3  # nodes of a curve: of fewer there is no bend
 SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
 
 
@@ -85,6 +88,23 @@ def spacing(data: Sequence[Integrals]) -> float:
     return max(CLOSEST, float(max(w.run.time[-1] for w in data)) / CHANGE_POINTS)
 
 
+def covered(columns: np.ndarray) -> np.ndarray:
+    """(p,), which nodes of a curve the data reach, and those between them.
+
+    A node counts from a share of INSIDE of what all nodes together give. What lies outside stays zero:
+    there the curve is the model's, and nothing is told of it.
+
+    Args:
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    weight = np.square(columns).sum(axis=(0, 1))
+    reached = np.flatnonzero(weight > INSIDE * max(float(weight.sum()), SLIGHT))
+    inside = np.zeros(weight.size, bool)
+    if reached.size:
+        inside[reached[0] : reached[-1] + 1] = True
+    return inside
+
+
 def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Prior precision of the values of a curve: its second differences are N(0, size^2).
 
@@ -100,6 +120,16 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
     bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
     return bend.T @ bend
+
+
+def curve(base: np.ndarray, plain: Shape) -> list[Shape]:
+    """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
+    inside = covered(plain.columns)
+    if inside.sum() < FEWEST:
+        return []
+    columns = plain.columns[:, :, inside]
+    fitted = [n for n, kept in zip(plain.fitted, inside, strict=True) if kept]
+    return [replace(plain, fitted=fitted, columns=columns, precision=smoothness(base, columns))]
 
 
 def values_to_try(
@@ -184,8 +214,7 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     step = 1.0 if hull or not e.differentiable else SMALL
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
-        precision = smoothness(base, plain.columns) if e.search.smooth else None
-        shapes.append(replace(plain, precision=precision))
+        shapes += [plain] if not e.search.smooth else curve(base, plain)
     for values in values_to_try(data, model, base, e):
         shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
     return Candidate(e, shapes)

@@ -70,7 +70,7 @@ class Problem:
     @property
     def count(self) -> int:
         """Number of cells."""
-        return int(self.columns.shape[1])
+        return int(np.shape(self.columns)[1])
 
     @property
     def charge(self) -> float:
@@ -101,7 +101,7 @@ class Problem:
         return self.y - self.columns @ dead
 
     def fitted(self, left: np.ndarray) -> tuple[np.ndarray, float]:
-        """What the nuisance parameters leave over of it (3 K,), and the cost with their prior penalty."""
+        """What the nuisance parameters leave over (3 K,), and the cost with their prior penalty."""
         if not self.offset.size:
             return left, float(left @ left)
         right = self.along.T @ left - self.precision @ self.offset
@@ -246,7 +246,7 @@ def problem(
     e: Effect,
     along: Along | None = None,
 ) -> Problem | None:
-    """The problem of an effect with intervals, in units of force; None where its thruster is never at work.
+    """The problem of an effect with intervals, in units of force; None: its thruster is never at work.
 
     Args:
         data: windows of every run.
@@ -283,7 +283,7 @@ def problem(
         base.ravel(),
         columns,
         np.maximum((middles - first) / EVERY, 0.0).astype(int),
-        Z.reshape(base.size, Z.shape[2]),
+        Z.reshape(base.size, -1),
         precision,
         offset,
         len(e.search.intervals),
