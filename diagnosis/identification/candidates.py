@@ -15,7 +15,8 @@ from fmus.effects import Effect
 from fmus.effects.effect import EACH_VSP
 
 from ..model import Integrals, Model, omega
-from .segmentation import Interval, intervals, problem
+from .multistart import Landscape, best_values
+from .segmentation import FLOOR, Interval, intervals, problem
 
 SMALL = (
     1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
@@ -153,6 +154,38 @@ def values_to_try(
     return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
 
 
+def spread(e: Effect) -> bool:
+    """Whether an effect has parameters that it is not linear in, and declares no values of them.
+
+    One with a memory takes long to compute: it is tried at few values.
+    """
+    several = bool(e.shape_parameters) or (not e.differentiable and len(e.coefficients) > 1)
+    told = e.search.times or e.search.tries or e.search.smooth
+    return several and not told and e.memory is None
+
+
+def by_starts(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, step: float
+) -> list[Shape]:
+    """The shapes of an effect at the best values of what it is not linear in."""
+    sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR
+
+    def force(values: Mapping[str, float]) -> np.ndarray:
+        changed = model.plus({n: x - model.value(n) for n, x in values.items()})
+        return ((base - model_error(data, changed)) / sigma).ravel()
+
+    def tried(shape: Mapping[str, float]) -> list[dict[str, float]]:
+        at = model.plus({n: x - model.value(n) for n, x in shape.items()})
+        return [{**v} for name in e.coefficients for v in scaled(data, at, base, e, name)]
+
+    poses = np.concatenate([w.smoothed.eta[w.known, :2] for w in data])
+    extent = float(np.linalg.norm(np.ptp(poses, axis=0)))
+    present = {p.name: model.value(p.name) for p in e.parameters}
+    of = Landscape(e, force, (base / sigma).ravel(), extent, present)
+    found, fitted = best_values(of, tried)
+    return [shape(data, model, base, additions(model, e, v), fitted, step) for v in found]
+
+
 def with_intervals(
     data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
 ) -> list[Mapping[str, float]]:
@@ -215,6 +248,8 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
         shapes += [plain] if not e.search.smooth else curve(base, plain)
+    if spread(e):
+        return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
     for values in values_to_try(data, model, base, e):
         shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
     return Candidate(e, shapes)

@@ -51,6 +51,7 @@ class Problem:
         first, cell: time at which the cells begin, and how long each is [s].
         y: (3 K,), model error.
         columns: (3 K, m), what each cell of a dead thruster adds to it.
+        count: m, number of cells.
         bins: (K,), number of the EVERY seconds in which the middle of each window lies.
         along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
         precision, offset: (q, q) and (q,), of the nuisance parameters.
@@ -61,16 +62,12 @@ class Problem:
     cell: float
     y: np.ndarray
     columns: csc_matrix
+    count: int
     bins: np.ndarray
     along: np.ndarray
     precision: np.ndarray
     offset: np.ndarray
     most: int
-
-    @property
-    def count(self) -> int:
-        """Number of cells."""
-        return int(np.shape(self.columns)[1])
 
     @property
     def charge(self) -> float:
@@ -282,6 +279,7 @@ def problem(
         cell,
         base.ravel(),
         columns,
+        count,
         np.maximum((middles - first) / EVERY, 0.0).astype(int),
         Z.reshape(base.size, -1),
         precision,
