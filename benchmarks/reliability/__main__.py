@@ -43,13 +43,7 @@ COUNTS = {"scenarios": 1000, "files": 300, "kills": 100, "signals": 100, "disk":
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reliability", description=about)
-    for name, count in (
-        ("scenarios", 1000),
-        ("files", 300),
-        ("kills", 100),
-        ("signals", 100),
-        ("disk", 30),
-    ):
+    for name, count in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N", help=f"({count})")
     parser.add_argument(
         "--deaths", type=int, metavar="N", help="of an FMU (every way in every function)"

@@ -17,6 +17,7 @@ from .mortal import WAYS
 ROOT = Path(__file__).parent.parent.parent
 WHERE = ("instantiate", "setup", "enter", "leave", "set", "get", "step", "terminate")
 HANGING = ("hang", "hang in C", "spin")
+EXCEPTIONS = ("exception", "stack", "memory")
 HARMLESS = ("fork", "fork, child ends", "flood", "SIGUSR1 to parent")
 # Longest wall time of one command [s]; chosen: none takes as long on a busy machine.
 PATIENCE = 60.0
@@ -158,24 +159,33 @@ def deaths(chosen: int | None, seed: int, work: Path, advance: Callable[[], None
                 process.send_signal(signal.SIGINT)
                 time.sleep(0.3)
         stderr = finish(process)
-        # Whether an FMU got to be instantiated is a matter of input; so is one that cannot be.
-        expected = {130} if way in HANGING or way == "SIGTERM to parent" else {3}
-        if way in HARMLESS:
-            expected = {0}
-        if where == "instantiate" and way in ("exception", "stack", "memory"):
-            expected = {2}
-        if where == "terminate" and way in ("exception", "stack", "memory", "closed descriptors"):
-            expected = {0, 3}  # the run is done
-        if way == "closed descriptors" and where in WHERE[:4]:
-            expected = {0, 3}  # none of ours is open yet
-        if way == "SIGTERM to parent" or (way in HANGING and where == "terminate"):
-            expected = {0, 130}  # the run may be done before the request acts
+        expected = endings(way, where)
         named = "" if way == "closed descriptors" else "bad"
         found = faults(process.returncode, stderr, out, expected, named)
         wrong += [f"{way} in {where}: {text}" for text in found]
         shutil.rmtree(out, ignore_errors=True)
         advance()
     return wrong
+
+
+def endings(way: str, where: str) -> set[int]:
+    """Exit codes that are right for a death."""
+    if way in HARMLESS:
+        return {0}
+    if way == "SIGTERM to parent":
+        # A request like any; in the last call of all the run may be done before it acts.
+        return {0, 130} if where == "terminate" else {130}
+    if way in HANGING:
+        return {130}
+    if where == "instantiate" and way in EXCEPTIONS:
+        return {2}  # whether an FMU can be instantiated is a matter of input
+    if where == "terminate" and way in ("exception", "stack"):
+        return {0}  # the run is done, and goes on from an exception
+    if (where == "terminate" and way in ("memory", "closed descriptors")) or (
+        where in WHERE[:4] and way == "closed descriptors"
+    ):
+        return {0, 3}  # what was taken away may or may not be needed any more, or yet
+    return {3}
 
 
 def cases(chosen: int | None, seed: int) -> list[tuple[str, str]]:
