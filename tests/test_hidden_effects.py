@@ -19,8 +19,7 @@ from benchmarks.hidden_effects.summary import write
 from benchmarks.hidden_effects.truth import force, motion, over, windows
 from cosim import InputError
 from diagnosis import Run
-from fmus.effects import STANDARD
-from fmus.effects.effect import EACH_VSP
+from fmus.effects import EACH_VSP, STANDARD
 from fmus.thrusters.allocation import Allocation, thrust
 
 

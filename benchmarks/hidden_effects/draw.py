@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.effects import STANDARD
-from fmus.effects.effect import EACH_VSP
+from fmus.effects import EACH_VSP, STANDARD
 
 from .simulated_runs import FINE, STEP, STOP
 from .truth import NAMES, Motion, Values, force, over, windows

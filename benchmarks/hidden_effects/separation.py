@@ -12,8 +12,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from fmus.effects import STANDARD
-from fmus.effects.effect import EACH_VSP
+from fmus.effects import EACH_VSP, STANDARD
 from fmus.ship import ship
 
 from .truth import WEIGHTS, Motion, Values, over

@@ -11,11 +11,12 @@ from . import (
     thrust_curves,
     thruster_dynamics,
 )
-from .effect import Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect import EACH_VSP, Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
 from .effect_set import EffectSet, effects_of
 from .families import Family
 
 __all__ = [
+    "EACH_VSP",
     "STANDARD",
     "Effect",
     "EffectSet",
