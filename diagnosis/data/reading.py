@@ -15,12 +15,12 @@ from scipy.io import loadmat
 
 from cosim import InputError
 from cosim.errors import nearest
+from fmus.effects.single_propellers import ASIDE
 from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import refuse_separator
 from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
 
-ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from data)
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
