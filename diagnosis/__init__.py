@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
     from .assessment.evaluation import Evaluation, PredictionError, evaluate_run
     from .assessment.stability import Stability, check_stability
-    from .assessment.uncertainty import omega_std
     from .assessment.windows import WindowErrors, Windows
     from .data import Counts, Run, Track, clean, read
     from .gathering import gather
     from .identification import Finding, Findings, method
     from .model import Integrals, Model, integrals, omega
+    from .model.uncertainty import omega_std
     from .report.content import comparison_content, diagnosis_content
     from .report.result_keys import ComparisonContent, DiagnosisContent, EffectResult
     from .session import Comparison, Diagnosis, diagnose, evaluate
@@ -98,7 +98,7 @@ _HOME = {
     "evaluate_run": "diagnosis.assessment.evaluation",
     "Stability": "diagnosis.assessment.stability",
     "check_stability": "diagnosis.assessment.stability",
-    "omega_std": "diagnosis.assessment.uncertainty",
+    "omega_std": "diagnosis.model.uncertainty",
     "WindowErrors": "diagnosis.assessment.windows",
     "Windows": "diagnosis.assessment.windows",
     "ComparisonContent": "diagnosis.report.result_keys",

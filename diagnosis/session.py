@@ -13,18 +13,21 @@ from cosim import InputError
 
 from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
-from .assessment.stability import OperatingRegion, Stability, check_stability
-from .assessment.uncertainty import omega_std
+from .assessment.remainder import Remainder
+from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
+from .decision import concluded, remainder_of
 from .identification import DEFAULT, Method, method
 from .identification.findings import Findings
+from .identification.withdrawal import Withdrawn, withdraw
 from .model import Integrals, Model, omega
+from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
 from .progress import Advance, silent
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
 
-Verdict = Literal["found", "ambiguous", "none"]
+Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,9 @@ class Diagnosis:
 
     Attributes:
         learned: the findings, and the model with them.
+        withdrawn: effects that were accepted and taken back.
+        remainder: what the learned model leaves; where nothing was learned, the first one.
+        refitted: whether the learned model has other nominal coefficients and no effect.
         shares: for each finding the share of the error's sum of squares that it explains.
         comparison: errors before and after, on the training runs and then on those held out.
         start: the initial model.
@@ -69,6 +75,9 @@ class Diagnosis:
     """
 
     learned: Findings
+    withdrawn: Sequence[Withdrawn]
+    remainder: Remainder
+    refitted: bool
     shares: Sequence[float]
     comparison: Comparison
     start: Model
@@ -79,9 +88,11 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        if not self.learned.effects:
-            return "none"
-        return "ambiguous" if self.learned.effects[0].alike else "found"
+        if self.learned.effects:
+            return "ambiguous" if self.learned.effects[0].alike else "found"
+        if self.refitted:
+            return "coefficients"
+        return "unexplained" if self.remainder.significant else "none"
 
     @property
     def sound(self) -> bool:
@@ -164,15 +175,34 @@ def diagnose(
         )
     start = model or Model()
     chosen = method(by) if isinstance(by, str) else by
-    learned = chosen.fit(train, start, prior, advance, seed)
-    final = learned.model if learned.effects else None
-    comparison = evaluate(train, start, final, held_out, advance)
-    advance("stability")
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
-    stability = check_stability(learned.model, start, advance, OperatingRegion.of(nu))
+    region = OperatingRegion.of(nu)
+    found = chosen.fit(train, start, prior, advance, seed)
+    advance("what unseen data say")
+    kept, withdrawn = withdraw(found, held_out, start, lambda a, b: drives_on(a, b, region))
+    learned, refitted = concluded(kept, [*train, *held_out], held_out, start)
+    final = learned.model if learned.effects or refitted else None
+    comparison = evaluate(train, start, final, held_out, advance)
+    advance("what is left")
+    runs, std = comparison.evaluations, comparison.omega_std
+    remainder = remainder_of(runs, std, comparison.after.regions, learned)
+    advance("stability")
+    stability = check_stability(learned.model, start, advance, region)
     shares = _shares(learned, start, held_out)
     u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
-    return Diagnosis(learned, shares, comparison, start, stability, (u, v, r), prior, seed)
+    return Diagnosis(
+        learned,
+        withdrawn,
+        remainder,
+        refitted,
+        shares,
+        comparison,
+        start,
+        stability,
+        (u, v, r),
+        prior,
+        seed,
+    )
 
 
 def _shares(learned: Findings, start: Model, held_out: Sequence[Integrals]) -> list[float]:

@@ -38,6 +38,7 @@ DIAGNOSIS_LAYERS = (
     ("model",),
     ("gathering",),
     ("identification", "assessment"),
+    ("decision",),
     ("session",),
     ("report",),
     ("command_line",),

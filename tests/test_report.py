@@ -75,6 +75,12 @@ def nothing(evaluations):
         "verdict": "none",
         "sentence": "Nothing is missing that these data show.",
         "effects": [],
+        "withdrawn": [],
+        "remainder": {
+            "significant": False,
+            "axes": {a: {"rms": 0.01, "uncertainty": 0.01, "share": 1.0} for a in "XYN"},
+            "sentence": "Nothing that matters.",
+        },
         "suspect_coefficients": [],
         "ranking": [],
         "where_after": NO_REGION,

@@ -4,19 +4,22 @@ Prediction errors over windows of 8 s, regions in which the model error is large
 whether a learned model is stable.
 """
 
+from ..model.uncertainty import omega_std
 from .evaluation import Evaluation, PredictionError, evaluate_run
 from .regions import ErrorRegions, Profile, Region, find_regions
+from .remainder import AxisRemainder, Remainder
 from .stability import OperatingRegion, Stability, check_stability
-from .uncertainty import omega_std
 from .windows import WindowErrors, Windows
 
 __all__ = [
+    "AxisRemainder",
     "ErrorRegions",
     "Evaluation",
     "OperatingRegion",
     "PredictionError",
     "Profile",
     "Region",
+    "Remainder",
     "Stability",
     "WindowErrors",
     "Windows",

@@ -145,8 +145,10 @@ def find_regions(
         rms, uncertainty = (np.sqrt(x[:, k].mean()) for x in (squares, noise))
         measured = f"{rms:.2g} {UNITS[axis]}"
         if not exceeds_noise(squares[:, k], noise[:, k], cluster):
-            within = f"{measured} is within the uncertainty of {uncertainty:.1g}"
-            sentences.append(f"{NAMES[axis]}: no error seen, {within}.")
+            within = f"no error seen, {measured} is within the uncertainty of {uncertainty:.1g}"
+            seldom = f"{measured} (uncertainty {uncertainty:.1g}), too seldom to say where"
+            is_within = rms <= MIN_RATIO_TO_NOISE * uncertainty
+            sentences.append(f"{NAMES[axis]}: {within if is_within else seldom}.")
             continue
         found = sorted(filter(None, (d.clearest_region() for d in designs)), key=lambda r: -r.contrast)
         regions += found

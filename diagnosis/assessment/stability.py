@@ -179,6 +179,18 @@ def sampled_motions(region: OperatingRegion) -> np.ndarray:
     return (SPEEDS[:, None, None] * directions).reshape(-1, 3)
 
 
+def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
+    """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
+    metric = mass(other)
+    for k in range(3):
+        nu = np.zeros((2 * len(SPEEDS), 3))
+        nu[:, k] = np.concatenate([-SPEEDS[::-1], SPEEDS]) * region[k]
+        lowest = float(dissipation(model, nu, metric).min())
+        if lowest < 0.0 and _less(lowest, float(dissipation(other, nu, metric).min())):
+            return True
+    return False
+
+
 def _less(after: float, before: float) -> bool:
     return after < before - TOLERANCE * abs(before)
 

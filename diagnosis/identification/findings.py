@@ -1,11 +1,12 @@
 """What an identification finds, whatever its method."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..model import Model
+from .confidence import Evidence
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +24,8 @@ class Suspect:
 
     Attributes:
         name: of the coefficient.
-        z: by how many posterior standard deviations.
-        value: what it seems to be, SI.
+        z: by how many prior standard deviations.
+        value: what it is in the learned model, SI.
     """
 
     name: str
@@ -40,11 +41,12 @@ class Finding:
         id: of the effect.
         values: its parameters as additions to the nominal ones.
         ci95: interval of each that is fitted, at the final step.
-        confidence: share of bootstrap replicates in which it came first; NaN where a method has none.
+        confidence: probability that it is a true cause; NaN where a method has none.
         alike: ids that these data cannot tell from it, itself not among them.
         q2: cross-validated share of the model error that is explained, with all found before.
         share: how much of the cross-validated model error went with this finding.
-        model: with this and all earlier findings, as it was then.
+        model: with this and all earlier findings.
+        evidence: what the confidence is made of; None where a method has none.
     """
 
     id: str
@@ -55,6 +57,7 @@ class Finding:
     q2: float
     share: float
     model: Model = field(default_factory=Model)
+    evidence: Evidence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +67,18 @@ class Findings:
     Attributes:
         effects: in the order of acceptance.
         ranking: of the first step.
-        model: with all effects.
-        suspects: nominal coefficients that are wrong.
+        model: with all effects; where there are none, the model that it started from.
+        suspects: nominal coefficients that are wrong, with values as in ``model``, or, where there is no
+            effect, as in ``refitted``.
         sigma: (3,), noise of each axis [N, N, N m].
+        refitted: the most likely model without an effect, but other nominal coefficients; None where a
+            method does not fit them.
+        moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
+        left_out: (blocks,), loss of each block by a fit that has not seen its run, or, of one run, the
+            block; None where a method has none.
+        left_out_at_first: the same of the model that it started from.
+        keep: the findings with some of the effects only, everything else fitted anew; None where a
+            method cannot.
     """
 
     effects: Sequence[Finding] = field(default_factory=list)
@@ -74,3 +86,8 @@ class Findings:
     model: Model = field(default_factory=Model)
     suspects: Sequence[Suspect] = field(default_factory=list)
     sigma: np.ndarray = field(default_factory=lambda: np.ones(3))
+    refitted: Model | None = None
+    moved: Mapping[str, float] = field(default_factory=dict)
+    left_out: np.ndarray | None = None
+    left_out_at_first: np.ndarray | None = None
+    keep: "Callable[[Sequence[str]], Findings] | None" = None

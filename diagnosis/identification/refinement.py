@@ -10,7 +10,7 @@ parameters hardly change on the way and are taken once; those of a new effect an
 Change points have no slope: they are searched around their first guess.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -57,6 +57,10 @@ class TrainingSet:
         """(3,), what an error counts on each axis."""
         return 1.0 / np.asarray(self.sigma) / np.sqrt(OVERLAP)
 
+    def error(self, at: "Estimate") -> np.ndarray:
+        """(K, 3), model error of an estimate [N, N, N m]."""
+        return model_error(self.data, at.model(self.prior))
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
@@ -88,6 +92,12 @@ class Estimate:
         """Those values that are fitted by slopes."""
         searched = change_points(self.start.ship)
         return [n for n in self.values if n not in searched]
+
+    def without(self, names: Collection[str]) -> "Estimate":
+        """The estimate without the values of some effects."""
+        kept = [k for k, n in enumerate(self.fitted) if n not in names]
+        values = {n: v for n, v in self.values.items() if n not in names}
+        return replace(self, values=values, precision=self.precision[kept][:, kept])
 
     def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "Estimate":
         """The estimate with additions, effects' parameters within their range."""
@@ -186,6 +196,11 @@ def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refin
         several = owner(at.start.ship, start.values).search.intervals
         return (_with_intervals if several else _with_change_points)(t, at, along, start)
     return _gauss_newton(t, at, along, start)
+
+
+def refit(t: TrainingSet, at: Estimate, along: Nuisance) -> Refined:
+    """The effects found and the nominal coefficients at their most likely values, without a new one."""
+    return _gauss_newton(t, at, along, Start({}, (), np.zeros((0, 0))))
 
 
 def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from ..model.correlation import independent
 from .candidates import Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import RIDGE, Regression, Scored, regression, score
@@ -33,6 +34,9 @@ REWEIGHTINGS = 4  # at the most
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
 # A curve that can do what an effect with this many parameters fewer does is no other explanation of it.
 FREE_SHAPE = 5
+# Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
+# own: as much as its score must fall to be accepted.
+NEW = 10.0
 TIE = 2.0  # paired standard errors within which two candidates are alike
 
 
@@ -83,13 +87,17 @@ def weighted(
     """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
     table = gram_table(base, t.blocks, found, along, sigma)
     free = len(along.offset) - t.prior.size
-    new = [k for k in range(len(found)) if novelty(table, k, free) >= SEPARATION]
+    size = float(table.total[0, 0])
+    new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
     order = in_order([score(table, k, len(found[k].shapes)) for k in new])
     return Ranking(base, along, table, found, order, score(table, -1, 1))
 
 
 def novelty(t: GramTable, candidate: int, free: int) -> float:
     """Share of a linear candidate's force that what was found cannot give, set freely; else 1.
+
+    Times the sum of squares of the model error, in units of the noise, it is the signal that a
+    candidate as large as that error has of its own.
 
     Args:
         t: the table it stands in.
@@ -132,7 +140,11 @@ class Shortlist:
     @property
     def winner(self) -> Estimate:
         """The model with the best of them."""
-        best = self.scored[0].candidate
+        return self.of(0)
+
+    def of(self, chosen: int) -> Estimate:
+        """The model with the candidate of a place in the order."""
+        best = self.scored[chosen].candidate
         estimate = self.refined[best].estimate
         precision = block_diag(estimate.precision, self.starts[best].precision)
         return replace(estimate, precision=np.asarray(precision))
@@ -156,17 +168,21 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
     """A shortlist in which an error counts by what even the best candidate leaves over.
 
     Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
-    such would move the nominal coefficients to wherever it becomes a little less.
+    such would move the nominal coefficients to wherever it becomes a little less. It also lasts: where
+    it is correlated over more windows than overlap, fewer count as independent. On no axis does it
+    count more than the error before, which a wrong winner may have made larger.
 
     Args:
         t, at, ranking: all candidates beside a model.
     """
     least = ranking.table.sigma
     t = replace(t, sigma=least)
+    most = np.sqrt(np.mean(ranking.base**2, axis=0))
     found = shortlist(t, at, ranking)
     for _ in range(REWEIGHTINGS):
         left = found.refined[found.scored[0].candidate].left
-        sigma = np.maximum(least, np.sqrt(np.mean(left**2, axis=0)))
+        spoiled = np.sqrt(np.mean(left**2, axis=0))
+        sigma = np.maximum(least, np.minimum(spoiled, most)) * np.sqrt(independent(t.data, left))
         change = sigma / ranking.table.sigma
         if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
             break

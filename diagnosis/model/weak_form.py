@@ -24,8 +24,8 @@ from .thrust import Response, thrust
 
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
-# Windows overlap: so many carry as much as one that is independent. The correlations of the kernel
-# (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
+# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
+# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64

@@ -10,15 +10,16 @@ from fmus.effects.text import Found
 
 from ..assessment.evaluation import Evaluation
 from ..assessment.regions import ErrorRegions, Profile, Region
+from ..assessment.remainder import Remainder
 from ..identification.findings import Finding
 from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit
+from .headline import headline
 
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
 AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
-NOTHING_FOUND = "Nothing is missing that these data show."
 
 
 def comparison_content(
@@ -53,13 +54,14 @@ def diagnosis_content(
     effects = [
         _effect(diagnosis, f, share) for f, share in zip(learned.effects, diagnosis.shares, strict=True)
     ]
+    suspects = [result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects]
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
-        sentence=" ".join(e.sentence for e in effects) or NOTHING_FOUND,
+        sentence=headline(diagnosis.verdict, effects, suspects, diagnosis.remainder.beyond_chance),
+        remainder=_remainder(diagnosis.remainder),
         effects=effects,
-        suspect_coefficients=[
-            result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects
-        ],
+        withdrawn=[result_keys.WithdrawnResult(id=w.id, reason=w.reason) for w in diagnosis.withdrawn],
+        suspect_coefficients=suspects,
         ranking=[result_keys.RankedResult(id=r.id, score=r.score, q2=r.q2) for r in learned.ranking],
         data=_data(comparison.evaluations),
         errors=[_errors(e) for e in comparison.evaluations],
@@ -77,6 +79,14 @@ def diagnosis_content(
         seed=diagnosis.seed,
         **_provenance(comparison, model, files),
     )
+
+
+def _remainder(r: Remainder) -> result_keys.RemainderResult:
+    axes = {
+        name: result_keys.AxisRemainderResult(rms=a.rms, uncertainty=a.uncertainty, share=a.share)
+        for name, a in r.axes.items()
+    }
+    return result_keys.RemainderResult(significant=r.significant, axes=axes, sentence=r.sentence)
 
 
 class _Provenance(TypedDict):

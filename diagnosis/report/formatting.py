@@ -7,6 +7,8 @@ import numpy as np
 VERDICTS = {
     "found": "Something is missing, and it was found",
     "ambiguous": "Something is missing, and more than one cause fits",
+    "coefficients": "Coefficients are wrong, and nothing else is missing",
+    "unexplained": "Something is missing, and nothing known here explains it",
     "none": "Nothing is missing that these data show",
 }
 NO_VALUE = "–"

@@ -12,6 +12,7 @@ import cosim
 from ..assessment.evaluation import Evaluation
 from ..progress import Advance, silent
 from . import figures, formatting, tracks
+from .headline import told
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import Change, ComparisonContent, DiagnosisContent
 from .shape import Curve, curves
@@ -89,7 +90,7 @@ def _template() -> "Template":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain)
+    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, told)
     environment.filters |= {f.__name__: f for f in filters}
     environment.globals["times"] = formatting.times
     return environment.get_template("page.html")
@@ -165,9 +166,6 @@ def _ranking(d: DiagnosisContent) -> Iterator[Drawing]:
         first = d.effects[0] if d.effects else None
         figure = figures.ranking(ranked, first.indistinguishable if first else ())
         caption = f"The best of {len(ranked)} candidates."
-        if first is not None and first.confidence is not None:
-            share = formatting.percent(first.confidence)
-            caption += f" {first.id} comes first in {share} of the data drawn again by chance."
         yield _draw(figure, "ranking", "Candidates in the order of their loss", caption)
 
 

@@ -143,8 +143,31 @@ class EffectResult(Part):
     separation: str
 
 
+class AxisRemainderResult(Part):
+    """What is left on an axis, its uncertainty [N or N m], and the share of the first sum of squares."""
+
+    rms: Number
+    uncertainty: Number
+    share: Number
+
+
+class RemainderResult(Part):
+    """What the model in ``model.ssv`` leaves, and whether that is more than chance and matters."""
+
+    significant: bool
+    axes: dict[str, AxisRemainderResult]
+    sentence: str
+
+
+class WithdrawnResult(Part):
+    """An effect that was accepted on training data and made unseen data worse."""
+
+    id: str
+    reason: str
+
+
 class SuspectResult(Part):
-    """A nominal coefficient that is likely wrong: its new value, and by how many standard deviations."""
+    """A nominal coefficient that is likely wrong: its new total, how far off [prior std]."""
 
     name: str
     z: Number
@@ -173,9 +196,11 @@ class StabilityResult(Part):
 class DiagnosisContent(Part):
     """The content of ``diagnosis.json``; at its end what it was made with."""
 
-    verdict: Literal["found", "ambiguous", "none"]
+    verdict: Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
     sentence: str
+    remainder: RemainderResult
     effects: list[EffectResult]
+    withdrawn: list[WithdrawnResult]
     suspect_coefficients: list[SuspectResult]
     ranking: list[RankedResult]
     data: Data

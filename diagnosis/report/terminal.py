@@ -8,10 +8,10 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from .headline import is_sure, told
 from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, RunErrors
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
-SMALL_SHARE = 0.01  # of the squared error, below which an effect carries a warning; chosen
 
 
 def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
@@ -26,12 +26,15 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.learn``."""
     yield from _data(r.data)
     yield from _lines("Where the model fails", r.where.sentences)
+    yield from _lines("What is left without an explanation", [r.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [r.sentence])
-    for k, effect in enumerate(r.effects, 1):
-        yield from _lines(
-            f"Finding {k}: {effect.id}" if len(r.effects) > 1 else "Finding", _effect(effect)
-        )
+    told = sorted(r.effects, key=lambda e: not is_sure(e))  # the sure ones first, else as accepted
+    for k, effect in enumerate(told, 1):
+        what = "Finding" if is_sure(effect) else "Possibility"
+        yield from _lines(f"{what} {k}: {effect.id}" if len(told) > 1 else what, _effect(effect))
+    if r.withdrawn:
+        yield from _lines("Withdrawn", [f"{w.id}: {w.reason}" for w in r.withdrawn])
     if r.suspect_coefficients:
         suspects = [
             f"{s.name} is rather {_number(s.value)} ({_number(s.z, 2)} standard deviations of the prior)"
@@ -44,7 +47,7 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
         yield from _lines(
             "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
         )
-    yield from _errors(r.errors, learned=bool(r.effects))
+    yield from _errors(r.errors, learned=bool(r.effects) or r.verdict == "coefficients")
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)
 
@@ -86,12 +89,10 @@ def _run(name: str, held_out: bool) -> Text:
 
 
 def _effect(e: EffectResult) -> Iterator[str]:
-    yield e.sentence
+    yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
     yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error"
-    if not (e.share_of_error or 0.0) >= SMALL_SHARE:
-        yield "warning: with it the error hardly falls, which is no reason to believe it"
     yield from filter(None, (e.separation, e.advice))
 
 

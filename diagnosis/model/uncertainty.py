@@ -9,8 +9,8 @@ corner frequency w0 follows from the variance of the smoothed pose, R w0 / 3, kn
 
 import numpy as np
 
-from ..model import Integrals, Model
-from ..model.weak_form import WIDTH, kernel
+from .ship_model import Model
+from .weak_form import WIDTH, Integrals, kernel
 
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
 # On a noise-free run at 20 Hz with smooth commands the true model leaves 4e-5 N and 1e-5 N m.
@@ -20,6 +20,8 @@ FREQUENCIES = np.geomspace(
 )  # rad/s, grid of the integral; chosen, far beyond the kernel's width
 CORNERS = np.geomspace(0.1, 200.0, 80)  # rad/s, table of w0, which is held within it; chosen
 KERNEL_POINTS = 1201  # of the kernel's Fourier integral; chosen
+# Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
+NOISE_TOLERANCE = 1.3
 SMALLEST_SHARE = 0.05  # of a window's time that samples cover; chosen
 SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
 

@@ -1,0 +1,127 @@
+"""With what a model error repeats: with place, motion, commands or time, or with none of them.
+
+A window's error is predicted by the mean over its NEIGHBOURS in a space (place, motion, commands), of
+windows that are at least APART from it in time or in another run. The squared correlation of prediction
+and error is the share that repeats there. By chance it is as in series that are shifted in time against
+that space, which keeps how long an error lasts.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..model import Integrals
+from ..model.correlation import correlated_windows
+from ..model.weak_form import EVERY
+
+NEIGHBOURS = 5  # windows of a prediction; chosen
+SEARCHED = 160  # nearest windows among which these are: a pass of APART to both sides holds 120
+APART = 30.0  # s; two blocks, as what counts as independent elsewhere
+SHIFTS = 199  # series shifted at random; a share above all of them is beyond chance by 0.5 %
+REPEATS = 0.25  # share from which on an error is said to repeat; chosen
+CLEARER = 0.1  # share by which commands must give more than a force that comes and goes; chosen
+STRETCH = 15  # windows, 7.5 s, of one amplitude: half of a block
+SPACES = ("place", "motion", "command", "time")
+
+
+class Recurrence(NamedTuple):
+    """How an axis' model error comes again.
+
+    Attributes:
+        shares: space -> share of the sum of squares that repeats in it; 0 where that is chance.
+        lasts: s, how long the error stays correlated.
+        in_part: whether it is in proportion to the command of its axis, at times more and at times less.
+    """
+
+    shares: dict[str, float]
+    lasts: float
+    in_part: bool
+
+    @property
+    def best(self) -> str | None:
+        """The space in which most repeats; None: there is none."""
+        name = max(self.shares, key=lambda n: self.shares[n])
+        return name if self.shares[name] >= REPEATS else None
+
+
+def recurrence(data: Sequence[Integrals], left: np.ndarray, seed: int = 0) -> list[Recurrence]:
+    """How the model error of each axis comes again.
+
+    Args:
+        data: windows of each run.
+        left: (K, 3), model error in them, one run after the other [N, N, N m].
+        seed: of the shifts.
+    """
+    run = np.repeat(np.arange(len(data)), [w.middle.size for w in data])
+    time = np.concatenate([w.middle for w in data])
+    place, motion, command = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
+    neighbours = {
+        "place": _neighbours(place, run, time),
+        "motion": _neighbours(_scaled(motion), run, time),
+        "command": _neighbours(_scaled(command), run, time),
+        "time": _neighbours(time[:, None], run, time, other_runs=True),
+    }
+    rng = np.random.default_rng(seed)
+    offsets = rng.integers(SEARCHED, max(len(left) - SEARCHED, SEARCHED + 1), SHIFTS)
+    lasts = EVERY * correlated_windows(data, left)
+    found = []
+    for k in range(3):
+        error = left[:, k]
+        shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
+        in_part = _in_part(error, command[:, k], run, shares["command"])
+        found.append(Recurrence(shares, float(lasts[k]), in_part))
+    return found
+
+
+def _of_run(w: Integrals) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means over the windows of a run: place (K, 2), motion (K, 3), command (K, 3)."""
+    eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.eta, w.smoothed.nu))
+    return w.smooth @ eta[:, :2], w.smooth @ nu, w.held @ w.run.tau_cmd
+
+
+def _scaled(x: np.ndarray) -> np.ndarray:
+    spread = x.std(axis=0)
+    return x / np.where(spread > 0.0, spread, 1.0)
+
+
+def _neighbours(
+    x: np.ndarray, run: np.ndarray, time: np.ndarray, other_runs: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (K, n) of the nearest windows of another time, and which of them there are."""
+    count = min(SEARCHED, len(x))
+    rows = KDTree(x).query(x, count)[1].reshape(len(x), -1)
+    other = run[rows] != run[:, None]
+    apart = other if other_runs else other | (np.abs(time[rows] - time[:, None]) >= APART)
+    order = np.argsort(~apart, axis=1, kind="stable")[:, :NEIGHBOURS]
+    return np.take_along_axis(rows, order, axis=1), np.take_along_axis(apart, order, axis=1)
+
+
+def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.ndarray) -> float:
+    """Share of an error that its neighbours foretell; 0 if that is chance."""
+
+    def foretold(x: np.ndarray) -> float:
+        rows, there = near
+        mean = (x[rows] * there).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+        size = float(np.sqrt((mean @ mean) * (x @ x)))
+        return max(float(mean @ x), 0.0) ** 2 / size**2 if size > 0.0 else 0.0
+
+    share = foretold(error)
+    if share < REPEATS:
+        return 0.0
+    return share if all(foretold(np.roll(error, int(n))) < share for n in offsets) else 0.0
+
+
+def _in_part(error: np.ndarray, command: np.ndarray, run: np.ndarray, always: float) -> bool:
+    """Whether the command with an amplitude of its own for each stretch gives far more of an error than
+    a constant force for each stretch, and than the command gives ``always``.
+    """
+    number = np.arange(error.size) // STRETCH + run * error.size
+
+    def explained(x: np.ndarray) -> float:
+        at = np.unique(number, return_inverse=True)[1]
+        top, bottom = np.bincount(at, x * error), np.bincount(at, x * x)
+        return float(np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0]) / max(error @ error, 1e-300))
+
+    return explained(command) > max(explained(np.ones_like(error)), always) + CLEARER

@@ -1,0 +1,88 @@
+"""What a candidate must show to be accepted: more than chance, in runs that its fit has not seen."""
+
+import numpy as np
+
+from fmus.ship import Ship
+
+from .map_regression import Scored
+from .shortlist import NEW, TIE, Shortlist
+
+# Of acceptance: fall of the score, which is twice a log likelihood ratio. Chance does not give 10 among
+# some fifty candidates (2 log 50 = 7.8), and what is less than 0.3 % of the error changes no prediction.
+LEAST_FALL, LEAST_SHARE = NEW, 0.003
+LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explained; chosen
+# Share of some axis' first sum of squares that must go with an effect: less shows in no prediction.
+LEAST_OF_AXIS = 0.02
+
+
+def accepted(nothing: Scored, best: Scored, total: float) -> bool:
+    """Whether a candidate is beyond chance, and does no harm in runs that it was not fitted to.
+
+    What the prior charges for nominal coefficients that moved is counted on both sides.
+
+    Args:
+        nothing: the score without it.
+        best: its own.
+        total: sum of squares of the first model error, in units of the noise.
+    """
+    fall = nothing.score - best.score
+    return (
+        fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
+        and float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
+        and not worse(best.runs, nothing.runs, best.prior - nothing.prior)
+    )
+
+
+def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
+    """Whether a loss by blocks (blocks,) exceeds another by more than two paired standard errors.
+
+    Args:
+        its, others: losses.
+        charge: added to the difference.
+    """
+    d = its - others
+    return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
+
+
+def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray) -> bool:
+    """Whether an effect takes away a share of the first sum of squares of some axis that shows.
+
+    Args:
+        first: (K, 3), the first model error.
+        without, left: (K, 3), the model error without the effect and with it.
+    """
+    fall = np.sum(without**2 - left**2, axis=0)
+    return bool(np.any(fall >= LEAST_OF_AXIS * np.sum(first**2, axis=0)))
+
+
+def better(present: str, best: Shortlist, ship: Ship) -> int | None:
+    """Number of the candidate of a shortlist that takes an effect's place; None: none does.
+
+    A simple law goes before a free curve that is no better than two paired standard errors; else a
+    candidate must be better than the present effect by as much as an effect must bring.
+
+    Args:
+        present: id of the effect that has the place.
+        best: candidates for the place, the present one mostly among them.
+        ship: whose effects they are.
+    """
+    scored = best.scored
+    ids = [best.ids[s.candidate] for s in scored]
+    smooth = [ship.effects[i].search.smooth for i in ids]
+    chosen = 0
+    if smooth[0]:
+        simple = [k for k in range(1, len(ids)) if not smooth[k] and not lower(scored[0], scored[k])]
+        chosen = min(simple, default=0)
+    if ids[chosen] == present:
+        return None
+    if present in ids:
+        at = ids.index(present)
+        simpler = smooth[at] and not smooth[chosen]
+        if not simpler and scored[at].score < scored[chosen].score + LEAST_FALL:
+            return None
+    return chosen
+
+
+def lower(its: Scored, others: Scored) -> bool:
+    """Whether a score is below another by more than two paired standard errors."""
+    return worse(others.blocks, its.blocks, others.penalty - its.penalty)

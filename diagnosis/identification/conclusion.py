@@ -1,0 +1,187 @@
+"""The end of a search: what was found, with intervals, shares and confidence, all fitted together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..model import Model
+from ..model.uncertainty import omega_std
+from .candidates import model_error
+from .confidence import Evidence, confidence, evidence
+from .findings import Finding, Findings, Ranked, Suspect
+from .gram import Nuisance, gram_table
+from .map_regression import RIDGE, Scored, score
+from .prior import NominalPrior
+from .refinement import Estimate, TrainingSet, nuisance, refit
+
+SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class Place:
+    """An effect that was found, as long as its values still change.
+
+    Attributes:
+        id: of the effect.
+        names: of its parameters.
+        intervals: 95 % interval of each change point [s].
+        bagged: its probability beside the other candidates.
+        alike: ids that these data cannot tell from it.
+    """
+
+    id: str
+    names: Sequence[str]
+    intervals: Mapping[str, tuple[float, float]]
+    bagged: float
+    alike: Sequence[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search came to.
+
+    Attributes:
+        t: what it was fitted to.
+        at: the most likely model.
+        places: the effects found, in the order of acceptance.
+        ranked: candidates of the first step.
+        lacking: (K, 3), the first model error.
+    """
+
+    t: TrainingSet
+    at: Estimate
+    places: Sequence[Place]
+    ranked: Sequence[Ranked]
+    lacking: np.ndarray
+
+    @property
+    def model(self) -> Model:
+        """The most likely model."""
+        return self.at.model(self.t.prior)
+
+    @cached_property
+    def _along(self) -> Nuisance:
+        return nuisance(self.t, self.at, self.t.error(self.at))
+
+    def findings(self, ids: Sequence[str] | None = None) -> Findings:
+        """What was found, or the findings with some of the effects only, the rest fitted anew."""
+        kept = [p for p in self.places if ids is None or p.id in ids]
+        if len(kept) < len(self.places):
+            gone = {n for p in self.places if p not in kept for n in p.names}
+            at = self.at.without(gone)
+            at = refit(self.t, at, self._of(at)).estimate
+            return replace(self, at=at, places=kept).findings()
+        names, std = self.at.fitted, self._std()
+        nested, shares = self._nested()
+        effects = []
+        for k, p in enumerate(self.places):
+            values = {n: self.at.values[n] for n in p.names}
+            own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
+            seen = self._evidence(p)
+            effects.append(
+                Finding(
+                    p.id,
+                    values,
+                    dict(p.intervals) | own,
+                    confidence(seen),
+                    p.alike,
+                    sum(shares[: k + 1]),
+                    shares[k],
+                    nested[k],
+                    seen,
+                )
+            )
+        t = self.t
+        prior, believed = t.prior, any(self.t.prior.std.values())
+        moved = dict(zip(prior.mean, self.at.offset.tolist(), strict=True)) if believed else {}
+        return Findings(
+            effects,
+            self.ranked,
+            self.model if effects else self.at.start,
+            suspected(prior, self.at.offset, std[len(names) :]) if believed else [],
+            np.asarray(t.sigma),
+            self.at.without(self.at.values).model(prior) if believed and not effects else None,
+            moved,
+            self._scored(self.at, self._along).runs,
+            by_block(t.blocks, self.lacking * t.weight),
+            self.findings,
+        )
+
+    def _of(self, at: Estimate) -> Nuisance:
+        """Nuisance parameters of a part of the effects, by slopes beside all of them."""
+        names = [*self.at.fitted, *self.t.prior.mean]
+        kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
+        a = self._along
+        return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept])
+
+    def _std(self) -> np.ndarray:
+        """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
+        along, weight = self._along, self.t.weight
+        A = np.moveaxis(along.columns * weight[:, None], 2, 0).reshape(along.offset.size, -1).T
+        H = A.T @ A + along.precision
+        H += RIDGE * np.diag(np.diag(H) + 1.0)
+        return np.sqrt(np.diag(np.linalg.inv(H)))
+
+    def _nested(self) -> tuple[list[Model], list[float]]:
+        """The models with each effect and those before it, and its share of the first model error.
+
+        That is the fall of the cross-validated sum of squares; before the first effect stands the model
+        that the search started from.
+        """
+        t, models, shares = self.t, [], []
+        total = before = float(np.sum((self.lacking * t.weight) ** 2))
+        for k in range(len(self.places)):
+            at, along = self.at, self._along
+            later = {n for p in self.places[k + 1 :] for n in p.names}
+            if later:
+                at = at.without(later)
+                along = self._of(at)
+                at = refit(t, at, along).estimate
+                theta = [*[at.values[n] for n in at.fitted], *at.offset]
+                along = replace(along, offset=np.array(theta))
+            left = float(self._scored(at, along).blocks.sum())
+            models.append(at.model(t.prior))
+            shares.append((before - left) / total)
+            before = left
+        return models, shares
+
+    def _scored(self, at: Estimate, along: Nuisance) -> Scored:
+        """A model as it is, by fits to a part of the data, linear about it."""
+        t = self.t
+        table = gram_table(t.error(at), t.blocks, [], along, np.asarray(t.sigma))
+        return score(table, -1, 1)
+
+    def _evidence(self, p: Place) -> Evidence:
+        data, model = self.t.data, self.model
+        left = model_error(data, model)
+        without = model_error(data, self.at.without(p.names).model(self.t.prior))
+        std = np.concatenate([omega_std(w, model) for w in data])
+        return evidence(p.bagged, without - left, left, std, self.t.blocks)
+
+
+def by_block(blocks: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Sum of squares (blocks,) of an error (K, 3) in each of the blocks (K,)."""
+    return np.bincount(np.unique(blocks, return_inverse=True)[1], np.sum(error**2, axis=1))
+
+
+def interval(value: float, std: float) -> tuple[float, float]:
+    """95 % interval."""
+    return value - NORMAL_95 * std, value + NORMAL_95 * std
+
+
+def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray) -> list[Suspect]:
+    """Nominal coefficients whose posterior excludes what is believed of them, the furthest first.
+
+    Args:
+        prior: of all nominal coefficients.
+        offset, std: (q,), mean and standard deviation of the posterior, in prior standard deviations.
+    """
+    found = [
+        Suspect(name, float(k), prior.mean[name] + believed * float(k))
+        for (name, believed), k, s in zip(prior.std.items(), offset, std, strict=True)
+        if abs(k) > SUSPECT * s
+    ]
+    return sorted(found, key=lambda s: -abs(s.z))

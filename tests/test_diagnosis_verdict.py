@@ -1,0 +1,223 @@
+"""What a diagnosis says of what it does not know: remainder, verdict, withdrawal, confidence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.measured import NOISE, commands, smoothed
+from support.planted import bank, dead_bow, gusts, voyages
+
+import diagnosis
+from diagnosis import Model, Run, integrals, omega
+from diagnosis.assessment.recurrence import recurrence
+from diagnosis.assessment.remainder import axis_remainders
+from diagnosis.identification.acceptance import worse
+from diagnosis.identification.confidence import confidence, evidence
+from diagnosis.identification.findings import Finding, Findings
+from diagnosis.identification.map_regression import Scored, first_share
+from diagnosis.identification.prior import NominalPrior
+from diagnosis.identification.withdrawal import withdraw
+from diagnosis.model.correlation import correlated_windows
+from diagnosis.model.uncertainty import omega_std
+from diagnosis.report import diagnosis_content
+
+SHORT = {"count": 2, "seconds": 90.0}
+GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
+
+
+def left(runs, model=None):
+    """Remainder of a model, of which the nominal one is the first."""
+    first, model = Model(), model or Model()
+    before, after = ([omega(w, m) for w in runs] for m in (first, model))
+    return axis_remainders(runs, before, after, [omega_std(w, first) for w in runs])
+
+
+@pytest.mark.parametrize("noise", [1.0, pytest.param(10.0, marks=pytest.mark.slow)])
+def test_noise_alone_is_no_remainder(noise):
+    axes = left(voyages(**SHORT, noise=noise))
+    assert not any(a.significant for a in axes.values())
+    assert all(0.7 < a.rms / a.uncertainty < 1.3 for a in axes.values())
+
+
+def test_true_model_leaves_no_remainder():
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    assert left(runs)["X"].significant
+    assert not any(a.significant for a in left(runs, Model().plus({"delta_X_u": -3.0})).values())
+
+
+@pytest.fixture(scope="module")
+def lap():
+    """Windows of a run that laps an ellipse at a speed that changes, under commands of another period."""
+    t = np.arange(0.0, 240.0, 0.1)
+    along = 2.0 * np.pi * t / 47.0 + 0.8 * np.sin(2.0 * np.pi * t / 31.0)
+    ahead = np.unwrap(np.arctan2(2.0 * np.cos(along), -3.0 * np.sin(along)))
+    pose = np.column_stack([3.0 * np.cos(along), 2.0 * np.sin(along), ahead])
+    pose += NOISE * np.random.default_rng(0).standard_normal(pose.shape)
+    return [integrals(smoothed(Run("lap", t, pose, commands(t))))]
+
+
+@pytest.mark.parametrize("space", ["place", "motion", "command", None])
+def test_remainder_repeats_with_what_it_was_made_of(lap, space):
+    (w,) = lap
+    s = w.smoothed
+    slow = np.random.default_rng(1).standard_normal(s.time.size // 40 + 2)
+    force = {
+        "place": np.sin(2.0 * s.eta[:, 0]) * np.cos(1.5 * s.eta[:, 1]),
+        "motion": s.nu[:, 0] * np.abs(s.nu[:, 0]),
+        "command": np.maximum(w.run.tau_cmd[:, 0], 0.2),
+        None: np.interp(s.time, 4.0 * np.arange(slow.size), slow),
+    }[space]
+    left = (w.smooth @ np.nan_to_num(force))[:, None] * np.ones(3)
+    (how, *_) = recurrence(lap, left - left.mean(axis=0))
+    assert how.best == space
+    assert not how.in_part
+    assert how.lasts > 2.0
+
+
+def test_force_that_depends_on_the_place_is_a_remainder():
+    assert left(voyages(**SHORT, **BANK))["N"].significant
+
+
+@pytest.mark.slow
+def test_force_that_fails_at_times_is_told_by_its_command():
+    runs = voyages(**DEAD)
+    assert left(runs)["N"].significant
+    assert recurrence(runs, np.concatenate([omega(w, Model()) for w in runs]))[2].in_part
+
+
+def learned(runs, prior):
+    return diagnosis.diagnose(runs[:-1], runs[-1:], prior)
+
+
+def off(share):
+    """Every nominal coefficient that much off, to either side."""
+    values = NominalPrior.of(Model(), share)
+    parts = Model().ship.parameters
+    sign = np.random.default_rng(3).choice([-1.0, 1.0], values.size)
+    wrong = {n: v + s * values.std[n] for (n, v), s in zip(values.mean.items(), sign, strict=True)}
+    return {
+        "ship": {n: v for n, v in wrong.items() if n in parts["vessel"]},
+        "thrusters": {n: v for n, v in wrong.items() if n in parts["thrusters"]},
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.numerical
+def test_cause_that_no_candidate_has_is_unexplained():
+    found = learned(voyages(**GUSTS), 0.1)
+    assert found.verdict == "unexplained"
+    assert found.remainder.significant
+    assert found.learned.model.values == Model().values
+    content = diagnosis_content(found, None, [])
+    assert "gusts" in content.remainder.sentence
+    assert "Nothing is missing" not in content.sentence
+    assert content.remainder.axes["X"].rms > 20.0 * content.remainder.axes["X"].uncertainty
+
+
+@pytest.mark.slow
+@pytest.mark.numerical
+def test_wrong_coefficients_alone_are_written():
+    found = learned(voyages(**off(0.1)), 0.1)
+    assert found.verdict == "coefficients"
+    assert not found.remainder.significant
+    assert not found.learned.effects
+    held_out = found.comparison.evaluations[-1]
+    assert held_out.after.position < 0.2 * held_out.before.position
+    for s in found.learned.suspects:
+        assert found.learned.model.value(s.name) == pytest.approx(s.value)
+        assert abs(s.z) <= 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.numerical
+def test_coefficient_far_outside_of_the_prior_is_an_effect():
+    found = learned(voyages(ship={"X_u": 2.0 * Model().value("X_u")}), 0.1)
+    assert found.verdict == "found"
+    (effect,) = found.learned.effects
+    assert effect.id == "X_u"
+    assert effect.confidence > 0.95
+    assert effect.share > 0.9, "the share is that of the fall against the model before"
+    assert not found.remainder.significant
+
+
+@pytest.mark.slow
+@pytest.mark.numerical
+def test_thruster_that_fails_at_times_gives_no_sure_finding():
+    found = learned(voyages(**DEAD), 0.1)
+    assert found.remainder.significant
+    assert all(f.confidence < 0.8 for f in found.learned.effects)
+    for e in found.comparison.evaluations:
+        assert e.after.position < 1.5 * e.before.position
+
+
+def finding(start, **values):
+    (name,) = values
+    return Finding(name.removeprefix("delta_"), values, {}, 0.9, [], 0.5, 0.5, start.plus(values))
+
+
+def test_effect_that_spoils_unseen_runs_is_withdrawn_and_another_kept():
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    start = Model()
+    right, wrong = finding(start, delta_X_u=-3.0), finding(start, delta_N_r=1.0)
+    model = start.plus({"delta_X_u": -3.0, "delta_N_r": 1.0})
+    found = Findings([right, replace(wrong, model=model)], model=model, sigma=np.full(3, 0.01))
+    kept, gone = withdraw(found, runs[1:], start, lambda a, b: False)
+    assert [w.id for w in gone] == ["N_r"]
+    assert "held-out" in gone[0].reason
+    assert [f.id for f in kept.effects] == ["X_u"]
+    assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
+    assert withdraw(kept, runs[1:], start, lambda a, b: False) == (kept, [])
+
+
+def test_less_dissipation_needs_unseen_data_that_show_it():
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    start = Model()
+    found = Findings([finding(start, delta_N_uv=1e-6)], model=start, sigma=np.full(3, 0.01))
+    assert withdraw(found, runs, start, lambda a, b: False)[1] == []
+    assert [w.id for w in withdraw(found, runs, start, lambda a, b: True)[1]] == ["N_uv"]
+
+
+def test_worse_is_more_than_two_paired_standard_errors():
+    rng = np.random.default_rng(0)
+    loss, change = rng.exponential(100.0, 64), rng.standard_normal(64)
+    change -= change.mean()
+    assert not worse(loss + change + 0.1, loss)
+    assert worse(loss + change + 0.5, loss)
+    assert not worse(loss + change - 5.0, loss)
+
+
+def test_candidates_that_are_the_same_share_their_probability():
+    blocks = np.random.default_rng(0).exponential(10.0, 20)
+    one = Scored(0, 0, blocks, blocks, 0.0, 5.0)
+    far = replace(one, candidate=2, blocks=blocks + 10.0)
+    shares = first_share([one, replace(one, candidate=1), far], 200, np.random.default_rng(0))
+    assert shares == pytest.approx([0.5, 0.5, 0.0], abs=1e-6)
+
+
+def test_confidence_falls_with_what_is_left_and_where_the_size_varies():
+    rng = np.random.default_rng(0)
+    blocks = np.repeat(np.arange(40), 30)
+    std = np.full((1200, 3), 0.01)
+    force = np.zeros((1200, 3))
+    force[:, 0] = 0.2 * np.sin(np.arange(1200) / 7.0)
+    noise = std * rng.standard_normal((1200, 3))
+    sure = evidence(1.0, force, noise, std, blocks)
+    assert sure.left == sure.varies == 0.0
+    assert confidence(sure) > 0.95
+    amplitude = (1.0 + 0.5 * rng.standard_normal(40))[blocks, None]
+    unsteady = evidence(1.0, force, noise + (amplitude - 1.0) * force, std, blocks)
+    assert unsteady.varies == pytest.approx(0.5, rel=0.3)
+    assert confidence(unsteady) < 0.1
+
+
+def test_correlation_is_that_of_an_autoregression(lap):
+    """tau of x_k = a x_(k-1) + e is (1 + a) / (1 - a)."""
+    (w,) = lap
+    rng, a = np.random.default_rng(0), 0.7
+    found = []
+    for _ in range(5):
+        x = rng.standard_normal((20 * w.middle.size, 3))
+        for k in range(1, len(x)):
+            x[k] += a * x[k - 1]
+        found.append(correlated_windows([w] * 20, x))
+    assert np.mean(found) == pytest.approx((1 + a) / (1 - a), rel=0.25)
