@@ -41,7 +41,7 @@ FACTOR = 4.0
 WORSE = 0.05
 # Of U: a run whose commands show in every axis but for so little needs no other reading. Chosen.
 MISSING = 0.1
-# Of U: so much an axis may lack in the right reading. Chosen: where more is missing, no model judges.
+# Of U: so much an axis may lack in the right reading. Chosen: with more missing, no model is a judge.
 EXPLAINED = 0.5
 # Windows of the weak form that count as one. Derived: the correlations of their kernel sum to 3.7.
 OVERLAP = 4
