@@ -40,8 +40,9 @@ DIAGNOSIS_LAYERS = (
     ("identification", "assessment"),
     ("session",),
     ("report",),
+    ("analysis",),
     ("command_line",),
-    ("compare", "learn"),  # commands
+    ("compare", "learn", "pca", "pls", "sysid"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the tools.
 FMUS_LAYERS = (
