@@ -102,6 +102,7 @@ def test_commands_that_do_nothing_do_no_harm(seed):
         assert (rms((knowing.nu - true_nu())[INNER]) < 1.05 * rms((blind.nu - true_nu())[INNER])).all()
 
 
+@pytest.mark.slow
 @needs_data
 def test_every_run_of_the_real_ship_says_how_late_its_thrusters_are():
     late = [smooth(clean(read(path))).delay for path in sorted((DATA / "cse1").glob("*.mat"))]

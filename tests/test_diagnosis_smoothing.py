@@ -305,6 +305,7 @@ def test_band_of_the_inverse_is_that_of_the_inverse():
         np.testing.assert_allclose(variance(b, found)[:, c], expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 @needs_data
 def test_measured_runs_are_smoothed():
     for path in sorted((DATA / "cse1").glob("*.mat")):

@@ -231,6 +231,7 @@ def test_defaults_are_the_nominal_model():
     assert parameters(THRUSTERS, {}) == THRUSTERS.params()
 
 
+@pytest.mark.slow
 @needs_data
 def test_measured_runs_are_predicted():
     runs = [smooth(clean(read(path))) for path in sorted((DATA / "cse1").glob("*.mat"))]

@@ -27,7 +27,7 @@ class Gains(NamedTuple):
     filter_period: Annotated[float, "s", "sampling period that b belongs to", Range(1e-6)] = 0.01
 
 
-class Motion(NamedTuple):
+class MotionState(NamedTuple):
     """Pose, heading continuous over turns, and body-fixed velocity."""
 
     x: Any = 0.0
@@ -40,30 +40,30 @@ class Motion(NamedTuple):
 
 class State(NamedTuple):
     seen: Seen = Seen()
-    motion: Motion = Motion()
+    motion: MotionState = MotionState()
     acceleration: Acceleration = Acceleration()
 
 
 def start(i: Inputs) -> State:
     """At rest where the first sample shows the ship."""
     seen = first_look(i.measurement)
-    return State(seen, Motion(seen.x_m, seen.y_m, seen.psi_m))
+    return State(seen, MotionState(seen.x_m, seen.y_m, seen.psi_m))
 
 
-def moved(m: Motion, h: Number) -> Motion:
+def moved(m: MotionState, h: Number) -> MotionState:
     """The pose after h [s] at the present velocity, (4.47)."""
     x_dot, y_dot = rotate_to_earth(m.psi, m.u, m.v)
     return m._replace(x=m.x + h * x_dot, y=m.y + h * y_dot, psi=m.psi + h * m.r)
 
 
-def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
+def corrected(m: MotionState, s: Sample, k: Gains, h: Number) -> MotionState:
     """A prediction corrected by a good sample, (4.48); by any other, nothing but a fading velocity."""
     dx, dy, dpsi = s.x - m.x, s.y - m.y, s.psi - m.psi
     ahead, aside = rotate_to_body(m.psi, dx, dy)
     gain = where(s.good, h, 0.0)
     # With nothing to correct it for long, a velocity is worth less and less.
     keep = where(s.overdue, 1.0 - weight(k.b, h, k.filter_period), 1.0)
-    on = Motion(
+    on = MotionState(
         m.x + gain * k.k1_x * dx,
         m.y + gain * k.k1_y * dy,
         m.psi + gain * k.k1_psi * dpsi,
@@ -72,7 +72,7 @@ def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
         clip(keep * m.v + gain * k.k2_v * aside, -k.u_max, k.u_max),
         clip(keep * m.r + gain * k.k2_r * dpsi, -k.r_max, k.r_max),
     )
-    return Motion(
+    return MotionState(
         where(s.first, s.x, on.x),
         where(s.first, s.y, on.y),
         where(s.first, s.psi, on.psi),
@@ -83,7 +83,7 @@ def corrected(m: Motion, s: Sample, k: Gains, h: Number) -> Motion:
 
 
 def estimated(
-    s: State, seen: Seen, after: Motion, good: Number, k: Gains, h: Number
+    s: State, seen: Seen, after: MotionState, good: Number, k: Gains, h: Number
 ) -> tuple[State, Estimate]:
     """State and outputs after a step that ends in ``after``."""
     nu = (after.u, after.v, after.r)

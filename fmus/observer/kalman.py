@@ -19,7 +19,7 @@ from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number, choose, clip, exp, finite, fmax, when, where
 from ..signals import Estimate, Force
 from .axis import MOST, Axis, Learning, Rates, later, rates, taken
-from .correction import Motion
+from .correction import MotionState
 from .derivative import Acceleration
 from .screen import Inputs, Sample, Screening, Seen, first_look, limited, look
 
@@ -58,7 +58,7 @@ class Params(NamedTuple):
 class Belief(NamedTuple):
     """Pose and velocity, and what is known on each body axis."""
 
-    motion: Motion = Motion()
+    motion: MotionState = MotionState()
     surge: Axis = Axis()
     sway: Axis = Axis()
     yaw: Axis = Axis()
@@ -71,7 +71,9 @@ class State(NamedTuple):
     refused: Any = 0.0
 
 
-def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> tuple[Motion, Acceleration]:
+def predicted(
+    s: State, tau: Force, hull: Hull, keep: Number, h: Number
+) -> tuple[MotionState, Acceleration]:
     """Pose and velocity after h [s] of a force, and nu_dot by the model alone.
 
     This is the midpoint method, halfway by the old acceleration; it needs the model once a step. Where
@@ -84,7 +86,7 @@ def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> tupl
     X, Y, N = motion(um, vm, rm, tau, hull)
     x_dot, y_dot = rotate_to_earth(psi + half * r, um, vm)
     gain = where(keep < 1.0, 0.0, h)
-    return Motion(
+    return MotionState(
         x + h * x_dot,
         y + h * y_dot,
         psi + h * rm,
@@ -94,7 +96,7 @@ def predicted(s: State, tau: Force, hull: Hull, keep: Number, h: Number) -> tupl
     ), Acceleration(X, Y, N)
 
 
-def believed(s: State, ahead: Motion, keep: Number, p: Params, k: Rates, h: Number) -> Belief:
+def believed(s: State, ahead: MotionState, keep: Number, p: Params, k: Rates, h: Number) -> Belief:
     """What is believed after h [s], before the sample of that instant."""
     _, surge, sway, yaw = s.belief
     n = p.noise
@@ -121,7 +123,7 @@ def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number
     sway, dy, dv = taken(b.sway, aside, position, k)
     yaw, dpsi, dr = taken(b.yaw, turn, heading, k)
     x, y = rotate_to_earth(m.psi, dx, dy)
-    after = Motion(
+    after = MotionState(
         m.x + x,
         m.y + y,
         m.psi + dpsi,
@@ -142,7 +144,7 @@ def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number
 
 def init(i: Inputs, p: Params) -> State:
     seen = first_look(i.measurement)
-    return State(seen, Belief(Motion(seen.x_m, seen.y_m, seen.psi_m)))
+    return State(seen, Belief(MotionState(seen.x_m, seen.y_m, seen.psi_m)))
 
 
 def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
@@ -162,7 +164,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     elsewhere = sample.first | (refused > p.rejection.jump_time)
     belief = when(
         elsewhere,
-        lambda: Belief(Motion(sample.x, sample.y, finite(sample.psi, 0.0))),
+        lambda: Belief(MotionState(sample.x, sample.y, finite(sample.psi, 0.0))),
         lambda: choose(fits, after, before),
     )
     m = belief.motion

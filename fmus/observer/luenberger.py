@@ -12,7 +12,7 @@ from ..declare import Component
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number
 from ..signals import Estimate, Force
-from .correction import Gains, Motion, State, corrected, estimated, moved, start
+from .correction import Gains, MotionState, State, corrected, estimated, moved, start
 from .screen import Inputs, Screening, limited, look
 
 
@@ -23,7 +23,7 @@ class Params(NamedTuple):
     damping: Damping = Damping()
 
 
-def accelerate(m: Motion, tau: Force, p: Params, h: Number) -> Motion:
+def accelerate(m: MotionState, tau: Force, p: Params, h: Number) -> MotionState:
     """The velocity after h [s] of a force, by the model."""
     hull = Hull(p.inertia, inverse_mass(p.inertia), p.damping)
     u_dot, v_dot, r_dot = motion(m.u, m.v, m.r, limited(tau), hull)
