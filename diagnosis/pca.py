@@ -1,4 +1,4 @@
-"""Principal components and outliers of measured runs: ``python -m diagnosis.pca RUN...``, 3.1 and 7.3."""
+"""Principal components and outliers of runs: ``python -m diagnosis.pca RUN...``, 3.1 and 7.3."""
 
 if __name__ == "__main__":
     from cosim.interrupts import leave_on_interrupt
@@ -49,7 +49,9 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "mdf",
     )
-    made.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log")
+    made.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
+    )
     made.add_argument(
         "--components",
         type=int,

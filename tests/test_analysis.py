@@ -18,7 +18,9 @@ NAMES = list("abcdef")
 
 def low_rank(n=400, m=6, rank=3, seed=0, noise=0.1):
     rng = np.random.default_rng(seed)
-    return rng.normal(size=(n, rank)) @ rng.normal(size=(rank, m)) + noise * rng.normal(size=(n, m)) + 5.0
+    return (
+        rng.normal(size=(n, rank)) @ rng.normal(size=(rank, m)) + noise * rng.normal(size=(n, m)) + 5.0
+    )
 
 
 def made(n=1600, seed=0, law=None):
@@ -138,7 +140,9 @@ class TestBases:
         names = [str(n) for n in t.get_feature_names_out()]
         assert names == [*NU, *TAU, "|u|u", "|u|v", "|u|r", "|v|v", "|v|r", "|r|r", "|r|v"]
         x = np.array([[0.1, -0.2, -0.3, 1.0, 2.0, 3.0]])
-        assert t.fit_transform(x)[0, 6:] == pytest.approx([0.01, -0.02, -0.03, -0.04, -0.06, -0.09, -0.06])
+        assert t.fit_transform(x)[0, 6:] == pytest.approx(
+            [0.01, -0.02, -0.03, -0.04, -0.06, -0.09, -0.06]
+        )
 
     def test_transformers_work_in_a_pipeline_and_a_grid_search(self):
         base = pytest.importorskip("sklearn.base")
@@ -159,7 +163,9 @@ class TestPls:
         G = Z.T @ Z
         assert np.allclose(G, np.diag(np.diag(G)), atol=1e-6 * G.max())
         X = (found.X - found.X.mean(axis=0)) / found.X.std(axis=0, ddof=1)
-        assert np.abs(Z.T @ (X - Z @ P.T)).max() < 1e-6 * np.abs(G).max(), "E is orthogonal to the scores"
+        assert np.abs(Z.T @ (X - Z @ P.T)).max() < 1e-6 * np.abs(G).max(), (
+            "E is orthogonal to the scores"
+        )
         assert found.predicted == pytest.approx(m.predict(found.X))
 
     def test_all_factors_give_least_squares(self):
@@ -218,8 +224,15 @@ class TestPls:
 
 def test_model_error_of_the_control_model_is_the_rotational_damping():
     """(7.7): with the true plant of Table 2.1, omega is what (2.27) leaves out."""
-    from fmus.hull import Hull, Inertia, RotationalDamping, inverse_mass, motion, rotational_damping_force
-    from fmus.hull import Damping
+    from fmus.hull import (
+        Damping,
+        Hull,
+        Inertia,
+        RotationalDamping,
+        inverse_mass,
+        motion,
+        rotational_damping_force,
+    )
     from fmus.signals import Force
 
     rng = np.random.default_rng(6)

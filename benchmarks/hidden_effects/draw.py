@@ -23,7 +23,7 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "bow exp(-(u/u0)^2)": ("bow_speed_loss", "curve_bow(|u|)"),
     "delay off the grid": ("delay",),
 }
-SINGLE = [*STANDARD, *FOREIGN]
+SINGLE = [*(e.id for e in STANDARD.values() if e.search.by != "given"), *FOREIGN]
 Scaled = Callable[[float], dict[str, float]]
 
 

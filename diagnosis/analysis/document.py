@@ -1,4 +1,4 @@
-"""The report of an analysis: sections of text, tables and figures in one HTML page, in the report's style."""
+"""The report of an analysis: text, tables and figures in one HTML page, in the style of the report."""
 
 import json
 import math

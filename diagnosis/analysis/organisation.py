@@ -6,7 +6,7 @@ Columns of a state over its range, Table 1 (the y limits there are swapped; corr
 - :class:`NominalBins`: 1 in the bin that the state lies in, else 0, (3.18), corrected;
 - :class:`ContinuousNominal`: resolution + 1 triangles that sum to one, (3.19)-(3.20), corrected.
 
-They say nothing of the response, so that fitting them on all data before a cross-validation leaks nothing.
+They learn nothing of the response: fitting them before a cross-validation leaks nothing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,9 +44,7 @@ TABLE_1: Mapping[str, StateRange] = {
 try:
     from sklearn.base import BaseEstimator, TransformerMixin
 except ModuleNotFoundError:
-    raise InputError(
-        "PLS needs scikit-learn: pip install 'cybership[analysis]'"
-    ) from None
+    raise InputError("PLS needs scikit-learn: pip install 'cybership[analysis]'") from None
 
 
 class QuadraticExtension(TransformerMixin, BaseEstimator):
@@ -99,9 +97,7 @@ class _Ranged(TransformerMixin, BaseEstimator):
         ranges: state -> range and resolution.
     """
 
-    def __init__(
-        self, names: Sequence[str], ranges: Mapping[str, StateRange] = TABLE_1
-    ) -> None:
+    def __init__(self, names: Sequence[str], ranges: Mapping[str, StateRange] = TABLE_1) -> None:
         self.names = names
         self.ranges = ranges
 
@@ -117,7 +113,10 @@ class _Ranged(TransformerMixin, BaseEstimator):
     def transform(self, X: np.ndarray) -> np.ndarray:
         """The columns of all states side by side."""
         return np.hstack(
-            [self.basis(x, self.ranges[n]) for n, x in zip(self.names, np.asarray(X, float).T, strict=True)]
+            [
+                self.basis(x, self.ranges[n])
+                for n, x in zip(self.names, np.asarray(X, float).T, strict=True)
+            ]
         )
 
     def get_feature_names_out(self, input_features: Any = None) -> np.ndarray:
@@ -137,7 +136,7 @@ class _Ranged(TransformerMixin, BaseEstimator):
 
 
 class NominalBins(_Ranged):
-    """One column for each bin, 1 where the state lies in it, (3.18): ``resolution`` bins of equal width."""
+    """One column for each of ``resolution`` bins, 1 where the state lies in it, (3.18), corrected."""
 
     @staticmethod
     def centres(s: StateRange) -> np.ndarray:

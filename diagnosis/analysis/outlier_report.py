@@ -99,12 +99,12 @@ def sentences(a: Analysed) -> Iterator[str]:
     m = a.model
     yield (
         f"{m.kept} components explain {percent(m.explained[m.kept - 1])} of the variance of "
-        f"{len(VARIABLES)} variables in {m.samples} samples (cross-validated {percent(a.q2[m.kept - 1])})."
+        f"{len(VARIABLES)} variables in {m.samples} samples, cross-validated {percent(a.q2[m.kept - 1])}."
     )
     gone = int((~a.kept).sum())
     yield (
-        f"Beyond the 99 % limits of T² ({number(m.t2_limit)}) or Q ({number(m.q_limit)}): {gone} samples, "
-        f"{100.0 * gone / m.samples:.1f} %, in {len(a.removed)} places."
+        f"Beyond the 99 % limits of T² ({number(m.t2_limit)}) or Q ({number(m.q_limit)}): {gone} "
+        f"samples, {100.0 * gone / m.samples:.1f} %, in {len(a.removed)} places."
     )
 
 
@@ -117,17 +117,14 @@ def document(a: Analysed, estimates: str) -> Document:
     share = Section(
         "Components",
         [
-            "Columns are centred and divided by their standard deviations. R² is the share of the variance "
-            f"that the first components explain, Q² the same of {BLOCKS} sequential blocks, each left out in "
-            "turn and projected on loadings found without it, (3.13)-(3.15).",
+            "Columns are centred and divided by their standard deviations. R² is the share of the "
+            f"variance that the first components explain, Q² the same of {BLOCKS} sequential blocks, each "
+            "left out in turn and projected on loadings found without it, (3.13)-(3.15).",
         ],
         [
             Table(
                 ["components", "R²", "Q²"],
-                [
-                    [str(k + 1), *numbers([m.explained[k], a.q2[k]], 4)]
-                    for k in range(len(VARIABLES))
-                ],
+                [[str(k + 1), *numbers([m.explained[k], a.q2[k]], 4)] for k in range(len(VARIABLES))],
             ),
             Table(
                 ["variable", *(f"p{k + 1}" for k in range(m.kept))],
@@ -145,16 +142,21 @@ def document(a: Analysed, estimates: str) -> Document:
         ],
     )
     rows = [
-        [s.run[r.first], *numbers([s.time[r.first], s.time[r.last]], 6), r.last - r.first + 1, r.why]
-        + [r.variable]
+        [
+            s.run[r.first],
+            *numbers([s.time[r.first], s.time[r.last]], 6),
+            r.last - r.first + 1,
+            r.why,
+            r.variable,
+        ]
         for r in sorted(a.removed, key=lambda r: r.first - r.last)[:LISTED]
     ]
     listed = f" The {LISTED} longest of {len(a.removed)} are listed." if len(a.removed) > LISTED else ""
     gone = Section(
         "Outliers",
         [
-            "T² is how far a sample is within the model's plane, in variances of the scores; Q its squared "
-            "distance from that plane. Limits: F distribution, and Jackson and Mudholkar (1979). Good "
+            "T² is how far a sample is within the model's plane, in variances of the scores; Q its "
+            "squared distance from that plane. Limits: F distribution, and Jackson and Mudholkar (1979). Good "
             "samples exceed either one once in a hundred." + listed,
         ],
         [Table(["run", "from [s]", "to [s]", "samples", "why", "variable"], rows)] if rows else [],

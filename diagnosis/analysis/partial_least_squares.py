@@ -1,6 +1,6 @@
 """Partial least squares of the model error, 3.1.3 and 7.3, cross-validated over sequential blocks.
 
-    X = Z P_x^T + E_x,  Y = Z P_y^T + E_y,  Z = X W (P_x^T W)^-1,  y = c + B x     (3.10)-(3.11), corrected
+    X = Z P_x^T + E_x,  Y = Z P_y^T + E_y,  Z = X W (P_x^T W)^-1,  y = c + B x    (3.10)-(3.11), corrected
 
 Columns are centred and divided by their standard deviations. scikit-learn regresses (NIPALS).
 """
@@ -81,7 +81,7 @@ class Fitted:
         c, B: of y = c + B x.
         std: (p, m), standard deviation of B over the folds.
         sign_changes: (p, m), folds in which the sign is another.
-        r2, q2: (p,), explained and cross-validated share of the variance.
+        r2, q2: (p,), explained and cross-validated share of the sum of squares about the mean.
         by_factors: (most, p), q2 of 1 ... most factors.
     """
 
@@ -148,10 +148,7 @@ def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) 
     most = min(recipe.factors or recipe.most, np.linalg.matrix_rank(X - X.mean(axis=0)))
     error = press(X, y, most)
     factors = min(recipe.factors or enough(error), most)
-    total = sum(
-        np.sum((y[rows] - np.delete(y, rows, axis=0).mean(axis=0)) ** 2, axis=0)
-        for rows in sequential(len(y))
-    )
+    total = np.sum((y - y.mean(axis=0)) ** 2, axis=0)
     m = regression(X, y, factors)
     c, B = plain(m)
     each = np.array([plain(f)[1] for f in folds(X, y, factors)])
@@ -164,7 +161,7 @@ def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) 
         B,
         each.std(axis=0, ddof=1),
         np.sum(each * B < 0.0, axis=0),
-        1.0 - left / np.sum((y - y.mean(axis=0)) ** 2, axis=0),
+        1.0 - left / total,
         1.0 - error[factors - 1] / total,
         1.0 - error / total,
     )

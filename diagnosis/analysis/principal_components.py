@@ -84,7 +84,7 @@ def standardise(X: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray
     mean, scale = X.mean(axis=0), X.std(axis=0, ddof=1)
     flat = [n for n, s, m in zip(names, scale, mean, strict=True) if not s > 1e-9 * max(abs(m), 1e-6)]
     if flat:
-        raise InputError(f"constant over all samples, so that nothing can be said of it: {', '.join(flat)}")
+        raise InputError(f"constant over all samples, which tells nothing: {', '.join(flat)}")
     return mean, scale
 
 

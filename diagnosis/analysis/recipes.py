@@ -72,7 +72,5 @@ def recipe(name: str) -> Recipe:
         InputError: there is none.
     """
     if name not in RECIPES:
-        raise InputError(
-            f"no recipe '{name}'{nearest(name, RECIPES)}; there are {', '.join(RECIPES)}"
-        )
+        raise InputError(f"no recipe '{name}'{nearest(name, RECIPES)}; there are {', '.join(RECIPES)}")
     return RECIPES[name]

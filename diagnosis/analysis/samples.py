@@ -1,4 +1,4 @@
-"""Samples of a measured run for multivariate analysis: velocity, acceleration, force, model error (7.7)."""
+"""Samples of a measured run for the analyses: velocity, acceleration, force, model error (7.7)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +18,7 @@ from fmus.signals import Measurement
 from ..data import Run, Track, clean, read
 from ..progress import Advance, silent
 from ..smoothing import smooth
+from .principal_components import outliers, principal_components
 
 ESTIMATES = ("smoothed", "mdf")
 NU = ("u", "v", "r")
@@ -65,7 +66,7 @@ class Samples:
 
 
 def model_error(nu: np.ndarray, nu_dot: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """omega = M nu_dot + C(nu) nu + g(nu) - tau (n, 3) [N, N, N m], (7.7), of the control model (2.27)."""
+    """omega = M nu_dot + C(nu) nu + g(nu) - tau (n, 3) [N, N, N m], (7.7), of control model (2.27)."""
     error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
     return np.column_stack(np.broadcast_arrays(*error))
 
@@ -76,6 +77,17 @@ def joined(parts: Sequence[Samples]) -> Samples:
     return Samples(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
+def without_outliers(samples: Samples) -> Samples:
+    """The samples within the limits of a PCA of model error, velocity and force (7.3).
+
+    Raises:
+        InputError: a column is constant.
+    """
+    X = np.hstack([samples.omega, samples.nu, samples.tau])
+    model = principal_components(X, [*OMEGA, *NU, *TAU])
+    return samples.rows(~outliers(model, X))
+
+
 def gather_samples(
     paths: Sequence[str | Path], estimates: str = "smoothed", advance: Advance = silent
 ) -> list[Samples]:
@@ -83,8 +95,8 @@ def gather_samples(
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`.
-        estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out; ``mdf``:
-            by the thesis' causal derivative filter, spikes and lag included.
+        estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out;
+            ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
         advance: progress callback.
 
     Returns:

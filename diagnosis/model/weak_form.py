@@ -161,6 +161,7 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
         return w.held @ thrust(w.run, response.of(model), nu)
 
     driven = w.recall("driven", drive, force)
+    driven = driven @ model.effective_thrust.T
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 

@@ -5,11 +5,12 @@ from . import (
     environment,
     force,
     inertia,
+    linear_map,
     measurement,
     thrust_curves,
     thruster_dynamics,
 )
-from .effect import Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect import Effect, Loaded, Memory, Motion, Running, Search, Thrust, Wording, effect
 from .effect_set import EffectSet, effects_of
 from .families import Family
 
@@ -18,6 +19,7 @@ __all__ = [
     "Effect",
     "EffectSet",
     "Family",
+    "Loaded",
     "Memory",
     "Motion",
     "Running",
@@ -37,6 +39,7 @@ STANDARD = EffectSet(
         thruster_dynamics,
         environment,
         force,
+        linear_map,
         inertia,
         measurement,
     )
