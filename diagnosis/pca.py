@@ -8,7 +8,6 @@ if __name__ == "__main__":
 import argparse
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 from cosim.command import run_command
 
@@ -48,9 +47,6 @@ def _parser() -> argparse.ArgumentParser:
         "           python -m diagnosis.pca run1.csv run2.csv --components 4 --out results/outliers\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "mdf",
-    )
-    made.add_argument(
-        "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
     )
     made.add_argument(
         "--components",

@@ -8,7 +8,6 @@ if __name__ == "__main__":
 import argparse
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
 from cosim.command import run_command
 
@@ -71,9 +70,6 @@ def _parser() -> argparse.ArgumentParser:
         "recipes:   PLS1 to PLS4 of Table 7.2; nominal, continuous: 3.2.2, 3.2.3\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "smoothed",
-    )
-    made.add_argument(
-        "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
     )
     made.add_argument("--recipe", default="PLS3", metavar="NAME", help="how X is made (PLS3)")
     made.add_argument(

@@ -101,7 +101,7 @@ class TestComponents:
     def test_constant_columns_and_too_few_samples_are_told(self):
         X = low_rank()
         X[:, 2] = 3.0
-        with pytest.raises(InputError, match="constant.*: c$"):
+        with pytest.raises(InputError, match=r"constant.*: c$"):
             pc.principal_components(X, NAMES)
         with pytest.raises(InputError, match="too few"):
             pc.principal_components(low_rank(8), NAMES)
@@ -216,7 +216,7 @@ class TestPls:
             recipe("PLS9")
         s = made()
         s.tau[:, 1] = 0.0
-        with pytest.raises(InputError, match="constant.*tau_Y"):
+        with pytest.raises(InputError, match=r"constant.*tau_Y"):
             pls.regressed(s, recipe("PLS2"))
         with pytest.raises(InputError, match="too few"):
             pls.regressed(made(n=100), recipe("PLS2"))

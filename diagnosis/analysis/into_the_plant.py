@@ -46,8 +46,8 @@ class EffectiveThrust:
         real = ", ".join(number(float(x.real)) for x in sorted(self.eigenvalues, key=lambda x: x.real))
         if self.holds:
             return (
-                f"Thrust: sym(I + B_τ) ≥ {number(self.least)} > {EPSILON}, eigenvalues of I + B_τ {real}: "
-                "every force acts towards where it is asked for."
+                f"Thrust: sym(I + B_τ) ≥ {number(self.least)} > {EPSILON}, eigenvalues of I + B_τ "
+                f"{real}: every force acts towards where it is asked for."
             )
         if min(x.real for x in self.eigenvalues) <= 0.0:
             return (

@@ -99,7 +99,8 @@ def sentences(a: Analysed) -> Iterator[str]:
     m = a.model
     yield (
         f"{m.kept} components explain {percent(m.explained[m.kept - 1])} of the variance of "
-        f"{len(VARIABLES)} variables in {m.samples} samples, cross-validated {percent(a.q2[m.kept - 1])}."
+        f"{len(VARIABLES)} variables in {m.samples} samples, "
+        f"cross-validated {percent(a.q2[m.kept - 1])}."
     )
     gone = int((~a.kept).sum())
     yield (
@@ -118,8 +119,8 @@ def document(a: Analysed, estimates: str) -> Document:
         "Components",
         [
             "Columns are centred and divided by their standard deviations. R² is the share of the "
-            f"variance that the first components explain, Q² the same of {BLOCKS} sequential blocks, each "
-            "left out in turn and projected on loadings found without it, (3.13)-(3.15).",
+            f"variance that the first components explain, Q² the same of {BLOCKS} sequential blocks, "
+            "each left out in turn and projected on loadings found without it, (3.13)-(3.15).",
         ],
         [
             Table(
@@ -156,8 +157,8 @@ def document(a: Analysed, estimates: str) -> Document:
         "Outliers",
         [
             "T² is how far a sample is within the model's plane, in variances of the scores; Q its "
-            "squared distance from that plane. Limits: F distribution, and Jackson and Mudholkar (1979). Good "
-            "samples exceed either one once in a hundred." + listed,
+            "squared distance from that plane. Limits: F distribution, and Jackson and Mudholkar "
+            "(1979). Good samples exceed either one once in a hundred." + listed,
         ],
         [Table(["run", "from [s]", "to [s]", "samples", "why", "variable"], rows)] if rows else [],
         [

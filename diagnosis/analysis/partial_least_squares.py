@@ -1,6 +1,6 @@
 """Partial least squares of the model error, 3.1.3 and 7.3, cross-validated over sequential blocks.
 
-    X = Z P_x^T + E_x,  Y = Z P_y^T + E_y,  Z = X W (P_x^T W)^-1,  y = c + B x    (3.10)-(3.11), corrected
+    X = Z P_x^T + E_x,  Y = Z P_y^T + E_y,  Z = X W (P_x^T W)^-1,  y = c + B x   (3.10)-(3.11), corrected
 
 Columns are centred and divided by their standard deviations. scikit-learn regresses (NIPALS).
 """
@@ -15,7 +15,7 @@ from cosim import InputError
 
 from .principal_components import BLOCKS, sequential, standardise
 from .recipes import Recipe
-from .samples import OMEGA, Samples
+from .samples import NU, OMEGA, TAU, Samples
 
 AXES = ("X", "Y", "N")
 
@@ -174,7 +174,7 @@ def regressed(samples: Samples, recipe: Recipe) -> Regressed:
         InputError: scikit-learn is missing, a column is constant, or there are too few samples.
     """
     transformer = recipe.transformer()
-    states = dict(zip(("u", "v", "r", "tau_X", "tau_Y", "tau_N"), samples.x.T, strict=True))
+    states = dict(zip([*NU, *TAU], samples.x.T, strict=True))
     given = np.column_stack([states[name] for name in recipe.columns])
     standardise(given, list(recipe.columns))
     standardise(samples.omega, list(OMEGA))
