@@ -35,7 +35,7 @@ def made(n=1600, seed=0, law=None):
 class TestComponents:
     def test_scores_are_orthogonal_and_data_is_scores_times_loadings_plus_residual(self):
         X = low_rank()
-        m = pc.principal_components(X, NAMES, 3)
+        m = pc.fit_components(X, NAMES, 3)
         T, P = m.scores(X), m.loadings[:, :3]
         G = T.T @ T
         assert np.allclose(G, np.diag(np.diag(G)), atol=1e-8 * G.max())
@@ -49,7 +49,7 @@ class TestComponents:
     def test_as_scikit_learn_and_nipals(self):
         decomposition = pytest.importorskip("sklearn.decomposition")
         X = low_rank(seed=1)
-        m = pc.principal_components(X, NAMES, 2)
+        m = pc.fit_components(X, NAMES, 2)
         Z = (X - m.mean) / m.scale
         other = decomposition.PCA().fit(Z)
         assert m.variance == pytest.approx(other.explained_variance_)
@@ -65,11 +65,11 @@ class TestComponents:
         rng = np.random.default_rng(2)
         mix = rng.normal(size=(9, 9)) * np.linspace(2.0, 0.2, 9)[:, None]
         X = rng.normal(size=(100_000, 9)) @ mix
-        m = pc.principal_components(X, list("abcdefghi"))
+        m = pc.fit_components(X, list("abcdefghi"))
         assert np.mean(m.t2(X) > m.t2_limit) == pytest.approx(0.01, abs=0.001)
         # Jackson and Mudholkar approximate; of a few uneven variances they are on the safe side.
         assert np.mean(m.q(X) > m.q_limit) == pytest.approx(0.01, abs=0.003)
-        four = pc.principal_components(X, list("abcdefghi"), 4)
+        four = pc.fit_components(X, list("abcdefghi"), 4)
         assert four.t2_limit == pytest.approx(stats.chi2.ppf(0.99, 4), rel=1e-3)
 
     def test_injected_spikes_are_removed_and_hardly_anything_else(self):
@@ -77,7 +77,7 @@ class TestComponents:
         rng = np.random.default_rng(4)
         spikes = rng.choice(5000, 25, replace=False)
         X[spikes, rng.integers(0, 6, 25)] += 10.0 * X.std(axis=0).max()
-        m = pc.principal_components(X, NAMES, 3)
+        m = pc.fit_components(X, NAMES, 3)
         bad = pc.outliers(m, X)
         assert bad[spikes].all()
         assert np.mean(np.delete(bad, spikes)) < 0.02
@@ -91,7 +91,7 @@ class TestComponents:
             press = total = 0.0
             for k in range(4):
                 test, rest = X[20 * k : 20 * k + 20], np.delete(X, np.s_[20 * k : 20 * k + 20], axis=0)
-                m = pc.principal_components(rest, NAMES, min(a, 5))
+                m = pc.fit_components(rest, NAMES, min(a, 5))
                 Z = (test - m.mean) / m.scale
                 P = m.loadings[:, :a]
                 press += np.sum((Z - Z @ P @ P.T) ** 2)
@@ -102,11 +102,11 @@ class TestComponents:
         X = low_rank()
         X[:, 2] = 3.0
         with pytest.raises(InputError, match=r"constant.*: c$"):
-            pc.principal_components(X, NAMES)
+            pc.fit_components(X, NAMES)
         with pytest.raises(InputError, match="too few"):
-            pc.principal_components(low_rank(8), NAMES)
+            pc.fit_components(low_rank(8), NAMES)
         with pytest.raises(InputError, match="1 to 5"):
-            pc.principal_components(low_rank(), NAMES, 6)
+            pc.fit_components(low_rank(), NAMES, 6)
 
 
 class TestBases:
@@ -210,6 +210,14 @@ class TestPls:
         found = pls.regressed(made(), recipe("continuous"))
         assert set(found.clipped) == {*NU, *TAU}
         assert found.clipped["u"] > 0.05
+
+    def test_a_missing_library_is_told_with_its_line_for_pip(self, monkeypatch):
+        import sys
+
+        monkeypatch.setitem(sys.modules, "sklearn.base", None)
+        monkeypatch.delitem(sys.modules, "diagnosis.analysis.organisation")
+        with pytest.raises(InputError, match=r"pip install 'cybership\[analysis\]'"):
+            recipe("PLS3").transformer()
 
     def test_bad_input_is_told(self):
         with pytest.raises(InputError, match="no recipe 'PLS9'"):

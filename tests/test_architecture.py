@@ -95,6 +95,7 @@ PUBLIC_OF_FMUS = (
 COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel")
 PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
+    "diagnosis.analysis",
     "diagnosis.assessment",
     "diagnosis.data",
     "diagnosis.identification",

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from ..report.formatting import number, percent
-from . import pictures
+from . import analysis_figures as pictures
 from .document import Document, Plot, Section, Table, numbers
 from .principal_components import (
     BLOCKS,
     LEVEL,
     PrincipalComponents,
     Removed,
+    fit_components,
     outliers,
-    principal_components,
     removals,
     validated,
 )
@@ -58,7 +58,7 @@ def analyse(runs: Sequence[Samples], components: int | None = None) -> Analysed:
     """
     s = joined(runs)
     X = np.hstack([s.omega, s.nu, s.tau])
-    model = principal_components(X, VARIABLES, components)
+    model = fit_components(X, VARIABLES, components)
     removed = removals(model, X, VARIABLES, s.run)
     return Analysed(s, X, model, validated(X, VARIABLES), removed, ~outliers(model, X))
 

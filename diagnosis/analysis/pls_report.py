@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..report.formatting import number, percent
-from . import pictures
+from . import analysis_figures as pictures
 from .document import Document, Plot, Section, Table, numbers
 from .into_the_plant import EffectiveThrust, effective_thrust, force_columns, goes_into_the_plant
 from .partial_least_squares import AXES, Fitted, Regressed

@@ -88,9 +88,7 @@ def standardise(X: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray
     return mean, scale
 
 
-def principal_components(
-    X: np.ndarray, names: list[str], kept: int | None = None
-) -> PrincipalComponents:
+def fit_components(X: np.ndarray, names: list[str], kept: int | None = None) -> PrincipalComponents:
     """The principal components of data.
 
     Args:

@@ -18,7 +18,7 @@ from fmus.signals import Measurement
 from ..data import Run, Track, clean, read
 from ..progress import Advance, silent
 from ..smoothing import smooth
-from .principal_components import outliers, principal_components
+from .principal_components import fit_components, outliers
 
 ESTIMATES = ("smoothed", "mdf")
 NU = ("u", "v", "r")
@@ -84,7 +84,7 @@ def without_outliers(samples: Samples) -> Samples:
         InputError: a column is constant.
     """
     X = np.hstack([samples.omega, samples.nu, samples.tau])
-    model = principal_components(X, [*OMEGA, *NU, *TAU])
+    model = fit_components(X, [*OMEGA, *NU, *TAU])
     return samples.rows(~outliers(model, X))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from fmus.controller.models import SURGE
 
 from ..report.formatting import number
-from . import pictures
+from . import analysis_figures as pictures
 from .concurrent_passes import Identified, explained, identify, regressors, thinned
 from .document import Document, Plot, Section, Table, numbers
 from .into_the_plant import EffectiveThrust, effective_thrust
