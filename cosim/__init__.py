@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from .errors import InputError, SimulationError
     from .files import atomic_write
     from .formats.ssv import Parameter, ParameterSet, read_parameters, write_parameters
-    from .master.simulation import Result, simulate
+    from .master.ending import Result
+    from .master.simulation import simulate
     from .results.log import read_log
     from .scenario.load import load_scenario
     from .scenario.schema import Scenario
@@ -50,7 +51,7 @@ __getattr__ = lazy_names(
         "InputError": "errors",
         "Parameter": "formats.ssv",
         "ParameterSet": "formats.ssv",
-        "Result": "master.simulation",
+        "Result": "master.ending",
         "Scenario": "scenario.schema",
         "SimulationError": "errors",
         "Unit": "conversion",

@@ -23,7 +23,9 @@ from rich.progress import (
 
 from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, run_command
 from .errors import InputError
-from .master.simulation import Result, simulate
+from .interrupts import on_interrupt, restore
+from .master.ending import Result
+from .master.simulation import simulate
 from .results.performance import table
 from .scenario.load import load_scenario
 
@@ -71,9 +73,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         complain(error)
         return BAD_INPUT
-    with suppress(BrokenPipeError):
-        _report(result, options.quiet)
+    handlers = on_interrupt(_no_interrupt)  # the run has ended, and its log says how
+    try:
+        with suppress(BrokenPipeError):
+            _report(result, options.quiet)
+    finally:
+        restore(handlers)
     return EXIT_CODES[result.status]
+
+
+def _no_interrupt() -> None:
+    """No-op: an interrupt comes too late."""
 
 
 def _no_progress(t: float) -> None:

@@ -215,6 +215,18 @@ def test_ctrl_c_ends_an_fmu_that_hangs_while_it_terminates(plain_fmu, tmp_path):
     assert len(cosim.read_log(tmp_path / "out")["time"]) == 21
 
 
+def test_interrupt_while_metrics_are_computed_is_told_in_the_log(ellipse, tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.results.performance.compute", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        cosim.simulate(cosim.load_scenario(ellipse | {"stop": 0.1}), tmp_path / "out")
+    told = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert (told["status"], told["rows"]) == ("interrupted", 11)
+    assert len(cosim.read_log(tmp_path / "out")["time"]) == 11
+
+
 def test_interrupt_during_instantiation_is_no_bad_input(plain_fmu, tmp_path):
     slow = "if 'pytest' not in __import__('sys').modules:\n    print('here', flush=True)\n    time.sleep(1.0)"
     (tmp_path / "s.json").write_text(json.dumps(alone(plain_fmu("Slow", f"{GAIN}\n{slow}\n"))))

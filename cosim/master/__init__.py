@@ -1,6 +1,7 @@
 """The master: algorithm, stepping, real time, recording, and the run itself."""
 
 from .algorithm import Master
-from .simulation import Result, simulate
+from .ending import Result
+from .simulation import simulate
 
 __all__ = ["Master", "Result", "simulate"]

@@ -5,9 +5,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -17,13 +15,13 @@ from ..files import update_json, write_json, write_roomy_json
 from ..formats.ssv import read_parameters
 from ..process.run_state import LOGGING, STATE, Owner
 from ..process.scratch import sweep
-from ..results import drawing, performance
 from ..results import log as logs
 from ..results.result_files import clear_results
 from ..scenario.schema import Scenario
 from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
+from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
 from .real_time import Pace
 from .recorder import Recorder
@@ -31,29 +29,6 @@ from .run_record import describe
 
 # Wall time between two updates of progress and log [s]; chosen: smooth, and cheap beside the steps.
 UPDATE_INTERVAL = 0.2
-
-
-@dataclass
-class Result:
-    """How a run ended, and its results.
-
-    Attributes:
-        status: ``done``, ``failed`` or ``interrupted``.
-        folder: where log, metrics and pictures are.
-        rows: number of logged rows.
-        message: why it failed; empty otherwise.
-        metrics: as in metrics.json; empty if the system lacks the signals for them.
-        warnings: oddities that were no reason to refuse.
-        pace: with ``realtime``: lateness and missed deadlines.
-    """
-
-    status: str
-    folder: Path
-    rows: int = 0
-    message: str = ""
-    metrics: dict[str, float] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
-    pace: dict[str, float] = field(default_factory=dict)
 
 
 def simulate(
@@ -93,6 +68,7 @@ def simulate(
     folder = Path(os.path.abspath(given))
     owner = Owner()
     sweep()
+    result: Result | None = None
     try:
         system = prepare(scenario, overrides, native)
         try:
@@ -102,7 +78,11 @@ def simulate(
             system.close()
             os.chdir(here)
         if recorder is not None:
-            _finish(system, result, recorder, pictures, show)
+            finish(system, result, recorder, pictures, show)
+    except KeyboardInterrupt:
+        if result is not None:
+            interrupted_late(result)
+        raise
     finally:
         STATE.finish()
     result.folder = given
@@ -146,11 +126,8 @@ def _run(
             )
         finally:
             master.close()
-        if interrupted() and result.status == "done":  # while an FMU terminated
-            result.status = "interrupted"
-            with _disk(result):
-                sidecar = folder / logs.SIDECAR
-                update_json(sidecar, json.loads(sidecar.read_text("utf-8")), {"status": result.status})
+        if interrupted():  # while an FMU terminated
+            interrupted_late(result)
         return result, recorder
 
 
@@ -202,7 +179,7 @@ def _record(
             result.message = result.message or str(error)
         except OSError as error:
             result.status = "failed"
-            result.message = _not_written(folder, error)
+            result.message = not_written(folder, error)
         recorder.close()
         result.rows = recorder.rows
         told: dict[str, Any] = {"rows": result.rows}
@@ -214,23 +191,9 @@ def _record(
         if result.message:
             told["message"] = result.message
         told["status"] = result.status
-        with _disk(result):
+        with writing(result):
             update_json(folder / logs.SIDECAR, sidecar, told)
     return result, recorder
-
-
-@contextmanager
-def _disk(result: Result) -> Iterator[None]:
-    """A file that cannot be written makes the run a failed one; what was written is kept."""
-    try:
-        yield
-    except OSError as error:
-        result.status = "failed"
-        result.message = result.message or _not_written(result.folder, error)
-
-
-def _not_written(folder: Path, error: OSError) -> str:
-    return f"cannot write to '{folder}': {error.strerror}"
 
 
 def _loop(
@@ -262,32 +225,3 @@ def _loop(
     recorder.flush()
     progress(system.scenario.stop)
     return False
-
-
-def _finish(
-    system: System,
-    result: Result,
-    recorder: Recorder,
-    draw: bool,
-    show: Callable[[str], None],
-) -> None:
-    """Write metrics, pictures and the log's final format."""
-    window, roles = system.scenario.metrics, system.scenario.roles
-    columns = recorder.kept()
-    try:
-        result.metrics = performance.compute(columns, window.start, window.stop, roles)
-        with _disk(result):
-            write_json(result.folder / logs.METRICS, result.metrics)
-    except performance.MetricsError as error:
-        show(f"note: no metrics: {error}")
-    if draw and result.status != "interrupted":
-        with _disk(result):
-            runs = {system.scenario.name: columns}
-            used = {system.scenario.name: roles}
-            drawn = drawing.draw(runs, result.folder, window.start, window.stop, used)
-            missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
-            if missing:
-                show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
-    if system.scenario.log.format == "parquet" and result.status == "done":
-        with _disk(result):
-            logs.to_parquet(result.folder)

@@ -1,0 +1,88 @@
+"""How a run ended, and what is written once its steps are done."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..files import update_json, write_json
+from ..results import drawing, performance
+from ..results import log as logs
+from ..system.system import System
+from .recorder import Recorder
+
+
+@dataclass
+class Result:
+    """How a run ended, and its results.
+
+    Attributes:
+        status: ``done``, ``failed`` or ``interrupted``.
+        folder: where log, metrics and pictures are.
+        rows: number of logged rows.
+        message: why it failed; empty otherwise.
+        metrics: as in metrics.json; empty if the system lacks the signals for them.
+        warnings: oddities that were no reason to refuse.
+        pace: with ``realtime``: lateness and missed deadlines.
+    """
+
+    status: str
+    folder: Path
+    rows: int = 0
+    message: str = ""
+    metrics: dict[str, float] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    pace: dict[str, float] = field(default_factory=dict)
+
+
+@contextmanager
+def writing(result: Result) -> Iterator[None]:
+    """A file that cannot be written makes the run a failed one; what was written is kept."""
+    try:
+        yield
+    except OSError as error:
+        result.status = "failed"
+        result.message = result.message or not_written(result.folder, error)
+
+
+def not_written(folder: Path, error: OSError) -> str:
+    return f"cannot write to '{folder}': {error.strerror}"
+
+
+def interrupted_late(result: Result) -> None:
+    """A run whose log is whole becomes an interrupted one: the request came behind its last step."""
+    if result.status == "done":
+        result.status = "interrupted"
+        with writing(result):
+            path = result.folder / logs.SIDECAR
+            update_json(path, json.loads(path.read_text("utf-8")), {"status": result.status})
+
+
+def finish(
+    system: System,
+    result: Result,
+    recorder: Recorder,
+    draw: bool,
+    show: Callable[[str], None],
+) -> None:
+    """Write metrics, pictures and the log's final format."""
+    window, roles = system.scenario.metrics, system.scenario.roles
+    columns = recorder.kept()
+    try:
+        result.metrics = performance.compute(columns, window.start, window.stop, roles)
+        with writing(result):
+            write_json(result.folder / logs.METRICS, result.metrics)
+    except performance.MetricsError as error:
+        show(f"note: no metrics: {error}")
+    if draw and result.status != "interrupted":
+        with writing(result):
+            runs = {system.scenario.name: columns}
+            used = {system.scenario.name: roles}
+            drawn = drawing.draw(runs, result.folder, window.start, window.stop, used)
+            missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
+            if missing:
+                show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
+    if system.scenario.log.format == "parquet" and result.status == "done":
+        with writing(result):
+            logs.to_parquet(result.folder)
