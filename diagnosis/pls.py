@@ -30,9 +30,9 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
     recipe = recipes.recipe(options.recipe)
     recipe.transformer()  # before any work: a library may be missing
     from .analysis.document import write_document, write_json
-    from .analysis.into_the_plant import as_model, goes_into_the_plant
+    from .analysis.into_the_plant import as_model, goes_into_the_plant, thrust_of
     from .analysis.partial_least_squares import regressed
-    from .analysis.pls_report import content, document, sentences, thrust_of
+    from .analysis.pls_report import content, document, sentences
     from .analysis.samples import joined, without_outliers
     from .model import write_model
 

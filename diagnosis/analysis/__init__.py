@@ -9,14 +9,15 @@ of the model error goes back into the ship by the effect ``linear_map``::
 """
 
 from .concurrent_passes import Identified, explained, identify
-from .into_the_plant import EffectiveThrust, as_model, effective_thrust
+from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
 from .partial_least_squares import Regressed, regressed
 from .principal_components import PrincipalComponents, fit_components, outliers, removals
 from .recipes import RECIPES, Recipe, recipe
-from .samples import Samples, gather_samples, joined, without_outliers
-from .table_7_1 import TABLE_7_1, plant, row
+from .samples import Samples, gather_samples, joined, model_error, without_outliers
+from .table_7_1 import NAMES, TABLE_7_1, plant, row
 
 __all__ = [
+    "NAMES",
     "RECIPES",
     "TABLE_7_1",
     "EffectiveThrust",
@@ -30,13 +31,16 @@ __all__ = [
     "explained",
     "fit_components",
     "gather_samples",
+    "goes_into_the_plant",
     "identify",
     "joined",
+    "model_error",
     "outliers",
     "plant",
     "recipe",
     "regressed",
     "removals",
     "row",
+    "thrust_of",
     "without_outliers",
 ]

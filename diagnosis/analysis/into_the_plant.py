@@ -16,7 +16,7 @@ from fmus.hull import RotationalDamping
 
 from ..model import Model
 from ..report.formatting import number
-from .partial_least_squares import AXES
+from .partial_least_squares import AXES, Regressed
 from .samples import TAU
 
 # Least share of a commanded force that has to act, in every direction of it (chosen: a twentieth).
@@ -70,6 +70,11 @@ def force_columns(B: np.ndarray, columns: Sequence[str]) -> np.ndarray:
     """B_tau (3, 3) of a map B (3, m); zero where the force is no column."""
     found = [B[:, columns.index(n)] if n in columns else np.zeros(3) for n in TAU]
     return np.column_stack(found)
+
+
+def thrust_of(found: Regressed) -> EffectiveThrust:
+    """What a regression makes of the thrusters' force."""
+    return effective_thrust(force_columns(found.B, found.columns))
 
 
 def regressor(column: str) -> str:

@@ -8,14 +8,9 @@ import numpy as np
 from ..report.formatting import number, percent
 from . import analysis_figures as pictures
 from .document import Document, Plot, Section, Table, numbers
-from .into_the_plant import EffectiveThrust, effective_thrust, force_columns, goes_into_the_plant
+from .into_the_plant import goes_into_the_plant, thrust_of
 from .partial_least_squares import AXES, Fitted, Regressed
 from .principal_components import BLOCKS
-
-
-def thrust_of(r: Regressed) -> EffectiveThrust:
-    """What the model makes of the thrusters' force."""
-    return effective_thrust(force_columns(r.B, r.columns))
 
 
 def content(r: Regressed, estimates: str) -> dict[str, Any]:
