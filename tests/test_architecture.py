@@ -41,8 +41,9 @@ DIAGNOSIS_LAYERS = (
     ("decision",),
     ("session",),
     ("report",),
+    ("analysis",),
     ("command_line",),
-    ("compare", "learn"),  # commands
+    ("compare", "learn", "pca", "pls", "sysid"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.
@@ -98,6 +99,7 @@ PUBLIC_OF_FMUS = (
 COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel")
 PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
+    "diagnosis.analysis",
     "diagnosis.assessment",
     "diagnosis.data",
     "diagnosis.identification",

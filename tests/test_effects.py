@@ -14,7 +14,7 @@ from support import ccode
 from support.project import ROOT
 
 from fmus.declare import flatten, packer, variables
-from fmus.effects import STANDARD, Motion, Running, Thrust
+from fmus.effects import STANDARD, Loaded, Motion, Running, Thrust
 from fmus.effects.__main__ import table as effects_table
 from fmus.effects.environment import surface
 from fmus.frames import rotate_to_earth
@@ -74,6 +74,7 @@ CONTRACT = [
     "heading_offset",
     "marker_offset",
     "clock_offset",
+    "linear_map",
     "curve_X(u)",
     "curve_vsp_x(c)",
     "curve_bow(|u|)",
@@ -151,7 +152,7 @@ def test_damping_like_force_is_the_coefficient_times_the_product_in_its_name(e):
 def test_regressors_carry_the_whole_effect(name):
     e = STANDARD[name]
     rng = np.random.default_rng(2)
-    ship = Motion(*rng.uniform(-0.5, 0.5, (7, 30)))
+    ship = Loaded(*rng.uniform(-0.5, 0.5, (10, 30)))
     weights = rng.uniform(0.0, 1.0, len(e.coefficients))
     given_ = dict(zip(e.coefficients, weights, strict=True))
     values = [given_.get(p.name, p.start) for p in e.parameters]

@@ -10,7 +10,15 @@ from benchmarks.hidden_effects import cell as benchmark_cell
 from benchmarks.hidden_effects import simulated_runs
 from benchmarks.hidden_effects.__main__ import cells, main
 from benchmarks.hidden_effects.cell import Cell, trial
-from benchmarks.hidden_effects.draw import LARGEST, SINGLE, SMALLEST, added_force, draw, share
+from benchmarks.hidden_effects.draw import (
+    LARGEST,
+    LOOKED_FOR,
+    SINGLE,
+    SMALLEST,
+    added_force,
+    draw,
+    share,
+)
 from benchmarks.hidden_effects.manoeuvres import Manoeuvre, manoeuvres
 from benchmarks.hidden_effects.results import Results, Row
 from benchmarks.hidden_effects.separation import NOTHING, Rivals, flat
@@ -19,7 +27,7 @@ from benchmarks.hidden_effects.summary import write
 from benchmarks.hidden_effects.truth import force, motion, over, windows
 from cosim import InputError
 from diagnosis import Run
-from fmus.effects import EACH_VSP, STANDARD
+from fmus.effects import STANDARD
 from fmus.thrusters.allocation import Allocation, thrust
 
 
@@ -89,7 +97,7 @@ def test_sizes_are_spread_evenly_over_their_logarithm():
 
 def test_every_effect_is_in_the_benchmark():
     hidden = {e for cell in cells(SINGLE, ["n1"], [False, True], range(2)) for e in cell.effects}
-    assert {e.id for e in STANDARD.values() if EACH_VSP not in e.needs} <= hidden
+    assert {e.id for e in LOOKED_FOR} <= hidden
     keys = [cell.key for cell in cells(SINGLE, ["n1", "n10"], [False, True], range(2))]
     assert len(set(keys)) == len(keys)
 

@@ -24,7 +24,8 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "delay off the grid": ("delay",),
 }
 # The runs have one set of commands: what acts on one of the two propellers is no candidate there.
-SINGLE = [*(e.id for e in STANDARD.values() if EACH_VSP not in e.needs), *FOREIGN]
+LOOKED_FOR = [e for e in STANDARD.values() if EACH_VSP not in e.needs and e.search.by != "given"]
+SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
 OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 Scaled = Callable[[float], dict[str, float]]
 

@@ -159,6 +159,7 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
     driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, nu))
+    driven = driven @ model.effective_thrust.T
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 

@@ -5,13 +5,25 @@ from . import (
     environment,
     force,
     inertia,
+    linear_map,
     measurement,
     outages,
     single_propellers,
     thrust_curves,
     thruster_dynamics,
 )
-from .effect import EACH_VSP, Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect import (
+    EACH_VSP,
+    Effect,
+    Loaded,
+    Memory,
+    Motion,
+    Running,
+    Search,
+    Thrust,
+    Wording,
+    effect,
+)
 from .effect_set import EffectSet, effects_of
 from .families import Family
 
@@ -21,6 +33,7 @@ __all__ = [
     "Effect",
     "EffectSet",
     "Family",
+    "Loaded",
     "Memory",
     "Motion",
     "Running",
@@ -42,6 +55,7 @@ STANDARD = EffectSet(
         thruster_dynamics,
         environment,
         force,
+        linear_map,
         inertia,
         measurement,
     )

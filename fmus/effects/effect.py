@@ -8,8 +8,9 @@ The function's first arguments and its result belong to the kind:
 =============  ==========================================  =========================================
 kind           first arguments                             result
 =============  ==========================================  =========================================
-force          :class:`Motion`                             force on the hull (X, Y, N) [N, N, N m]
-environment    :class:`Motion`                             the same, or what ``gives`` says
+force          :class:`Loaded`: a motion and tau           force on the hull (X, Y, N) [N, N, N m]
+environment    :class:`Loaded`; :class:`Motion` for what   the same, or what ``gives`` says
+               gives a velocity of the water
 inertia        :class:`~fmus.hull.Inertia`                 the changed Inertia
 actuator       :class:`Thrust`, :class:`Running`           the changed Thrust
 actuator with  memory, three signals, step h [s]           the next memory, the changed signals
@@ -63,6 +64,21 @@ class Motion(NamedTuple):
     v: Any = 0.0
     r: Any = 0.0
     t: Any = 0.0
+
+
+class Loaded(NamedTuple):
+    """A :class:`Motion`, and the thrusters' force on the hull [N, N, N m]."""
+
+    x: Any = 0.0
+    y: Any = 0.0
+    psi: Any = 0.0
+    u: Any = 0.0
+    v: Any = 0.0
+    r: Any = 0.0
+    t: Any = 0.0
+    tau_X: Any = 0.0
+    tau_Y: Any = 0.0
+    tau_N: Any = 0.0
 
 
 class Running(NamedTuple):
@@ -128,7 +144,7 @@ class Search:
     """How an identification finds the parameters of an effect.
 
     Attributes:
-        by: ``regression`` on the model error, or a peak in its ``spectrum``.
+        by: ``regression`` on the model error, a peak in its ``spectrum``, or ``given``: not looked for.
         differentiable: whether the force may be linearised about zero; by default, if it is linear.
         tries: values to try of the parameters that the force is not linear in, each a mapping from
             parameter to value; or a function that makes them of the parameters of the model in use. The
@@ -146,7 +162,7 @@ class Search:
             neighbours are alike.
     """
 
-    by: Literal["regression", "spectrum"] = "regression"
+    by: Literal["regression", "spectrum", "given"] = "regression"
     differentiable: bool | None = None
     tries: Iterable[Values] | Callable[[Values], Iterable[Values]] = ()
     fitted: tuple[str, ...] | None = None

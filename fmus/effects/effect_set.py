@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from ..declare import DeclarationError, nearest
-from .effect import Effect, Kind, Motion, Running, Thrust
+from .effect import Effect, Kind, Loaded, Running, Thrust
 
 ROOM = Path(__file__).parent
 
@@ -118,8 +118,14 @@ def _imported(name: str, path: Path) -> ModuleType:
 
 # Motion and thrust at which effects are compared, so large that squares and products all count.
 _AT = (
-    (Motion(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0), Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5)),
-    (Motion(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0), Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5)),
+    (
+        Loaded(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0, 0.4, 0.6, -0.3),
+        Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5),
+    ),
+    (
+        Loaded(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0, -0.4, -0.6, 0.3),
+        Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5),
+    ),
 )
 
 
