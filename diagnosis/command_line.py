@@ -27,7 +27,7 @@ class Done(NamedTuple):
 
 
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
-    """A parser with the options that both commands have: ``--model``, ``--effects``, ``--out``."""
+    """A parser with the options that both commands have."""
     made = argparse.ArgumentParser(
         prog=f"python -m diagnosis.{name}",
         description=description,
@@ -45,6 +45,44 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         default=[],
         help="a file of model effects of your own; may be repeated",
     )
+    made.add_argument(
+        "--anyway",
+        action="store_true",
+        help="go on though a run's units, signs or columns seem to be other ones than said",
+    )
+    return made
+
+
+def analysis_parser(
+    name: str, description: str, epilog: str, estimates: str, fewest: str = "+"
+) -> argparse.ArgumentParser:
+    """A parser with what the analyses of the thesis share: runs, ``--estimates``, ``--out``.
+
+    Args:
+        name: of the command, and of its result folder.
+        description: what it does.
+        epilog: examples and exit codes.
+        estimates: where velocities come from by default.
+        fewest: ``+``: one run at the least; ``*``: none.
+    """
+    made = argparse.ArgumentParser(
+        prog=f"python -m diagnosis.{name}",
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument(
+        "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
+    )
+    made.add_argument(
+        "--estimates",
+        choices=("smoothed", "mdf"),
+        default=estimates,
+        help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
+        f"derivative filter ({estimates})",
+    )
+    out = Path("results", name)
+    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
     return made
 
 

@@ -16,7 +16,7 @@ import cosim
 from cosim.results import draw
 
 from .monte_carlo import Content, interval, ratio, run_all, shipped, vary
-from .outcome import Outcome, columns, outcome, true_states
+from .outcome import LEARNED_FROM, Outcome, columns, outcome, true_states
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
 from .verdict import CONTROLLERS, FOUR, OLD, claims
@@ -24,10 +24,13 @@ from .verdict import CONTROLLERS, FOUR, OLD, claims
 PATHS = ("ellipse", "eight")
 SENSES = ("mdf", "kalman")
 NEEDED = [
-    *(f"vessel.{s}" for s in ("x", "y", "omega_star_X", "omega_star_Y", "omega_star_N")),
+    "vessel.x",
+    "vessel.y",
     "guidance.x_t",
     "guidance.y_t",
-    *(f"controller.{s}" for s in ("z1_x", "tau_N", "omega_hat_X", "omega_hat_Y", "omega_hat_N")),
+    "controller.z1_x",
+    "controller.tau_N",
+    *LEARNED_FROM,
     "controller.sigma_min",
     "controller.rank_met",
 ]
@@ -99,7 +102,8 @@ def tables(report: Report, path: str, by_condition: Table) -> None:
     for condition, outcomes in by_condition.items():
         count = len(next(iter(outcomes.values())))
         kind = "one run without noise" if condition.startswith("true") else f"{count} seeds"
-        report.text(f"**{condition}**, {kind}; RMS from 20 s on:")
+        starts = sorted({o.start for o in next(iter(outcomes.values())) if o.done})
+        report.text(f"**{condition}**, {kind}; from {', '.join(f'{t:g}' for t in starts)} s on:")
         names = ("position", "second", "heading", "omega_Y", "omega_N", "iaewwt", "sigma", "rank")
         rows = []
         for controller, each in outcomes.items():

@@ -17,7 +17,6 @@ from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found, Runs
 from .lessons import DELAYS, lessons
 from .margin import SETTINGS
 from .monte_carlo import Content, run_all, vary
-from .outcome import AXES, Log, missing
 from .store_contents import logged, store_contents
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
@@ -141,12 +140,6 @@ def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
     report.table(header, rows)
 
 
-def shown(run: Path) -> Log:
-    """A log whose model error holds the lost thrust as well, as (7.7) has it."""
-    log = dict(cosim.read_log(run))
-    return {**log, **{f"vessel.omega_star_{a}": missing(log, a) for a in AXES}}
-
-
 def pictures(report: Report, seed: int) -> None:
     """The pictures of 6.4 for every trial, with the fault as in the basin and without."""
     for trial in TRIALS:
@@ -155,7 +148,7 @@ def pictures(report: Report, seed: int) -> None:
             place = folder((trial.name, faulty))
             logs = report.folder / "logs" / place
             draw(
-                {LABELS[c]: shown(logs / c / str(seed)) for c in CONTROLLERS},
+                {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS},
                 report.folder / place,
             )
             for file in ("trajectory", "errors", "metrics", "forces", "model_error"):

@@ -22,20 +22,22 @@ LEARNED_FROM = [
     )
     for a in AXES
 ]
-# The start of a run, which depends on where the ship lay, is left out.
+# s; the start of a run, which depends on where the ship lay, is left out.
 SETTLED = 20.0
 
 
 class Outcome(NamedTuple):
-    """Numbers of one run; RMS values from 20 s on.
+    """Numbers of one run; RMS values over the window of its metrics.
 
     Attributes:
         done: False where the run broke off.
+        start: first time of that window [s].
         position: distance to the target [m].
         second: the same over the second half, which is the second lap of the ellipse [m].
         cross_track, heading: errors e [m] and heading [rad].
         surge: mean error along the ship over the second half, z1_x [m].
-        omega_X, omega_Y, omega_N: error of the estimated model error [N, N, N m].
+        omega_X, omega_Y, omega_N: error of the estimated model error (7.7), lost thrust included
+            [N, N, N m].
         omega_hat_X: mean estimate of the model error in surge over the second half [N].
         iaew, iaewwt: metrics (4.59), (4.60).
         swing: RMS of the requested yaw moment above 0.5 Hz [N m]: oscillation.
@@ -44,6 +46,7 @@ class Outcome(NamedTuple):
     """
 
     done: bool
+    start: float
     position: float
     second: float
     cross_track: float
@@ -65,7 +68,7 @@ class Outcome(NamedTuple):
         return self.omega_Y
 
 
-BROKEN = Outcome(False, *[float("nan")] * 14)
+BROKEN = Outcome(False, *[float("nan")] * 15)
 
 
 def rms(x: np.ndarray) -> float:
@@ -91,16 +94,15 @@ def outcome(result: cosim.Result) -> Outcome:
     if result.status == "failed":
         return BROKEN
     log = cosim.read_log(result.folder)
-    settled = log["time"] >= SETTLED
-    half = log["time"] >= 0.5 * log["time"][-1]
     m = result.metrics
-    wrong = {
-        a: rms((log[f"controller.omega_hat_{a}"] - log[f"vessel.omega_star_{a}"])[settled]) for a in AXES
-    }
+    settled = log["time"] >= m["from"]
+    half = log["time"] >= 0.5 * log["time"][-1]
+    wrong = {a: rms((log[f"controller.omega_hat_{a}"] - missing(log, a))[settled]) for a in AXES}
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     learns = "controller.sigma_min" in log
     return Outcome(
         done=True,
+        start=m["from"],
         position=rms(distance[settled]),
         second=rms(distance[half]),
         cross_track=m["cross_track_rms"],

@@ -12,7 +12,7 @@ from cosim.scenario import Roles
 
 from . import sysid4
 from .monte_carlo import Content, shipped, vary
-from .outcome import AXES, SETTLED, Log, missing, quick, rms
+from .outcome import SETTLED, Log, missing, quick, rms
 
 RBS, ABS = "controller_bs", "controller_abs"
 CLZ, CLE = "controller_cl_win_z2", "controller_cl_win_eps"
@@ -30,7 +30,6 @@ SPIKES = {"kind": "spikes", "signals": POSE, "size": [0.1, 0.1, 0.1], "rate": 1.
 LOGGED = [
     *Roles().columns[1:],
     "controller.z1_x",
-    *(f"thrusters.tau_act_{a}" for a in AXES),
 ]
 LOST = 2.0  # m; the target is then on the other side of the path
 SLOW = 0.1  # Hz; the path itself asks for less

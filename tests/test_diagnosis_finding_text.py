@@ -80,7 +80,7 @@ def test_an_effect_of_a_user_says_what_it_says_of_itself():
     assert UNKNOWN.excite in tell_apart(mine, STANDARD["mass"])
 
 
-@pytest.mark.parametrize("name", STANDARD)
+@pytest.mark.parametrize("name", [e.id for e in STANDARD.values() if e.search.by != "given"])
 def test_equation_has_every_number_with_its_unit(name):
     effect = STANDARD[name]
     given = values(effect, 0.25)

@@ -7,7 +7,7 @@ from support.loops import closed_loop, ellipse_target, multisine_target, unlimit
 from support.project import COMPONENTS
 
 from fmus.controller.adaptive import Disturbance
-from fmus.controller.learning import Drive, Memory, learned
+from fmus.controller.learning import Drive, learned, remembered
 from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
 from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, summed
 from fmus.declare import variables
@@ -133,15 +133,23 @@ def turn(psi):
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def adapt(model, rows, phi, gamma, steps, dt, omega=STILL, gamma_omega=OFF, rho=0.0, stale=0.0):
+def adapt(model, rows, phi, gamma, steps, dt, omega=STILL, gamma_omega=OFF, rho=0.0, **options):
     """Learn from a frozen store alone; yield the estimates."""
     on = sum(gamma_omega) > 0.0
-    sums = summed(model, rows, on)
-    memory = Memory(sums.count, sums.turned, sums.cross)
+    sums = summed(on, rows, model)
+    memory = remembered(sums, None, rho, StoreOptions(**options).store_weight)
     rest = Drive(empty_store(model).last, 0.0, STILL)
     for _ in range(steps):
         phi, omega = learned(
-            model, (phi, omega), (gamma, gamma_omega), rest, 0.0, sums, memory, stale, dt
+            model,
+            (phi, omega),
+            (gamma, gamma_omega),
+            rest,
+            0.0,
+            sums,
+            memory,
+            StoreOptions(**options),
+            dt,
         )
         yield np.array(phi), np.array(omega)
 
@@ -206,6 +214,45 @@ def test_stale_errors_wind_up_and_fresh_ones_do_not():
     )
     assert fresh == pytest.approx(TRUE_PHI, rel=1e-2)
     assert np.linalg.norm(stale) > 10 * np.linalg.norm(TRUE_PHI)
+
+
+def test_weight_of_the_store_scales_its_pull_and_its_guard():
+    """w sum_j F_j^T eps_j; the guard on h Gamma trace(Q) counts w, so that a step too long for w = 1 is free."""
+    rng = np.random.default_rng(7)
+    rows = store_of(ROTATIONAL, rng, phi=TRUE_PHI)
+    gamma = ROTATIONAL.gamma()
+    trace = sum(np.sum(np.array(gamma) * dense(ROTATIONAL, r) ** 2) for r in rows)
+
+    def first(dt, weight, **gains):
+        options = {"store_weight": weight, **gains}
+        return next(adapt(ROTATIONAL, rows, ROTATIONAL.hat(), gamma, 1, dt, **options))[0]
+
+    slow, fast = 0.1 / trace, 5.0 / trace
+    assert first(slow, 0.1) == pytest.approx(0.1 * first(slow, 1.0))
+    assert first(fast, 0.1) == pytest.approx(0.5 * first(fast, 1.0)), "only w = 1 is slowed down there"
+
+
+def test_weight_of_the_store_holds_for_the_earth_fixed_force_too():
+    rng = np.random.default_rng(8)
+    rows = store_of(ROTATIONAL, rng, phi=TRUE_PHI)
+    gamma_omega = Disturbance(1.0, 2.0, 3.0)
+    still = [
+        next(
+            adapt(
+                ROTATIONAL,
+                rows,
+                ROTATIONAL.hat(),
+                ROTATIONAL.gamma(),
+                1,
+                1e-5,
+                STILL,
+                gamma_omega,
+                store_weight=w,
+            )
+        )[1]
+        for w in (1.0, 0.1)
+    ]
+    assert still[1] == pytest.approx(0.1 * still[0])
 
 
 def test_stale_store_overshoots_in_the_loop():

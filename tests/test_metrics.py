@@ -7,7 +7,17 @@ import pytest
 
 from cosim.metrics import main
 from cosim.plots import main as plots_main
-from cosim.results import MetricsError, canvas, compute, drawing, over_time, performance, track, tracking
+from cosim.results import (
+    MetricsError,
+    canvas,
+    compute,
+    drawing,
+    lines,
+    over_time,
+    performance,
+    track,
+    tracking,
+)
 from cosim.scenario import Roles
 
 ROLES = Roles()
@@ -318,6 +328,17 @@ class TestPlots:
         assert self.names(drawing.draw({"a": pose}, tmp_path)) == self.ALL[:1]
         assert drawing.draw({"a": {"time": log["time"]}}, tmp_path) == []
         assert drawing.draw({}, tmp_path) == []
+
+    def test_lost_thrust_is_part_of_the_model_error(self):
+        """(7.7): what was commanded and did not act is missing too; without its columns the hull's stays."""
+        log = wild()
+        run = canvas.Run("a", log, {}, ROLES, None, None)
+        for axis, found in zip("XYN", lines.missing_force(run), strict=True):
+            lost = log[f"thrusters.tau_act_{axis}"] - log[f"thrusters.tau_cmd_{axis}"]
+            assert found == pytest.approx(log[f"vessel.omega_star_{axis}"] + lost)
+        short = {k: v for k, v in log.items() if not k.startswith("thrusters.tau_act")}
+        hull = [log[f"vessel.omega_star_{axis}"] for axis in "XYN"]
+        assert np.array_equal(lines.missing_force(run._replace(log=short)), hull)
 
     def test_a_run_that_blew_up_is_drawn_as_far_as_it_goes(self, tmp_path):
         log = wild()

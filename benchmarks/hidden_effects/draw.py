@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.effects import STANDARD
+from fmus.effects import EACH_VSP, STANDARD
 
 from .effect_forms import form
 from .foreign_physics import FOREIGN_PHYSICS
@@ -24,8 +24,10 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "bow exp(-(u/u0)^2)": ("bow_speed_loss", "curve_bow(|u|)"),
     "delay off the grid": ("delay",),
 }
-# One of two propellers that have no commands of their own here cannot be told from the other.
-SINGLE = [*(e.id for e in STANDARD.values() if "each vsp" not in e.needs), *FOREIGN]
+# The runs have one set of commands: what acts on one of the two propellers is no candidate there.
+LOOKED_FOR = [e for e in STANDARD.values() if EACH_VSP not in e.needs and e.search.by != "given"]
+SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
+OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 # Physics of which the diagnosis has nothing: no id is a right answer.
 UNKNOWN = [e.id for e in FOREIGN_PHYSICS]
 MOST_PLAY = 0.12  # of the full command: about the largest size, 40 % of the force on an axis
@@ -68,8 +70,8 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     """
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
-    elif effect.endswith("_outage"):  # and so are these
-        values = outages([p.name for p in STANDARD[effect].parameters], rng)
+    elif effect in STANDARD and STANDARD[effect].search.intervals:  # and so are these
+        values = outage(effect, rng)
     elif effect == "backlash":  # so is its play, of which a series takes seconds
         values = {"backlash": less * MOST_PLAY * float(rng.uniform(0.25, 1.0))}
     else:
@@ -79,13 +81,15 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     return Draw(effect, values, share(pilot, effect, values))
 
 
-def outages(names: Sequence[str], rng: np.random.Generator) -> dict[str, float]:
-    """One to four intervals without thrust, from a twentieth to two fifths of the time in all."""
-    count = int(rng.integers(1, 5))
-    room = 0.8 * STOP / count  # s; nothing fails in the first and last tenth
-    starts = [0.1 * STOP + room * (k + float(rng.uniform(0.0, 0.5))) for k in range(count)]
-    times = [t for start in starts for t in (start, start + room * float(rng.uniform(0.06, 0.5)))]
-    return dict(zip(names, times, strict=False))
+def outage(effect: str, rng: np.random.Generator) -> dict[str, float]:
+    """Three to eight intervals that take a share of the time, one in each equal part of it."""
+    names = STANDARD[effect].search.intervals
+    count = int(rng.integers(3, len(names) + 1))
+    room = STOP / count
+    lasts = np.maximum(SHORTEST, OUT * room * rng.uniform(0.5, 1.5, count))
+    starts = room * np.arange(count) + rng.uniform(0.1, 0.5, count) * room
+    spans = zip(names, starts.tolist(), lasts.tolist(), strict=False)
+    return {name: t for (a, b), start, last in spans for name, t in ((a, start), (b, start + last))}
 
 
 def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:

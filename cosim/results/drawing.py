@@ -48,7 +48,9 @@ PICTURES = {
         metrics,
     ),
     "forces": Picture((("linear_force", "nonlinear_force", "requested_force"),), forces),
-    "model_error": Picture((("model_error", "estimate"),), model_error),
+    "model_error": Picture(
+        (("model_error", "estimate", "force", "acting_force"), ("model_error", "estimate")), model_error
+    ),
 }
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .canvas import WIDTH, Runs, finish, legend, plot, stacked
+from .canvas import WIDTH, Run, Runs, finish, legend, plot, stacked
 from .log import Log
 from .performance import AXES, cross_track, over_time, wrap
 
@@ -71,15 +71,28 @@ def forces(runs: Runs) -> "Figure":
     return finish(figure, panels, runs)
 
 
+def missing_force(run: Run) -> list[np.ndarray]:
+    """The model error (7.7) on each axis [N, N, N m]: that of the hull, and the thrust that was lost.
+
+    Of the latter only where the log tells it.
+    """
+    hull = [run.log[name] for name in run.roles.model_error]
+    if not all(name in run.log for name in run.roles.of("force", "acting_force")):
+        return hull
+    pairs = zip(run.roles.acting_force, run.roles.force, strict=True)
+    lost = [run.log[acting] - run.log[commanded] for acting, commanded in pairs]
+    return [a + b for a, b in zip(hull, lost, strict=True)]
+
+
 def model_error(runs: Runs) -> "Figure":
     """Model error and its estimate on each axis, one column of panels for each run."""
     figure, panels = stacked(3, len(runs), 6.5, max(WIDTH, 3.5 * len(runs)), sharey="row")
     for column, run in zip(panels.T, runs, strict=True):
         if len(runs) > 1:
             column[0].set_title(run.label, fontsize=10)
-        for panel, true, estimate in zip(column, run.roles.model_error, run.roles.estimate, strict=True):
+        for panel, true, estimate in zip(column, missing_force(run), run.roles.estimate, strict=True):
             # The thin black line stays visible on the estimate, and the estimate around it.
-            plot(panel, run, run.log[true], color="black", linestyle="-", linewidth=0.9, zorder=3)
+            plot(panel, run, true, color="black", linestyle="-", linewidth=0.9, zorder=3)
             plot(panel, run, run.log[estimate], linestyle="-", linewidth=1.8)
     for panel, axis in zip(panels[:, 0], AXES, strict=True):
         panel.set_ylabel(f"ω in {axis} [{'N m' if axis == 'N' else 'N'}]")

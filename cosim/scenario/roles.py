@@ -46,7 +46,13 @@ class Roles(Strict):
     nonlinear_force: Columns = Field(
         default=_axes("controller.tau_nonlin_"), description="nonlinear part of the requested force"
     )
-    model_error: Columns = Field(default=_axes("vessel.omega_star_"), description="true model error")
+    acting_force: Columns = Field(
+        default=_axes("thrusters.tau_act_"),
+        description="force that acts: what it lacks of 'force' counts as model error",
+    )
+    model_error: Columns = Field(
+        default=_axes("vessel.omega_star_"), description="true model error of the hull"
+    )
     estimate: Columns = Field(
         default=_axes("controller.omega_hat_"), description="estimated model error"
     )
@@ -64,7 +70,7 @@ class Roles(Strict):
     def columns(self) -> tuple[str, ...]:
         """``time`` and all columns that metrics and pictures may read."""
         tracking = self.of("pose", "velocity", "target", "requested_force", "force")
-        forces = self.of("linear_force", "nonlinear_force", "model_error", "estimate")
+        forces = self.of("linear_force", "nonlinear_force", "acting_force", "model_error", "estimate")
         return ("time", *tracking, *forces)
 
     def given(self) -> Iterator[tuple[str, str]]:

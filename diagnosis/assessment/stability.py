@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim import InputError
-from fmus.effects import Motion
+from fmus.effects import Loaded
 from fmus.hull import damping_force
 from fmus.vessel.vessel_effects import NONE
 
@@ -147,7 +147,7 @@ def force(model: Model, nu: np.ndarray) -> np.ndarray:
     b = model.hull
 
     def total(u: np.ndarray, v: np.ndarray, r: np.ndarray) -> np.ndarray:
-        at = Motion(0.0, 0.0, 0.0, u, v, r, 0.0)
+        at = Loaded(u=u, v=v, r=r)
         result = np.stack(damping_force(u, v, r, b.hull.damping))
         for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
             added = member.apply(acts, b.params.outside, NONE, at)

@@ -10,6 +10,7 @@ import numpy as np
 from cosim import InputError
 from cosim.errors import nearest
 from fmus.declare import Component, Variable, packer, variables
+from fmus.effects.linear_map import AXES, parameter
 from fmus.effects.measurement import CLOCK_OFFSET
 from fmus.hull import mass_matrix
 from fmus.ship import Ship, ship
@@ -117,6 +118,12 @@ class Model:
     def mass(self) -> np.ndarray:
         """(3, 3), mass matrix M [kg, kg m, kg m2], effects included."""
         return np.array(mass_matrix(self.hull.hull.inertia))
+
+    @cached_property
+    def effective_thrust(self) -> np.ndarray:
+        """(3, 3), I + B_tau: force on the hull by the thrusters' force, with the effect linear_map."""
+        given = [[self.vessel.get(parameter(a, f"tau_{b}"), 0.0) for b in AXES] for a in AXES]
+        return np.eye(3) + np.array(given)
 
     @property
     def reference_mass(self) -> np.ndarray:

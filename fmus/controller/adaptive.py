@@ -27,11 +27,19 @@ from .parametrisation import GAIN, Parametrisation
 
 
 class Disturbance(NamedTuple):
-    """Adaptation to a constant earth-fixed force omega_n: off unless a gain is set."""
+    """Adaptation to a constant earth-fixed force omega_n by z2: off unless a gain is set."""
 
-    gamma_omega_x: Annotated[float, "1/m", "adaptation gain of the north force", GAIN] = 0.0
-    gamma_omega_y: Annotated[float, "1/m", "adaptation gain of the east force", GAIN] = 0.0
-    gamma_omega_psi: Annotated[float, "1", "adaptation gain of the yaw moment", GAIN] = 0.0
+    gamma_omega_x: Annotated[float, "N/m", "adaptation gain of the north force", GAIN] = 0.0
+    gamma_omega_y: Annotated[float, "N/m", "adaptation gain of the east force", GAIN] = 0.0
+    gamma_omega_psi: Annotated[float, "N.m/rad", "adaptation gain of the yaw moment", GAIN] = 0.0
+
+
+class DisturbanceByError(NamedTuple):
+    """The same by eps, which is a force."""
+
+    gamma_omega_x: Annotated[float, "1/s", "adaptation gain of the north force", GAIN] = 0.0
+    gamma_omega_y: Annotated[float, "1/s", "adaptation gain of the east force", GAIN] = 0.0
+    gamma_omega_psi: Annotated[float, "1/s", "adaptation gain of the yaw moment", GAIN] = 0.0
 
 
 class OmegaTrue(NamedTuple):

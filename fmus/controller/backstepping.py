@@ -19,9 +19,9 @@ from .parametrisation import GAIN, Parametrisation, Regressors
 class Gains(NamedTuple):
     """Feedback gains, Table 5.1: diagonals of K_p and K_d."""
 
-    K_p_x: Annotated[float, "rad/s", "position gain, along", GAIN] = 0.4
-    K_p_y: Annotated[float, "rad/s", "position gain, across", GAIN] = 1.0
-    K_p_psi: Annotated[float, "rad/s", "heading gain", GAIN] = 0.2
+    K_p_x: Annotated[float, "1/s", "position gain, along", GAIN] = 0.4
+    K_p_y: Annotated[float, "1/s", "position gain, across", GAIN] = 1.0
+    K_p_psi: Annotated[float, "1/s", "heading gain", GAIN] = 0.2
     K_d_u: Annotated[float, "N.s/m", "velocity gain, surge", GAIN] = 1.0
     K_d_v: Annotated[float, "N.s/m", "velocity gain, sway", GAIN] = 5.0
     K_d_r: Annotated[float, "N.m.s/rad", "velocity gain, yaw", GAIN] = 1.0

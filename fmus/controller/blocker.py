@@ -11,7 +11,11 @@ OFF = 1e6
 
 
 class BlockerOptions(NamedTuple):
-    """Norms above which learning stops; so large by default that it never does."""
+    """Norms above which learning stops.
+
+    Those of velocity and acceleration are so large by default that they never act. That of the force
+    does: learning sees the force that the controller asks for, which may be more than thrusters give.
+    """
 
     nu_dot_max: Annotated[float, "1", "norm of the acceleration that blocks", POSITIVE] = OFF
     nu_max: Annotated[float, "1", "norm of the velocity that blocks", POSITIVE] = OFF

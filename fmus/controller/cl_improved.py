@@ -2,7 +2,8 @@
 
 Samples are smoothed over two seconds (chapter 8): with a force among the regressors, the lag of an
 observer's acceleration would otherwise be taken for a loss of thrust. The thresholds lie above what the
-ship does on the ellipse; 3 N is what its thrusters give.
+ship does on the ellipse; 3 N is what its thrusters give. All of it is more than 7.5 prints, which is
+(7.1) alone: ``cl_win_eps_surge``.
 """
 
 from .concurrent import concurrent

@@ -11,7 +11,7 @@ from ..declare import POSITIVE, Component, DeclarationError
 from ..hull import Triple
 from ..ops import Number, choose, sqrt, when, where
 from ..signals import Force
-from .adaptive import attentive, energy, parameters, to_body
+from .adaptive import Disturbance, DisturbanceByError, attentive, energy, parameters, to_body
 from .backstepping import Inputs, control, control_errors, outputs, starting
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
@@ -104,7 +104,8 @@ def concurrent(
     unknown = starts.keys() - {field for group in groups.values() for field in group._fields}
     if unknown:
         raise DeclarationError(f"{name} has no {', '.join(sorted(unknown))} to start differently")
-    Params = parameters(model, **groups)
+    # With z2 the law adds forces to a velocity: the gain has the unit for z2, store_weight the rest.
+    Params = parameters(model, disturbance=DisturbanceByError() if by_eps else Disturbance(), **groups)
     Outputs = outputs(model, Learning())
     still: Triple = (0.0, 0.0, 0.0)
     beginning = empty_store(model)
@@ -146,7 +147,7 @@ def concurrent(
         sums = s.store.sums
         memory = when(
             omega_on,
-            lambda: remembered(sums, integral, p.samples.rho),
+            lambda: remembered(sums, integral, p.samples.rho, p.store.store_weight),
             lambda: no_integral,
         )
         if by_eps:
@@ -161,7 +162,7 @@ def concurrent(
             1.0 if by_eps else 0.0,
             sums,
             memory,
-            p.store.stale,
+            p.store,
             dt,
         )
 

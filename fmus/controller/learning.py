@@ -1,13 +1,14 @@
 """How fast concurrent learning moves its estimates, 4.1.2-4.1.5, corrected.
 
-    phi_hat'     = Gamma (F^T e + sum_j F_j^T eps_j)
-    omega_n_hat' = Gamma_omega (R e + sum_j R_j eps_j), or (4.35) with rho > 0
+    phi_hat'     = Gamma (F^T e + w sum_j F_j^T eps_j)
+    omega_n_hat' = Gamma_omega (R e + w sum_j R_j eps_j), or (4.35) with rho > 0
 
 where F = -Phi and e is z2 or eps. The errors eps_j are formed anew with today's estimates; ``stale`` = 1
-uses them as they were when stored, as printed.
+uses them as they were when stored, as printed. w is ``store_weight``: footnote 1 has w = 0.1.
 
 The part driven by eps is a linear feedback with the information matrix Q. Explicit Euler is unstable
 where h Gamma lambda_max(Q) > 2, so that part goes slower where h times the trace of Gamma Q exceeds 1.
+Q counts the stored samples with their weight.
 With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n each.
 """
 
@@ -15,10 +16,10 @@ from typing import Any, NamedTuple
 
 from ..hull import Triple
 from ..ops import Number, fmax, when, where
-from .adaptive import Disturbance, climb, to_earth
+from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
 from .eigen import dot
 from .parametrisation import Parametrisation, Regressors
-from .store import Row, Sums, plus, times
+from .store import Row, StoreOptions, Sums, plus, times
 
 
 class Memory(NamedTuple):
@@ -29,12 +30,12 @@ class Memory(NamedTuple):
     cross: tuple[Triple, ...]
 
 
-def remembered(sums: Sums, integral: Memory, rho: Number) -> Memory:
-    """What omega_n learns by: rho times the integral, or with rho = 0 the store."""
+def remembered(sums: Sums, integral: Memory, rho: Number, weight: Number) -> Memory:
+    """What omega_n learns by: rho times the integral, or with rho = 0 the weighted store."""
     return when(
         rho > 0.0,
         lambda: times(rho, integral),
-        lambda: Memory(sums.count, sums.turned, sums.cross),
+        lambda: times(weight, Memory(sums.count, sums.turned, sums.cross)),
     )
 
 
@@ -70,13 +71,15 @@ def earth_slopes(memory: Memory, phi: Any, omega: Triple, stale: Number) -> Trip
     return a, b, c
 
 
-def information(model: Parametrisation, gamma: Any, sums: Sums, F: Regressors, own: Number) -> Any:
-    """Trace of Gamma Q, of the store and of ``own`` times the present sample."""
+def information(
+    model: Parametrisation, gamma: Any, sums: Sums, F: Regressors, weight: Number, own: Number
+) -> Any:
+    """Trace of Gamma Q, of ``weight`` times the store and ``own`` times the present sample."""
     total = 0.0
     for indices, gram, row in zip(model.pattern, sums.grams, F, strict=True):
         for position, k in enumerate(indices):
             f = row[position]
-            total = total + gamma[k] * (gram[position][position] + own * f * f)
+            total = total + gamma[k] * (weight * gram[position][position] + own * f * f)
     return total
 
 
@@ -97,12 +100,12 @@ class Drive(NamedTuple):
 def learned(
     model: Parametrisation,
     estimates: tuple[Any, Triple],
-    gains: tuple[Any, Disturbance],
+    gains: tuple[Any, Disturbance | DisturbanceByError],
     drive: Drive,
     by_eps: Number,
     sums: Sums,
     memory: Memory,
-    stale: Number,
+    options: StoreOptions,
     dt: Number,
 ) -> tuple[Any, Triple]:
     """The estimates after dt [s].
@@ -115,7 +118,7 @@ def learned(
         by_eps: 1 where that is eps, and so belongs to the guarded part, else 0.
         sums: over the store.
         memory: what omega_n learns by.
-        stale: 1 for errors as they were when stored.
+        options: whether stored errors are stale, and the weight of their sum.
         dt: 0 where nothing is learned.
 
     Returns:
@@ -124,10 +127,11 @@ def learned(
     phi, omega = estimates
     gamma, gamma_omega = gains
     on = dot(gamma_omega, (1.0, 1.0, 1.0))
-    trace = information(model, gamma, sums, drive.F, by_eps) + on * (memory.weight + by_eps)
+    stale, weight = options.stale, options.store_weight
+    trace = information(model, gamma, sums, drive.F, weight, by_eps) + on * (memory.weight + by_eps)
     guarded = dt / fmax(1.0, dt * trace)
     pace = where(by_eps > 0.5, guarded, dt)
-    slopes = stored_slopes(model, sums, phi, omega, on > 0.0, stale)
+    slopes = times(weight, stored_slopes(model, sums, phi, omega, on > 0.0, stale))
     earth = when(
         on > 0.0,
         lambda: earth_slopes(memory, phi, omega, stale),

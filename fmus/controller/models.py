@@ -47,19 +47,39 @@ ROTATIONAL = Parametrisation(
 )
 
 
-def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+def _surge_damping(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
     u, v, r = nu
     f = rotational_regressors(v, r)
-    return (abs(u) * u, u, abs(u) * r, -tau[0]), (*f, -tau[1]), (*f, -tau[2])
+    return (abs(u) * u, u, abs(u) * r), f, f
+
+
+_SURGE = (
+    Coefficient("X_absu_u, added", "N.s2/m2", "surge force, |u|u", 0.0, 8.0),
+    Coefficient("X_u, added", "N.s/m", "surge force, u", 0.0, 4.0),
+    Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
+)
+
+# (7.1), (7.2). The surge coefficients add to g(nu).
+SURGE_DAMPING = Parametrisation(
+    coefficients=(*_SURGE, *_ROTATIONAL),
+    pattern=((0, 1, 2), (3, 4, 5, 6), (7, 8, 9, 10)),
+    regressors=_surge_damping,
+    known=towed_and_coriolis,
+    # Yaw has the regressors of sway.
+    blocks=((0,), (1,)),
+)
+
+
+def _surge(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regressors:
+    X, Y, N = _surge_damping(nu, nu_dot, tau, b)
+    return (*X, -tau[0]), (*Y, -tau[1]), (*N, -tau[2])
 
 
 # (7.1)-(7.5). The surge coefficients add to g(nu). The gains of the losses are small because a force is
 # some ten times as large as the other regressors.
 SURGE = Parametrisation(
     coefficients=(
-        Coefficient("X_absu_u, added", "N.s2/m2", "surge force, |u|u", 0.0, 8.0),
-        Coefficient("X_u, added", "N.s/m", "surge force, u", 0.0, 4.0),
-        Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
+        *_SURGE,
         *_ROTATIONAL,
         Coefficient("delta_X", "1", "loss of thrust in surge", 0.0, 0.1),
         Coefficient("delta_Y", "1", "loss of thrust in sway", 0.0, 0.1),
@@ -167,6 +187,7 @@ SCALED = Parametrisation(
 PARAMETRISATIONS: dict[str, Any] = {
     "rotational": ROTATIONAL,
     "surge": SURGE,
+    "surge damping": SURGE_DAMPING,
     "all": ALL_UNKNOWN,
     "scaled": SCALED,
 }

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import FIXED, POSITIVE, Range
 from ..frames import rotate_to_earth
 from ..hull import Triple
-from ..ops import Number, choose, fmax, fmin, put, when, where
+from ..ops import Number, choose, fmax, fmin, kernel, put, when, where
 from .eigen import dot, exceed, smallest, tridiagonal
 from .parametrisation import Parametrisation, Regressors
 
@@ -26,6 +26,8 @@ class StoreOptions(NamedTuple):
     age_limit: Annotated[float, "s", "samples are forgotten after this time; 0: never", POSITIVE] = 0.0
     stale: Annotated[float, "1", "1: errors as they were when stored", FIXED, Range(0.0, 1.0)] = 0.0
     rank_tolerance: Annotated[float, "1", "rank is met above this singular value", POSITIVE] = 0.01
+    # Footnote 1 of 4.1.4 prints 0.1, for stale errors. With errors formed anew 1 learns faster.
+    store_weight: Annotated[float, "1", "weight of the sum over the store, rho", POSITIVE] = 1.0
 
 
 class Row(NamedTuple):
@@ -107,10 +109,11 @@ def empty_row(F: Regressors) -> Row:
 def empty_store(model: Parametrisation) -> Store:
     F: Any = tuple([tuple([0.0] * len(indices)) for indices in model.pattern])
     rows = (empty_row(F),) * SIZE
-    return Store(rows, F, summed(model, rows, False))
+    return Store(rows, F, summed(False, rows, model))
 
 
-def summed(model: Parametrisation, rows: tuple[Row, ...], omega_on: Number) -> Sums:
+@kernel
+def summed(omega_on: Number, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
     count, oldest = 0.0, NEVER
     projected: tuple[Any, ...] = (0.0,) * len(model.coefficients)
@@ -204,6 +207,6 @@ def offer(
         )
         rows = when(considered, lambda: storage(model, kept, store.sums, row), lambda: kept)
         last = choose(considered, row.F, store.last)
-        return Store(rows, last, summed(model, rows, omega_on))
+        return Store(rows, last, summed(omega_on, rows, model))
 
     return when(considered | expired, revised, lambda: store)

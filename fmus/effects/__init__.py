@@ -5,19 +5,35 @@ from . import (
     environment,
     force,
     inertia,
+    linear_map,
     measurement,
+    outages,
+    single_propellers,
     thrust_curves,
     thruster_dynamics,
 )
-from .effect import Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect import (
+    EACH_VSP,
+    Effect,
+    Loaded,
+    Memory,
+    Motion,
+    Running,
+    Search,
+    Thrust,
+    Wording,
+    effect,
+)
 from .effect_set import EffectSet, effects_of
 from .families import Family
 
 __all__ = [
+    "EACH_VSP",
     "STANDARD",
     "Effect",
     "EffectSet",
     "Family",
+    "Loaded",
     "Memory",
     "Motion",
     "Running",
@@ -33,10 +49,13 @@ STANDARD = EffectSet(
     e
     for module in (
         thrust_curves,
+        single_propellers,
         actuator,
+        outages,
         thruster_dynamics,
         environment,
         force,
+        linear_map,
         inertia,
         measurement,
     )

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from ..declare import DeclarationError, nearest
-from .effect import Effect, Kind, Motion, Running, Thrust
+from .effect import Effect, Kind, Loaded, Running, Thrust
 
 ROOM = Path(__file__).parent
 
@@ -118,8 +118,14 @@ def _imported(name: str, path: Path) -> ModuleType:
 
 # Motion and thrust at which effects are compared, so large that squares and products all count.
 _AT = (
-    (Motion(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0), Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5)),
-    (Motion(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0), Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5)),
+    (
+        Loaded(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0, 0.4, 0.6, -0.3),
+        Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5),
+    ),
+    (
+        Loaded(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0, -0.4, -0.6, 0.3),
+        Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5),
+    ),
 )
 
 
@@ -139,6 +145,12 @@ def is_linear(e: Effect) -> bool:
             off = [abs(a - 2.0 * b + c) for a, b, c in zip(none, once, twice, strict=True)]
             if max(off) > 1e-6 * size:
                 return False
+        parts = [{name: 0.5 * _unit(e, name)} for name in e.coefficients]
+        alone = [_flat(e, at, one) for one in ({}, *parts)]
+        whole = _flat(e, at, {name: x for one in parts for name, x in one.items()})
+        rest = [w - sum(p) + (len(parts) - 1) * n for w, n, *p in zip(whole, *alone, strict=True)]
+        if max(map(abs, rest)) > 1e-6 * max(map(abs, whole)):
+            return False
     return True
 
 

@@ -15,12 +15,12 @@ GAIN = Range(0.0, 50.0)
 class Gains(NamedTuple):
     """K_1 and K_2, limits of the velocity, and the filter of the acceleration."""
 
-    k1_x: Annotated[float, "rad/s", "correction of the north position", GAIN] = 6.0
-    k1_y: Annotated[float, "rad/s", "correction of the east position", GAIN] = 6.0
-    k1_psi: Annotated[float, "rad/s", "correction of the heading", GAIN] = 6.0
-    k2_u: Annotated[float, "rad2/s2", "correction of the surge velocity", GAIN] = 9.0
-    k2_v: Annotated[float, "rad2/s2", "correction of the sway velocity", GAIN] = 9.0
-    k2_r: Annotated[float, "rad2/s2", "correction of the yaw rate", GAIN] = 9.0
+    k1_x: Annotated[float, "1/s", "correction of the north position", GAIN] = 6.0
+    k1_y: Annotated[float, "1/s", "correction of the east position", GAIN] = 6.0
+    k1_psi: Annotated[float, "1/s", "correction of the heading", GAIN] = 6.0
+    k2_u: Annotated[float, "1/s2", "correction of the surge velocity", GAIN] = 9.0
+    k2_v: Annotated[float, "1/s2", "correction of the sway velocity", GAIN] = 9.0
+    k2_r: Annotated[float, "1/s2", "correction of the yaw rate", GAIN] = 9.0
     u_max: Annotated[float, "m/s", "velocity that no ship has", Range(0.0, 100.0)] = 2.0
     r_max: Annotated[float, "rad/s", "yaw rate that no ship has", Range(0.0, 100.0)] = 5.0
     b: Annotated[float, "1", "weight of a new acceleration in its filter", FRACTION] = 0.05

@@ -9,7 +9,7 @@ from operator import add
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import FIXED, Component, bundle
-from ..effects import STANDARD, EffectSet, Motion
+from ..effects import STANDARD, EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
@@ -143,8 +143,9 @@ def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] with every effect, in a current that the hull sees as nu_r."""
     ship, u_c, v_c = through_water(s, b)
     X, Y, N = tau
+    loaded = Loaded(*ship, *tau)
     for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
-        dX, dY, dN = member.apply(acts, b.params.outside, NONE, ship)
+        dX, dY, dN = member.apply(acts, b.params.outside, NONE, loaded)
         X, Y, N = X + dX, Y + dY, N + dN
     u_dot, v_dot, r_dot = motion(ship.u, ship.v, ship.r, Force(X, Y, N), b.hull)
     # A constant current turns backwards in the turning ship's frame.
@@ -189,10 +190,10 @@ def change_forces(s: State, b: Prepared) -> Any:
     return b.effects.change_forces._make(forces)
 
 
-def outside_forces(s: State, b: Prepared) -> Any:
+def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
     """The force of each other effect on the hull."""
     ship, _, _ = through_water(s, b)
-    forces = forces_of(b.effects.outside, b.outside, b.params.outside, ship)
+    forces = forces_of(b.effects.outside, b.outside, b.params.outside, Loaded(*ship, *tau))
     return b.effects.outside_forces._make(forces)
 
 
@@ -252,7 +253,7 @@ def make(effects: EffectSet = STANDARD) -> Component:
         wrong = b.changed | b.disturbed | b.heavier
         omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
         change = when(b.changed, lambda: change_forces(after, b), lambda: unchanged)
-        outside = when(b.disturbed, lambda: outside_forces(after, b), lambda: undisturbed)
+        outside = when(b.disturbed, lambda: outside_forces(after, tau, b), lambda: undisturbed)
         _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
         u_dot, v_dot, r_dot = nu_dot
         omega_X, omega_Y, omega_N = omega

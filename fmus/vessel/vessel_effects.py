@@ -4,7 +4,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from ..declare import variables, vector
-from ..effects import Effect, EffectSet, Motion
+from ..effects import Effect, EffectSet, Loaded, Motion
 from ..effects.group import Group, group
 from ..hull import Damping
 
@@ -61,7 +61,7 @@ def _outputs_of(e: Effect) -> list[tuple[str, str, str, float]]:
     ]
 
 
-def forces_of(group: Group, acting: tuple[Any, ...], values: Any, ship: Motion) -> list[Any]:
+def forces_of(group: Group, acting: tuple[Any, ...], values: Any, ship: Motion | Loaded) -> list[Any]:
     """The force of each effect of a group [N, N m], on the axes that it acts on."""
     found: list[Any] = []
     for member, acts in zip(group.members, acting, strict=True):

@@ -1,0 +1,46 @@
+"""The thesis' own analysis of measured runs, chapters 3 and 7: PCA, PLS, SysID by concurrent learning.
+
+Samples of velocity, force and model error are organised (:mod:`.organisation`) and analysed; a model
+of the model error goes back into the ship by the effect ``linear_map``::
+
+    runs = gather_samples(["run1.csv", "run2.csv"])
+    found = regressed(joined(runs), recipe("PLS3"))
+    diagnosis.model.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
+"""
+
+from .concurrent_passes import Identified, explained, identify
+from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
+from .partial_least_squares import Regressed, regressed
+from .principal_components import PrincipalComponents, fit_components, outliers, removals
+from .recipes import RECIPES, Recipe, recipe
+from .samples import Samples, gather_samples, joined, model_error, without_outliers
+from .table_7_1 import NAMES, TABLE_7_1, plant, row
+
+__all__ = [
+    "NAMES",
+    "RECIPES",
+    "TABLE_7_1",
+    "EffectiveThrust",
+    "Identified",
+    "PrincipalComponents",
+    "Recipe",
+    "Regressed",
+    "Samples",
+    "as_model",
+    "effective_thrust",
+    "explained",
+    "fit_components",
+    "gather_samples",
+    "goes_into_the_plant",
+    "identify",
+    "joined",
+    "model_error",
+    "outliers",
+    "plant",
+    "recipe",
+    "regressed",
+    "removals",
+    "row",
+    "thrust_of",
+    "without_outliers",
+]

@@ -1,0 +1,160 @@
+"""Samples of a measured run for the analyses: velocity, acceleration, force, model error (7.7)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim import InputError
+from fmus.controller.models import ROTATIONAL
+from fmus.controller.parametrisation import Belief
+from fmus.frames import rotate_to_body
+from fmus.observer import mdf
+from fmus.observer.screen import Inputs
+from fmus.signals import Measurement
+
+from ..data import Run, Track, clean, read
+from ..progress import Advance, silent
+from ..smoothing import smooth
+from .principal_components import fit_components, outliers
+
+ESTIMATES = ("smoothed", "mdf")
+NU = ("u", "v", "r")
+TAU = ("tau_X", "tau_Y", "tau_N")
+OMEGA = ("omega_X", "omega_Y", "omega_N")
+# s; until the derivative filter has found the ship: ten times the longer of its time constants (chosen).
+SETTLED = 5.0
+# Samples below which nothing is analysed; chosen: ten for each of the columns of the largest recipe.
+FEWEST = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of one run, or of several in a row. Arrays are (n, 3) for surge, sway and yaw.
+
+    Attributes:
+        run: (n,), name of the run that each is of.
+        time: (n,) [s].
+        nu: velocity [m/s, m/s, rad/s].
+        nu_dot: acceleration [m/s2, m/s2, rad/s2].
+        tau: commanded force [N, N, N m], the mean of the steps before and after the sample.
+        omega: model error relative to (2.27), rotational damping included [N, N, N m], (7.7).
+    """
+
+    run: np.ndarray
+    time: np.ndarray
+    nu: np.ndarray
+    nu_dot: np.ndarray
+    tau: np.ndarray
+    omega: np.ndarray
+
+    def rows(self, keep: np.ndarray) -> "Samples":
+        """Only some of the samples."""
+        return Samples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+    @property
+    def names(self) -> list[str]:
+        """The runs, in order."""
+        return list(dict.fromkeys(self.run.tolist()))
+
+    @property
+    def x(self) -> np.ndarray:
+        """(n, 6), the columns u, v, r, tau_X, tau_Y, tau_N of (7.13)."""
+        return np.hstack([self.nu, self.tau])
+
+
+def model_error(nu: np.ndarray, nu_dot: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    """omega = M nu_dot + C(nu) nu + g(nu) - tau (n, 3) [N, N, N m], (7.7), of control model (2.27)."""
+    error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
+    return np.column_stack(np.broadcast_arrays(*error))
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """Several runs in a row."""
+    names = Samples.__dataclass_fields__
+    return Samples(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+
+
+def without_outliers(samples: Samples) -> Samples:
+    """The samples within the limits of a PCA of model error, velocity and force (7.3).
+
+    Raises:
+        InputError: a column is constant.
+    """
+    X = np.hstack([samples.omega, samples.nu, samples.tau])
+    model = fit_components(X, [*OMEGA, *NU, *TAU])
+    return samples.rows(~outliers(model, X))
+
+
+def gather_samples(
+    paths: Sequence[str | Path], estimates: str = "smoothed", advance: Advance = silent
+) -> list[Samples]:
+    """Read measured runs and estimate velocity and acceleration.
+
+    Args:
+        paths: files or folders of logs, see :func:`diagnosis.read`.
+        estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out;
+            ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
+        advance: progress callback.
+
+    Returns:
+        The samples of each run.
+
+    Raises:
+        InputError: a run cannot be used, is given twice, or has too few samples.
+    """
+    advance("reading")
+    runs = [read(path) for path in paths]
+    known: dict[bytes, str | Path] = {}
+    for run, path in zip(runs, paths, strict=True):
+        same = known.setdefault(np.column_stack([run.time, run.pose]).tobytes(), path)
+        if same is not path:
+            raise InputError(f"'{path}' holds the same measurement as '{same}'")
+    found = []
+    for run in runs:
+        advance(f"{estimates} states of {run.name}")
+        track = clean(run)
+        s = _smoothed(track) if estimates == "smoothed" else _filtered(track)
+        if s.time.size < FEWEST:
+            raise InputError(f"run '{run.name}': {s.time.size} samples are too few, {FEWEST} are needed")
+        found.append(s)
+    return found
+
+
+def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray) -> Samples:
+    """The rows to keep, with their forces."""
+    before = np.vstack([run.tau_cmd[:1], run.tau_cmd[:-1]])
+    tau = 0.5 * (before + run.tau_cmd)
+    good = keep & np.isfinite(nu).all(axis=1) & np.isfinite(nu_dot).all(axis=1)
+    good &= np.isfinite(tau).all(axis=1)
+    nu, nu_dot, tau = nu[good], nu_dot[good], tau[good]
+    names = np.full(nu.shape[0], run.name, dtype=object)
+    return Samples(names, run.time[good], nu, nu_dot, tau, model_error(nu, nu_dot, tau))
+
+
+def _smoothed(track: Track) -> Samples:
+    """By the smoother, at all measured samples that are no spikes."""
+    s = smooth(track)
+    ahead, aside = rotate_to_body(s.eta[:, 2], s.eta_ddot[:, 0], s.eta_ddot[:, 1])
+    u, v, r = s.nu.T
+    # The body-fixed axes turn at the yaw rate.
+    nu_dot = np.column_stack([ahead + r * v, aside - r * u, s.eta_ddot[:, 2]])
+    return _samples(track.run, s.used, s.nu, nu_dot)
+
+
+def _filtered(track: Track) -> Samples:
+    """By the modified derivative filter of 4.3.2, sample by sample."""
+    run, observer = track.run, mdf.COMPONENT
+    p: Any = observer.params()
+    pose = run.pose.tolist()
+    inputs = [Inputs(Measurement(*row)) for row in pose]
+    state, rows = observer.init(inputs[0], p), []
+    steps = np.diff(run.time, prepend=run.time[0]).tolist()
+    for i, h in zip(inputs, steps, strict=True):
+        state, e = observer.step(state, i, p, h)
+        rows.append((e.u_hat, e.v_hat, e.r_hat, e.u_dot_hat, e.v_dot_hat, e.r_dot_hat))
+    found = np.array(rows)
+    settled = (run.time >= run.time[0] + SETTLED) & ~track.between
+    return _samples(run, settled, found[:, :3], found[:, 3:])

@@ -1,0 +1,61 @@
+"""Principal components and outliers of runs: ``python -m diagnosis.pca RUN...``, 3.1 and 7.3."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+
+from cosim.command import run_command
+
+from .command_line import Done, analysis_parser, run
+from .progress import Advance
+from .result_folder import together
+
+FILES = ("pca.json", "report.html")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(partial(pca, _parser().parse_args(arguments)))
+
+
+def pca(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from .analysis import gather_samples  # only now: it takes a second to import
+    from .analysis.document import write_document, write_json
+    from .analysis.outlier_report import analyse, content, document, sentences
+
+    with together(options.out, FILES) as new:
+        runs = gather_samples(options.runs, options.estimates, advance)
+        advance("principal components")
+        found = analyse(runs, options.components)
+        write_json(new / FILES[0], content(found, options.estimates))
+        advance("report")
+        write_document(new / FILES[1], document(found, options.estimates))
+    return Done(0, [*sentences(found), f"in {options.out}: {', '.join(FILES)}"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = analysis_parser(
+        "pca",
+        "Principal components of model error, velocity and force, and the samples that are outliers.",
+        "examples:  python -m diagnosis.pca results/ellipse\n"
+        "           python -m diagnosis.pca run1.csv run2.csv --components 4 --out results/outliers\n"
+        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
+        "mdf",
+    )
+    made.add_argument(
+        "--components",
+        type=int,
+        metavar="A",
+        help="components of the model (the fewest that explain 90 %%)",
+    )
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,87 @@
+"""Partial least squares of the model error: ``python -m diagnosis.pls RUN...``, 3.1.3 and 7.3."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+
+from cosim.command import run_command
+
+from .command_line import Done, analysis_parser, run
+from .progress import Advance
+from .result_folder import together
+
+RESULT, MODEL, REPORT = FILES = ("pls.json", "model.ssv", "report.html")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(partial(pls, _parser().parse_args(arguments)))
+
+
+def pls(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from .analysis import gather_samples, recipes  # only now: it takes a second to import
+
+    recipe = recipes.recipe(options.recipe)
+    recipe.transformer()  # before any work: a library may be missing
+    from .analysis.document import write_document, write_json
+    from .analysis.into_the_plant import as_model, goes_into_the_plant, thrust_of
+    from .analysis.partial_least_squares import regressed
+    from .analysis.pls_report import content, document, sentences
+    from .analysis.samples import joined, without_outliers
+    from .model import write_model
+
+    with together(options.out, FILES) as new:
+        runs = gather_samples(options.runs, options.estimates, advance)
+        samples = joined(runs)
+        if not options.keep_outliers:
+            advance("outliers")
+            samples = without_outliers(samples)
+        advance(f"regression {recipe.name}")
+        found = regressed(samples, recipe)
+        possible = goes_into_the_plant(found.columns)
+        written = possible and (options.ssv or thrust_of(found).holds)
+        if written:
+            write_model(new / MODEL, as_model(found.c, found.B, found.columns))
+        write_json(new / RESULT, content(found, options.estimates))
+        advance("report")
+        write_document(new / REPORT, document(found, options.estimates))
+    shown = [*sentences(found)]
+    if not possible:
+        shown.append(f"{MODEL} is not written: the plant has no such columns.")
+    elif not written:
+        shown.append(f"{MODEL} is not written; --ssv writes it all the same.")
+    files = [name for name in FILES if written or name != MODEL]
+    return Done(0, [*shown, f"in {options.out}: {', '.join(files)}"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = analysis_parser(
+        "pls",
+        "Regress the model error on velocity and force by partial least squares, with cross-validation.",
+        "examples:  python -m diagnosis.pls results/ellipse\n"
+        "           python -m diagnosis.pls run1.csv run2.csv --recipe PLS2 --out results/pls2\n"
+        "           python -m cosim.run scenarios/ellipse.json --parameters results/pls/model.ssv\n"
+        "recipes:   PLS1 to PLS4 of Table 7.2; nominal, continuous: 3.2.2, 3.2.3\n"
+        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
+        "smoothed",
+    )
+    made.add_argument("--recipe", default="PLS3", metavar="NAME", help="how X is made (PLS3)")
+    made.add_argument(
+        "--keep-outliers", action="store_true", help="do not remove outliers by PCA beforehand (7.3)"
+    )
+    made.add_argument(
+        "--ssv",
+        action="store_true",
+        help=f"write {MODEL} also where its part of the force fails the check before simulation",
+    )
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,105 @@
+"""The weight of the stored sums, footnote 1 of 4.1.4: ``python -m studies.store_weight``.
+
+The four variants of concurrent learning on both paths with the ship's true state and no noise: stored
+errors formed anew or as printed (stale), samples of saturated thrusters left out or not, four weights.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+from .chapter5 import PATHS, UNGATED, needed
+from .monte_carlo import Content, run_all, shipped, vary
+from .outcome import Outcome, outcome, true_states
+from .study_command import progress, run_study, study_parser
+from .study_report import Report
+from .verdict import FOUR, OLD
+
+WEIGHTS = (1.0, 0.1, 0.05, 0.01)
+# Of the table: fresh or stale, and whether samples of saturated thrusters are kept out.
+FORMS = {
+    "fresh, gated": {},
+    "fresh, ungated": UNGATED,
+    "stale, gated": {"controller.stale": 1.0},
+    "stale, ungated": {"controller.stale": 1.0, **UNGATED},
+}
+# The thesis' order (5.3.3, 5.4.3), best first.
+ORDER = ("win_eps", "svd_eps", "win_z2", "svd_z2", "abs", "bs")
+PLAIN = "as it is"
+
+
+def variants(path: str, seconds: float | None) -> dict[str, Content]:
+    """``controller|form|weight`` -> scenario, for one path."""
+    base = shipped(path)
+    if seconds is not None:
+        base = vary(base, stop=seconds, metrics={"from": 0.5 * seconds})
+    found: dict[str, Content] = {}
+    for name in dict.fromkeys([*FOUR, *OLD]):
+        own = true_states(vary(base, {"controller": f"{name}.fmu"}, log={"signals": needed(name)}))
+        if name not in FOUR:
+            found[f"{name}|{PLAIN}|1"] = own
+            continue
+        for form, changes in FORMS.items():
+            for weight in WEIGHTS:
+                values = {**changes, "controller.store_weight": weight}
+                found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values)
+    return found
+
+
+def label(name: str) -> str:
+    """A controller as the report calls it."""
+    return name.removeprefix("controller_").removeprefix("cl_")
+
+
+def tables(report: Report, path: str, found: Mapping[str, Sequence[Outcome]]) -> None:
+    """The position errors of one path, and whether they are in the thesis' order."""
+    plain = {label(k.split("|")[0]): o[0].position for k, o in found.items() if PLAIN in k}
+    report.heading(path.capitalize())
+    report.text(
+        "Position error, RMS [m]. " + ", ".join(f"{n}: {x:.4f}" for n, x in plain.items() if n in ORDER)
+    )
+    rows = []
+    for form in FORMS:
+        for weight in WEIGHTS:
+            errors = {label(n): found[f"{n}|{form}|{weight:g}"][0].position for n in FOUR}
+            every = [{**errors, **plain}[n] for n in ORDER]
+            same = all(a < b for a, b in pairwise(every))
+            cells = [f"{errors[n]:.4f}" for n in ORDER[:4]]
+            rows.append([f"{form}, {weight:g}", *cells, "yes" if same else "no"])
+    report.table(["stored errors, samples, weight", *ORDER[:4], "thesis' order"], rows)
+
+
+def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | None) -> Path:
+    """Run everything and write the report; returns its path."""
+    todo = {path: variants(path, seconds) for path in paths}
+    report = Report(out, "The weight of the stored sums")
+    report.text(
+        "Footnote 1 of 4.1.4 reduces the stored part of the adaptation by ρ = 0.1: a "
+        "weight of every stored sum. True states, no noise, one run each. `stale`: stored errors as "
+        "Algorithms 1 and 2 print them. `ungated`: samples of saturated thrusters are stored too."
+    )
+    with progress(sum(map(len, todo.values())), "store weight") as advance:
+        for path, contents in todo.items():
+            found = run_all(contents, [0], outcome, None, jobs, advance)
+            tables(report, path, found)
+            report.result(path, found)
+    return report.write()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = study_parser(
+        "store_weight",
+        "Find out what the weight of the stored sums does (footnote 1 of 4.1.4).",
+        "  python -m studies.store_weight\n  python -m studies.store_weight --quick",
+        seeds=None,
+    )
+    parser.add_argument("--path", choices=PATHS, help="this path alone (both)")
+    options = parser.parse_args(arguments)
+    paths = (options.path,) if options.path else PATHS
+    run_study(partial(study, options.out, paths, 60.0 if options.quick else None, options.jobs))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+"""PCA, PLS and the organisation of data, chapter 3: identities, scikit-learn, brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cosim import InputError
+from diagnosis.analysis import organisation as org
+from diagnosis.analysis import partial_least_squares as pls
+from diagnosis.analysis import principal_components as pc
+from diagnosis.analysis.recipes import RECIPES, recipe
+from diagnosis.analysis.samples import NU, TAU, Samples, model_error
+
+NAMES = list("abcdef")
+
+
+def low_rank(n=400, m=6, rank=3, seed=0, noise=0.1):
+    rng = np.random.default_rng(seed)
+    return (
+        rng.normal(size=(n, rank)) @ rng.normal(size=(rank, m)) + noise * rng.normal(size=(n, m)) + 5.0
+    )
+
+
+def made(n=1600, seed=0, law=None):
+    """Samples whose model error is a law of velocity and force, with a little noise."""
+    rng = np.random.default_rng(seed)
+    nu = rng.normal(size=(n, 3)) * (0.1, 0.05, 0.2)
+    tau = rng.normal(size=(n, 3)) * (0.5, 1.0, 0.5)
+    omega = 0.01 * rng.normal(size=(n, 3)) + (law(nu, tau) if law else nu @ rng.normal(size=(3, 3)))
+    return Samples(np.full(n, "made", dtype=object), 0.1 * np.arange(n), nu, 0.0 * nu, tau, omega)
+
+
+class TestComponents:
+    def test_scores_are_orthogonal_and_data_is_scores_times_loadings_plus_residual(self):
+        X = low_rank()
+        m = pc.fit_components(X, NAMES, 3)
+        T, P = m.scores(X), m.loadings[:, :3]
+        G = T.T @ T
+        assert np.allclose(G, np.diag(np.diag(G)), atol=1e-8 * G.max())
+        assert np.allclose(P.T @ P, np.eye(3))
+        standard = (X - m.mean) / m.scale
+        assert np.allclose(standard, T @ P.T + m.residuals(X))
+        assert np.allclose(m.residuals(X) @ P, 0.0, atol=1e-9)
+        assert m.q(X).sum() + np.sum(T**2) == pytest.approx(np.sum(standard**2))
+        assert m.variance[:3] == pytest.approx(T.var(axis=0, ddof=1))
+
+    def test_as_scikit_learn_and_nipals(self):
+        decomposition = pytest.importorskip("sklearn.decomposition")
+        X = low_rank(seed=1)
+        m = pc.fit_components(X, NAMES, 2)
+        Z = (X - m.mean) / m.scale
+        other = decomposition.PCA().fit(Z)
+        assert m.variance == pytest.approx(other.explained_variance_)
+        assert np.abs(m.loadings.T) == pytest.approx(np.abs(other.components_), abs=1e-9)
+        t = Z[:, 0]
+        for _ in range(500):  # NIPALS
+            p = Z.T @ t / (t @ t)
+            p /= np.linalg.norm(p)
+            t = Z @ p
+        assert np.abs(p) == pytest.approx(np.abs(m.loadings[:, 0]), abs=1e-9)
+
+    def test_limits_keep_their_rate_on_gaussian_samples(self):
+        rng = np.random.default_rng(2)
+        mix = rng.normal(size=(9, 9)) * np.linspace(2.0, 0.2, 9)[:, None]
+        X = rng.normal(size=(100_000, 9)) @ mix
+        m = pc.fit_components(X, list("abcdefghi"))
+        assert np.mean(m.t2(X) > m.t2_limit) == pytest.approx(0.01, abs=0.001)
+        # Jackson and Mudholkar approximate; of a few uneven variances they are on the safe side.
+        assert np.mean(m.q(X) > m.q_limit) == pytest.approx(0.01, abs=0.003)
+        four = pc.fit_components(X, list("abcdefghi"), 4)
+        assert four.t2_limit == pytest.approx(stats.chi2.ppf(0.99, 4), rel=1e-3)
+
+    def test_injected_spikes_are_removed_and_hardly_anything_else(self):
+        X = low_rank(5000, seed=3)
+        rng = np.random.default_rng(4)
+        spikes = rng.choice(5000, 25, replace=False)
+        X[spikes, rng.integers(0, 6, 25)] += 10.0 * X.std(axis=0).max()
+        m = pc.fit_components(X, NAMES, 3)
+        bad = pc.outliers(m, X)
+        assert bad[spikes].all()
+        assert np.mean(np.delete(bad, spikes)) < 0.02
+        listed = pc.removals(m, X, NAMES, np.zeros(5000))
+        assert sum(r.last - r.first + 1 for r in listed) == bad.sum()
+
+    def test_validated_share_by_brute_force(self):
+        X = low_rank(80, seed=5)
+        found = pc.validated(X, NAMES, blocks=4)
+        for a in (1, 3, 6):
+            press = total = 0.0
+            for k in range(4):
+                test, rest = X[20 * k : 20 * k + 20], np.delete(X, np.s_[20 * k : 20 * k + 20], axis=0)
+                m = pc.fit_components(rest, NAMES, min(a, 5))
+                Z = (test - m.mean) / m.scale
+                P = m.loadings[:, :a]
+                press += np.sum((Z - Z @ P @ P.T) ** 2)
+                total += np.sum(Z**2)
+            assert found[a - 1] == pytest.approx(1.0 - press / total)
+
+    def test_constant_columns_and_too_few_samples_are_told(self):
+        X = low_rank()
+        X[:, 2] = 3.0
+        with pytest.raises(InputError, match=r"constant.*: c$"):
+            pc.fit_components(X, NAMES)
+        with pytest.raises(InputError, match="too few"):
+            pc.fit_components(low_rank(8), NAMES)
+        with pytest.raises(InputError, match="1 to 5"):
+            pc.fit_components(low_rank(), NAMES, 6)
+
+
+class TestBases:
+    BASES = (org.NominalBins, org.ContinuousNominal)
+
+    @pytest.mark.parametrize("basis", BASES)
+    def test_sums_to_one_also_outside_of_the_range(self, basis):
+        x = np.linspace(-0.5, 0.5, 1001)[:, None]
+        t = basis(["u"]).fit(x)
+        assert t.transform(x).sum(axis=1) == pytest.approx(1.0)
+        assert t.transform(x).shape[1] == len(t.get_feature_names_out())
+        assert t.clipped_ == pytest.approx([(np.mean((x < -0.02) | (x > 0.3)))])
+
+    def test_triangles_interpolate_at_their_nodes(self):
+        s = org.TABLE_1["u"]
+        nodes = org.ContinuousNominal.centres(s)
+        assert nodes.size == s.resolution + 1 == 11
+        assert org.ContinuousNominal.basis(nodes, s) == pytest.approx(np.eye(11), abs=1e-12)
+        x = np.linspace(s.low, s.high, 57)
+        assert org.ContinuousNominal.basis(x, s) @ nodes == pytest.approx(x)
+
+    def test_bins_of_the_printed_example(self):
+        """(3.18), corrected: ten bins of [0, 10]."""
+        s = org.StateRange(0.0, 10.0, 10)
+        found = org.NominalBins.basis(np.array([0.5, 3.2, 9.9, 10.0, 12.0, -1.0]), s)
+        assert found.shape == (6, 10)
+        assert found.argmax(axis=1).tolist() == [0, 3, 9, 9, 9, 0]
+
+    def test_quadratic_extension_of_the_velocity_is_that_of_7_14(self):
+        t = RECIPES["PLS2"].transformer()
+        names = [str(n) for n in t.get_feature_names_out()]
+        assert names == [*NU, *TAU, "|u|u", "|u|v", "|u|r", "|v|v", "|v|r", "|r|r", "|r|v"]
+        x = np.array([[0.1, -0.2, -0.3, 1.0, 2.0, 3.0]])
+        assert t.fit_transform(x)[0, 6:] == pytest.approx(
+            [0.01, -0.02, -0.03, -0.04, -0.06, -0.09, -0.06]
+        )
+
+    def test_transformers_work_in_a_pipeline_and_a_grid_search(self):
+        base = pytest.importorskip("sklearn.base")
+        pipeline = pytest.importorskip("sklearn.pipeline")
+        cross = pytest.importorskip("sklearn.cross_decomposition")
+        s = made()
+        for t in (RECIPES["PLS3"].transformer(), org.ContinuousNominal([*NU, *TAU])):
+            pipe = pipeline.make_pipeline(base.clone(t), cross.PLSRegression(2)).fit(s.x, s.omega)
+            assert pipe.predict(s.x).shape == s.omega.shape
+
+
+class TestPls:
+    def test_scores_are_orthogonal_and_x_is_scores_times_loadings_plus_residual(self):
+        s = made()
+        found = pls.regressed(s, recipe("PLS2"))
+        m = found.parts[0].model
+        Z, P = m.x_scores_, m.x_loadings_
+        G = Z.T @ Z
+        assert np.allclose(G, np.diag(np.diag(G)), atol=1e-6 * G.max())
+        X = (found.X - found.X.mean(axis=0)) / found.X.std(axis=0, ddof=1)
+        assert np.abs(Z.T @ (X - Z @ P.T)).max() < 1e-6 * np.abs(G).max(), (
+            "E is orthogonal to the scores"
+        )
+        assert found.predicted == pytest.approx(m.predict(found.X))
+
+    def test_all_factors_give_least_squares(self):
+        s = made()
+        law = recipe("PLS2")
+        X = law.transformer().fit_transform(s.x)
+        full = pls.regression(X, s.omega, X.shape[1])
+        c, B = pls.plain(full)
+        A = np.column_stack([np.ones(len(X)), X])
+        beta = np.linalg.lstsq(A, s.omega, rcond=None)[0]
+        assert c == pytest.approx(beta[0], abs=1e-8)
+        assert pytest.approx(beta[1:].T, rel=1e-6, abs=1e-8) == B
+
+    def test_a_hidden_map_is_found(self):
+        B = np.array([[-2.0, 0, 0, -0.3, 0, 0], [0, 0, 1.5, 0, 0, 0], [0, 0, -1.0, 0, 0, -0.3]])
+        s = made(law=lambda nu, tau: np.hstack([nu, tau]) @ B.T)
+        found = pls.regressed(s, replace(recipe("PLS2"), factors=None, most=13))
+        assert found.B[:, :6] == pytest.approx(B, abs=0.05)
+        assert min(found.by_axis("q2").values()) > 0.9
+
+    def test_validated_share_by_brute_force(self):
+        s = made(n=400)
+        law = recipe("PLS3")
+        X = law.transformer().fit_transform(s.x)
+        press = pls.press(X, s.omega, 3, blocks=4)
+        for a in (1, 3):
+            error = 0.0
+            for k in range(4):
+                test = np.arange(100 * k, 100 * k + 100)
+                rest = np.setdiff1d(np.arange(400), test)
+                m = pls.regression(X[rest], s.omega[rest], a)
+                error = error + np.sum((s.omega[test] - m.predict(X[test])) ** 2, axis=0)
+            assert press[a - 1] == pytest.approx(error)
+
+    def test_separate_regressions_stand_side_by_side(self):
+        found = pls.regressed(made(), recipe("PLS4"))
+        assert len(found.parts) == 3
+        assert found.B.shape == (3, 10)
+        assert all(f <= 3 for f in found.by_axis("factors").values())
+
+    def test_columns_of_ranges_are_told_how_much_they_clip(self):
+        found = pls.regressed(made(), recipe("continuous"))
+        assert set(found.clipped) == {*NU, *TAU}
+        assert found.clipped["u"] > 0.05
+
+    def test_a_missing_library_is_told_with_its_line_for_pip(self, monkeypatch):
+        import sys
+
+        monkeypatch.setitem(sys.modules, "sklearn.base", None)
+        monkeypatch.delitem(sys.modules, "diagnosis.analysis.organisation")
+        with pytest.raises(InputError, match=r"pip install 'cybership\[analysis\]'"):
+            recipe("PLS3").transformer()
+
+    def test_bad_input_is_told(self):
+        with pytest.raises(InputError, match="no recipe 'PLS9'"):
+            recipe("PLS9")
+        s = made()
+        s.tau[:, 1] = 0.0
+        with pytest.raises(InputError, match=r"constant.*tau_Y"):
+            pls.regressed(s, recipe("PLS2"))
+        with pytest.raises(InputError, match="too few"):
+            pls.regressed(made(n=100), recipe("PLS2"))
+
+
+def test_model_error_of_the_control_model_is_the_rotational_damping():
+    """(7.7): with the true plant of Table 2.1, omega is what (2.27) leaves out."""
+    from fmus.hull import (
+        Damping,
+        Hull,
+        Inertia,
+        RotationalDamping,
+        inverse_mass,
+        motion,
+        rotational_damping_force,
+    )
+    from fmus.signals import Force
+
+    rng = np.random.default_rng(6)
+    nu, tau = rng.normal(size=(20, 3)) * 0.1, rng.normal(size=(20, 3))
+    hull = Hull(Inertia(), inverse_mass(Inertia()), Damping())
+    nu_dot = np.array([motion(*n, Force(*f), hull) for n, f in zip(nu, tau, strict=True)])
+    expected = [rotational_damping_force(v, r, RotationalDamping()) for _, v, r in nu]
+    assert model_error(nu, nu_dot, tau) == pytest.approx(np.array(expected), abs=1e-9)

@@ -1,0 +1,288 @@
+"""The thesis' analysis of runs: SysID by concurrent learning, models in the plant, the three commands."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.command import command
+from support.measured import sail, smoothed
+
+from cosim import InputError
+from diagnosis.analysis import concurrent_passes as cp
+from diagnosis.analysis import into_the_plant as plant
+from diagnosis.analysis.samples import Samples, gather_samples, model_error
+from diagnosis.analysis.sysid_report import warnings
+from diagnosis.analysis.table_7_1 import NAMES, TABLE_7_1, row
+from diagnosis.analysis.table_7_1 import plant as plant_of
+from diagnosis.model import Model, integrals, omega, read_model
+from diagnosis.pca import main as pca
+from diagnosis.pls import main as pls
+from diagnosis.sysid import main as sysid
+from fmus.base_units import base_exponents
+from fmus.declare import variables
+from fmus.effects import STANDARD
+from fmus.effects.linear_map import AXES, REGRESSORS, parameter, regressors
+from fmus.signals import Force
+from fmus.vessel.vessel import COMPONENT, State
+from studies import sysid4
+
+MAP = STANDARD["linear_map"]
+
+
+def with_values(values):
+    return Model(vessel=values).hull
+
+
+class TestLinearMap:
+    def test_units_of_coefficient_times_regressor_are_a_force_or_a_moment(self):
+        units = {p.name: p.unit for p in MAP.parameters}
+        for axis in AXES:
+            force = base_exponents("N.m" if axis == "N" else "N")
+            for name, unit in REGRESSORS.items():
+                total = dict(base_exponents(unit))
+                for base, power in base_exponents(units[parameter(axis, name)]).items():
+                    total[base] = total.get(base, 0) + power
+                # A radian is a number, so that a yaw rate times a lever is a velocity.
+                found = {k: v for k, v in total.items() if v and k != "rad"}
+                assert found == force, (axis, name)
+
+    def test_model_error_of_the_vessel_is_the_map_of_velocity_and_force(self):
+        rng = np.random.default_rng(1)
+        values = {p.name: rng.normal() for p in MAP.parameters}
+        s, tau = State(0.0, 0.0, 0.3, 0.2, -0.1, 0.15, 0.0), Force(0.5, -0.3, 0.2)
+        _, out = COMPONENT.prepared_step(s, tau, with_values(values), 0.0)
+        x = np.array(regressors(s.u, s.v, s.r, tau))
+        expected = [
+            sum(values[parameter(a, n)] * v for n, v in zip(REGRESSORS, x, strict=True)) for a in AXES
+        ]
+        assert [out.omega_X, out.omega_Y, out.omega_N] == pytest.approx(expected)
+
+    def test_loss_of_thrust_is_a_map_of_the_force(self):
+        """(I + B_tau) tau: half of the force lost by the map moves the ship as half of the force."""
+        values = {parameter(a, f"tau_{a}"): -0.5 for a in AXES}
+        s, tau = State(u=0.1, r=0.05), Force(0.6, -0.4, 0.3)
+        lost, _ = COMPONENT.prepared_step(s, tau, with_values(values), 0.02)
+        half, _ = COMPONENT.prepared_step(s, Force(*(0.5 * x for x in tau)), with_values({}), 0.02)
+        assert tuple(lost) == pytest.approx(tuple(half), rel=1e-12)
+
+    def test_diagnosis_sees_the_part_of_the_force(self):
+        """The model error of a measured run is the same by a loss of the thrusters and by the map."""
+        run, _ = sail(32.0, h=0.05)
+        w = integrals(smoothed(run))
+        by_map = Model(vessel={parameter("X", "tau_X"): -0.3, parameter("N", "tau_N"): -0.2})
+        by_loss = Model(thrusters={"loss_surge": 0.3, "loss_yaw": 0.2})
+        assert omega(w, by_map) == pytest.approx(omega(w, by_loss), abs=1e-9)
+        assert np.abs(omega(w, by_map) - omega(w, Model())).max() > 0.05
+
+    def test_it_is_no_candidate(self):
+        assert MAP.search.by == "given"
+
+
+class TestIntoThePlant:
+    def test_plant_has_the_model_error_of_the_regression(self):
+        """omega relative to (2.27): the rotational damping of Table 2.1 must not count twice."""
+        rng = np.random.default_rng(2)
+        columns = ["u", "v", "r", "tau_X", "tau_Y", "tau_N", "|u|u", "|r|v"]
+        c, B = rng.normal(size=3), rng.normal(size=(3, 8))
+        model = plant.as_model(c, B, columns)
+        s, tau = State(u=0.1, v=0.04, r=-0.2), Force(0.3, 0.2, -0.1)
+        _, out = COMPONENT.prepared_step(s, tau, model.hull, 0.0)
+        nu_dot = np.array([[out.u_dot, out.v_dot, out.r_dot]])
+        found = model_error(np.array([[s.u, s.v, s.r]]), nu_dot, np.array([tau]))
+        x = [s.u, s.v, s.r, *tau, abs(s.u) * s.u, abs(s.r) * s.v]
+        assert found[0] == pytest.approx(c + B @ x)
+        assert [out.omega_star_X, out.omega_star_Y, out.omega_star_N] == pytest.approx(found[0])
+
+    def test_columns_that_the_plant_lacks_are_known(self):
+        assert plant.goes_into_the_plant(["u", "tau_X", "|v|r"])
+        assert not plant.goes_into_the_plant(["u", "|tau_X|tau_Y"])
+
+    def test_criterion(self):
+        assert plant.effective_thrust(np.zeros((3, 3))).least == pytest.approx(1.0)
+        reversed_ = plant.effective_thrust(np.diag([-1.2, 0.0, 0.0]))
+        assert not reversed_.holds
+        assert "reverses" in reversed_.sentence
+        # All eigenvalues are one, and yet a force acts backwards: only the symmetric part shows it.
+        skewed = plant.effective_thrust(np.array([[0.0, 5.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+        assert skewed.eigenvalues.real == pytest.approx(1.0)
+        assert not skewed.holds
+        assert "against" in skewed.sentence
+
+
+def made(phi, n=4000, seed=0, pairs=1.0):
+    """Samples of a ship with these coefficients, in rich motion; ``pairs`` = -1: |r|v = -|v|r."""
+    rng = np.random.default_rng(seed)
+    t = 0.05 * np.arange(n)
+
+    def wave(size, k):
+        return size * sum(np.sin((0.2 + 0.13 * j * k) * t + rng.uniform(0, 6)) for j in range(1, 5)) / 2
+
+    nu = np.column_stack([0.08 + wave(0.06, 1.0), wave(0.04, 1.3), wave(0.15, 0.7)])
+    if pairs < 0.0:
+        nu[:, 1] = -np.sign(nu[:, 2]) * np.abs(nu[:, 1])
+    tau = np.column_stack([wave(0.6, 1.7), wave(0.8, 0.9), wave(0.4, 1.1)])
+    s = Samples(np.full(n, "made", dtype=object), t, nu, 0.0 * nu, tau, 0.0 * nu)
+    return Samples(s.run, t, nu, s.nu_dot, tau, cp.regressors(s) @ phi)
+
+
+class TestPasses:
+    def test_coefficients_are_found_in_rich_motion(self):
+        phi = row("SYSID4")
+        found = cp.identify([made(phi)])
+        assert found.settled
+        assert found.least_squares == pytest.approx(phi, abs=1e-6)
+        assert found.ridge == pytest.approx(phi, abs=1e-2)
+        assert cp.explained([made(phi, seed=1)], found.phi) == pytest.approx(1.0, abs=0.02)
+        assert found.phi[-3:] == pytest.approx(phi[-3:], abs=0.05)
+
+    def test_a_pass_never_moves_away_from_the_truth_of_data_without_noise(self):
+        phi = row("SYSID3")
+        m = cp.material(made(phi, n=600))
+        now = np.zeros(14)
+        weights = 1.0 / cp.GAMMA
+        for _ in range(3):
+            after = cp.one_pass(now, m)
+            assert np.sum(weights * (after - phi) ** 2) < np.sum(weights * (now - phi) ** 2)
+            now = after
+
+    def test_products_that_cannot_be_told_apart_are_told(self):
+        s = made(row("SYSID4"), n=800, pairs=-1.0)
+        found = cp.identify([s])
+        said = " ".join(warnings(found, [s]))
+        assert "|r|v = −|v|r" in said
+        assert found.condition[1] > 1e6
+        rich = made(row("SYSID4"), n=800)
+        assert "|r|v =" not in " ".join(warnings(cp.identify([rich]), [rich]))
+
+    def test_nothing_is_learned_for_a_second_after_a_spike(self):
+        s = made(row("SYSID4"), n=400)
+        s.tau[100] = 10.0
+        beta = cp.allowed(s)
+        assert not beta[100:121].any()
+        assert beta[99]
+        assert beta[122]
+
+
+def test_rows_of_table_7_1_are_ships():
+    assert list(TABLE_7_1) == ["SYSID1", "SYSID2", "SYSID3", "SYSID4"]
+    for name in TABLE_7_1:
+        phi = row(name)
+        s = made(phi, n=50)
+        model = plant_of(phi)
+        for k in range(0, 50, 10):
+            _, out = COMPONENT.prepared_step(
+                State(u=s.nu[k, 0], v=s.nu[k, 1], r=s.nu[k, 2]), Force(*s.tau[k]), model.hull, 0.0
+            )
+            star = [out.omega_star_X, out.omega_star_Y, out.omega_star_N]
+            assert star == pytest.approx(s.omega[k], abs=1e-9)
+    assert row("SYSID4") == pytest.approx(sysid4.PHI)
+    with pytest.raises(InputError, match=r"no recipe 'SYSID5'.*SYSID1"):
+        row("SYSID5")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Two measured runs of a ship with more drag and lost thrust, and one that is too short."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, seconds in (("a", 48.0), ("b", 32.0), ("short", 12.0)):
+        run, _ = sail(
+            seconds,
+            h=0.05,
+            noise=0.2,
+            seed=ord(name[0]),
+            ship={"delta_X_u": -3.0},
+            thrusters={"loss_yaw": 0.2},
+        )
+        table = np.column_stack([run.time, run.pose, run.tau_cmd])
+        columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+        pd.DataFrame(table, columns=columns).to_csv(folder / f"{name}.csv", index=False)
+    return folder
+
+
+def test_both_estimates_of_velocity_are_those_of_the_run(runs):
+    (smooth,) = gather_samples([runs / "a.csv"], "smoothed")
+    (filtered,) = gather_samples([runs / "a.csv"], "mdf")
+    assert filtered.time[0] >= 5.0
+    both = np.isin(smooth.time, filtered.time)
+    rest = np.isin(filtered.time, smooth.time)
+    assert np.corrcoef(smooth.nu[both, 2], filtered.nu[rest, 2])[0, 1] > 0.95
+
+
+@pytest.mark.slow
+def test_pca_writes_its_results(runs, tmp_path):
+    done = command(pca, runs / "a.csv", runs / "b.csv", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "pca.json").read_text())
+    assert {"explained", "q2", "t2_limit", "q_limit", "removed"} <= set(found)
+    assert found["explained"][-1] == pytest.approx(1.0)
+    assert found["removed_share"] == pytest.approx(
+        sum(r["samples"] for r in found["removed"]) / found["samples"]
+    )
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("<svg") >= 5
+    assert "http:" not in page.replace("http://www.w3.org", "")
+    assert "https:" not in page
+
+
+@pytest.mark.slow
+def test_pls_writes_its_results_and_a_model_of_the_plant(runs, tmp_path):
+    done = command(pls, runs / "a.csv", runs / "b.csv", "--recipe", "PLS4", "--ssv", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "pls.json").read_text())
+    assert set(found["factors"]) == set(found["r2"]) == set(found["q2"]) == set(AXES)
+    u = found["coefficients"]["X"]["u"]
+    assert set(u) == {"value", "std", "sign_changes"}
+    model = read_model(tmp_path / "model.ssv")
+    assert model.vessel["map_X_u"] == pytest.approx(u["value"])
+    assert model.vessel["delta_Y_r"] == 7.25
+    assert "<svg" in (tmp_path / "report.html").read_text()
+
+
+def test_sysid_writes_its_results_and_a_model_of_the_plant(runs, tmp_path):
+    done = command(sysid, runs / "a.csv", "--test", runs / "b.csv", "--ssv", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "sysid.json").read_text())
+    assert set(found["parameters"]) == set(NAMES)
+    assert {"own", "other"} == set(found["r2"])
+    assert found["r2"]["other"]["N"] > 0.5
+    assert {"least_squares", "ridge", "condition", "passes", "warnings"} <= set(found)
+    model = read_model(tmp_path / "model.ssv")
+    assert model.vessel["map_N_tau_N"] == pytest.approx(-found["parameters"]["delta_N"])
+
+
+def test_rows_of_the_thesis_need_no_run(tmp_path):
+    done = command(sysid, "--recipe", "SYSID4", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    vessel = read_model(tmp_path / "model.ssv").vessel
+    assert vessel["delta_X_u"] == -3.5
+    assert vessel["delta_Y_r"] == pytest.approx(8.8)
+    assert vessel["map_X_tau_X"] == -0.3
+
+
+@pytest.mark.parametrize(
+    ("main", "arguments", "said"),
+    [
+        (pca, ["{}/short.csv"], "too few"),
+        (pca, ["{}/a.csv", "--components", "9"], "1 to 8"),
+        (pca, ["{}/nothing.csv"], "nothing.csv"),
+        (pca, ["{}/a.csv", "{}/a.csv"], "same measurement"),
+        (pls, ["{}/a.csv", "--recipe", "PLS7"], "no recipe 'PLS7'"),
+        (pls, ["{}/short.csv"], "too few"),
+        (sysid, [], "needs a run"),
+        (sysid, ["--recipe", "SYSID9"], "no recipe 'SYSID9'"),
+    ],
+)
+def test_bad_input_is_one_message(main, arguments, said, runs, tmp_path):
+    out = tmp_path / "out"
+    done = command(main, *[a.format(runs) for a in arguments], "--out", out)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
+
+
+def test_damping_parameters_are_all_cancelled():
+    names = {v.name for v in variables(COMPONENT.params)}
+    model = plant.as_model(np.zeros(3), np.zeros((3, 1)), ["u"])
+    assert set(model.vessel) <= names
