@@ -440,9 +440,8 @@ def test_calibration_finds_the_constants_that_made_the_findings():
     )
     rate = confidence(bagged, left, varies, known)
     true = rng.random(4000) < rate
-    found = fitted(
-        [Judged(*map(float, e), bool(t)) for *e, t in zip(bagged, left, varies, true, strict=True)]
-    )
+    table = zip(bagged.tolist(), left.tolist(), varies.tolist(), true.tolist(), strict=True)
+    found = fitted([Judged(b, x, y, t) for b, x, y, t in table])
     assert confidence(bagged, left, varies, found) == pytest.approx(rate, abs=0.05)
     none_wrong = fitted([Judged(1.0, 0.0, 0.0, True)] * 50)
     assert 0.9 < confidence(np.ones(1), np.zeros(1), np.zeros(1), none_wrong)[0] < 0.99
