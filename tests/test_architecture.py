@@ -26,7 +26,7 @@ COSIM_LAYERS = (
     ("system",),
     ("results",),
     ("master", "watch"),
-    ("export",),
+    ("export", "campaign"),
     ("run", "metrics", "plots", "interface"),  # commands
 )
 
@@ -61,6 +61,7 @@ LAYERS = {"cosim": COSIM_LAYERS, "diagnosis": DIAGNOSIS_LAYERS, "fmus": FMUS_LAY
 # What other packages may import of cosim: these modules, with their ``__all__``.
 PUBLIC = (
     "cosim",
+    "cosim.campaign",
     "cosim.command",
     "cosim.errors",
     "cosim.export",

@@ -77,6 +77,13 @@ CONTRACT = [
     "curve_X(u)",
     "curve_vsp_x(c)",
     "curve_bow(|u|)",
+    "bow_outage",
+    "vsp_outage",
+    "curve_vsp_y(c)",
+    "curve_vsp1_x(c)",
+    "curve_vsp1_y(c)",
+    "curve_vsp2_x(c)",
+    "curve_vsp2_y(c)",
 ]
 Params = COMPONENT.params
 CHANGES, OUTSIDE = vessel_effects(STANDARD).changes, vessel_effects(STANDARD).outside
@@ -302,6 +309,17 @@ def test_bow_thruster_fails_at_its_time():
     before, after = push(p, steps=4), push(p, steps=5)
     assert act(before) == pytest.approx(cmd(before))
     assert act(after) == pytest.approx(act(push(thruster_params(loss_bow=1.0))))
+
+
+@pytest.mark.parametrize("device", ["bow", "vsp"])
+def test_thruster_that_is_out_comes_back(device):
+    names = ("start_2", "end_2", "start_7", "end_7")
+    out = dict(zip((f"{device}_outage_{n}" for n in names), (0.02, 0.04, 0.06, 0.07), strict=True))
+    dead = act(push(thruster_params(**{f"loss_{device}": 1.0})))
+    for steps in range(1, 10):
+        force = act(push(thruster_params(**out), steps=steps))
+        gone = steps in (2, 3, 6)  # the force of a step is that at its end
+        assert force == pytest.approx(dead if gone else act(push(thruster_params(), steps=steps)))
 
 
 def test_bow_loses_effect_with_speed_and_never_turns_round():

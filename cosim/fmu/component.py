@@ -106,6 +106,7 @@ class Component:
         saved_state: the ``fmi2FMUstate`` of the last save, if there was one.
         complaint: the last message of a warning or worse that the FMU logged.
         worst_status: the worst status that any call returned.
+        on_message: as given; another one may take its place between runs.
 
     Raises:
         InputError: no binary for this platform, or instantiation refused.
@@ -145,12 +146,13 @@ class Component:
         self.saved_state = ctypes.c_void_p()
         self.complaint = ""
         self.worst_status = 0
+        self.on_message = on_message
 
         def listen(status: int, text: str) -> None:
             text = " ".join(text.split())
             if status > 0:
                 self.complaint = text
-            on_message(name, status, text)
+            self.on_message(name, status, text)
 
         self._modules: list[ModuleType] = []
         self._classes: list[type] = []

@@ -174,6 +174,11 @@ class Scenario(Strict):
         """Assumptions and omissions in reading it from the format of another tool."""
         return self._notes
 
+    @property
+    def unpacked(self) -> Unpacked | None:
+        """The scratch folder that an archive was unpacked to, if there is one."""
+        return self._unpacked
+
     def set_origin(
         self, folder: Path, notes: Sequence[str] = (), unpacked: Unpacked | None = None
     ) -> None:

@@ -12,11 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..model.weak_form import OVERLAP
 from .candidates import Candidate
 
-# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
-# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
-OVERLAP = 4.0
 RUN = 10_000  # blocks of a run are numbered from this times its number on
 FOLDS = 8  # of cross-validation over blocks
 # Ridge of the regression for the noise, relative to the regressors: they may be collinear.
