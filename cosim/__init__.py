@@ -10,13 +10,15 @@ runs a scenario; from Python::
 
 The packages below, each using only those before it: ``fmu`` (one FMU), ``formats`` (files of the SSP and
 OSP standards), ``scenario`` (the user's input), ``system`` (a scenario checked against its FMUs),
-``results`` (log, metrics, pictures), ``master`` (the run), ``export`` (systems for other tools).
+``results`` (log, metrics, pictures), ``master`` (the run), ``campaign`` (many runs), ``export``
+(systems for other tools).
 """
 
 from .lazy import lazy_names
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
+    from .campaign.conduct import run_campaign
     from .conversion import BASE_UNITS, Unit
     from .errors import InputError, SimulationError
     from .files import atomic_write
@@ -40,6 +42,7 @@ __all__ = [
     "load_scenario",
     "read_log",
     "read_parameters",
+    "run_campaign",
     "simulate",
     "write_parameters",
 ]
@@ -59,6 +62,7 @@ __getattr__ = lazy_names(
         "load_scenario": "scenario.load",
         "read_log": "results.log",
         "read_parameters": "formats.ssv",
+        "run_campaign": "campaign.conduct",
         "simulate": "master.simulation",
         "write_parameters": "formats.ssv",
     },

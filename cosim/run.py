@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from functools import partial
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -27,7 +28,8 @@ from .interrupts import on_interrupt, restore
 from .master.ending import Result
 from .master.simulation import simulate
 from .results.performance import table
-from .scenario.load import load_scenario
+from .scenario.load import load_scenario, with_settings
+from .scenario.setting import parse_assignment
 
 EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
 
@@ -42,7 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print(printable(text), markup=False)
 
     try:
-        scenario = load_scenario(options.scenario, {"step": options.step, "stop": options.stop})
+        chosen = {"step": options.step, "stop": options.stop, "seed": options.seed}
+        scenario = load_scenario(options.scenario, chosen)
+        if options.set:
+            settings = [parse_assignment(text) for text in options.set]
+            scenario = with_settings(scenario, settings, Path.cwd(), "--set")
         bar = (
             nullcontext()
             if options.quiet or not console.is_terminal
@@ -66,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.parameters,
                 options.realtime,
                 pictures=not options.no_plots,
-                native=not options.no_native,
+                only_own=options.only_own,
                 show=show,
                 progress=progress,
             )
@@ -127,6 +133,12 @@ def _positive(text: str) -> float:
     return value
 
 
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"needs a whole number from zero on, not '{text}'")
+    return int(text)
+
+
 def _folder(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("needs the name of a folder")
@@ -140,7 +152,9 @@ def _parser() -> argparse.ArgumentParser:
         epilog="examples:  python -m cosim.run scenarios/ellipse.json\n"
         "           python -m cosim.run scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters model.ssv\n"
-        "           python -m cosim.run theirs.json --no-native\n"
+        "           python -m cosim.run theirs.json --only-own\n"
+        "           python -m cosim.run scenarios/ellipse.json --set vessel.m=15 --seed 3\n"
+        "           python -m cosim.run scenarios/ellipse.json --set controller=./mine.fmu\n"
         "           python -m cosim.run system.ssp --stop 100\n"
         "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -152,6 +166,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--stop", type=_positive, metavar="SECONDS", help="another end")
     parser.add_argument("--step", type=_positive, metavar="SECONDS", help="another base step")
+    parser.add_argument("--seed", type=_seed, metavar="N", help="another seed of noise and faults")
+    parser.add_argument(
+        "--set",
+        metavar="PATH=VALUE",
+        action="append",
+        default=[],
+        help="one value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
+        "faults.0.std=0.001; may be given several times",
+    )
     parser.add_argument("--out", type=_folder, metavar="DIR", help="result folder (results/<name>)")
     parser.add_argument(
         "--parameters",
@@ -163,7 +186,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
-        "--no-native",
+        "--only-own",
         action="store_true",
         help="refuse FMUs with programs that python -m fmus.build has not built on this computer",
     )

@@ -27,7 +27,7 @@ class Done(NamedTuple):
 
 
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
-    """A parser with the options that both commands have: ``--model``, ``--effects``, ``--out``."""
+    """A parser with the options that both commands have."""
     made = argparse.ArgumentParser(
         prog=f"python -m diagnosis.{name}",
         description=description,
@@ -44,6 +44,11 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         help="a file of model effects of your own; may be repeated",
+    )
+    made.add_argument(
+        "--anyway",
+        action="store_true",
+        help="go on though a run's units, signs or columns seem to be other ones than said",
     )
     return made
 

@@ -27,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
+    from .assessment.plausibility import refuse_implausible
     from .gathering import gather
     from .model import Model, read_model
     from .report import comparison_content, show_comparison, write_report
@@ -34,7 +35,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     with together(options.out, FILES) as new:
         craft = ship_with(options.effects)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
-        comparison = session.evaluate(gather(options.runs, advance), model, advance=advance)
+        runs = gather(options.runs, advance, options.anyway)
+        if not options.anyway:
+            refuse_implausible(runs, options.runs, model)
+        comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")
         content = comparison_content(comparison, options.model, FILES)
         (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")

@@ -23,12 +23,15 @@ PROCESSES = 2  # more need more memory than they save time (chosen)
 WORTH = 60_000
 
 
-def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integrals]:
+def gather(
+    paths: Sequence[str | Path], advance: Advance = silent, anyway: bool = False
+) -> list[Integrals]:
     """Read and smooth measured runs.
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`.
         advance: progress callback.
+        anyway: whether units that no ship's motion can be in are believed.
 
     Returns:
         For each run its windows of the weak form; names are unique.
@@ -39,7 +42,7 @@ def gather(paths: Sequence[str | Path], advance: Advance = silent) -> list[Integ
     advance("reading")
     runs = [read(path) for path in paths]
     _refuse_twice(runs, paths)
-    return [_windows(s) for s in _smooth_all(_distinct(runs, paths), advance)]
+    return [_windows(s) for s in _smooth_all(_distinct(runs, paths), advance, anyway)]
 
 
 def _refuse_twice(runs: Sequence[Run], paths: Sequence[str | Path]) -> None:
@@ -63,21 +66,21 @@ def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
     ]
 
 
-def _smoothed(run: Run) -> Smoothed:
-    return smooth(clean(run))
+def _smoothed(run: Run, anyway: bool) -> Smoothed:
+    return smooth(clean(run, anyway))
 
 
-def _smooth_all(runs: Sequence[Run], advance: Advance) -> Iterable[Smoothed]:
+def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable[Smoothed]:
     if len(runs) < 2 or sum(run.time.size for run in runs) < WORTH:
         for run in runs:
             advance(f"smoothing {run.name}")
-            yield _smoothed(run)
+            yield _smoothed(run, anyway)
         return
     # Ctrl-C is for this process alone, which then lets the others end.
     pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), ignore_interrupts)
     try:
         with UninterruptedProcesses():
-            futures = [pool.submit(_smoothed, run) for run in runs]
+            futures = [pool.submit(_smoothed, run, anyway) for run in runs]
         for run, future in zip(runs, futures, strict=True):
             advance(f"smoothing {run.name}")
             yield future.result()

@@ -29,6 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
+    from .assessment.plausibility import refuse_implausible
     from .gathering import gather
     from .model import Model, read_model, write_model
     from .report import diagnosis_content, show_diagnosis, write_report
@@ -38,7 +39,10 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         craft = ship_with(options.effects)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
         by = method(options.method)
-        runs = gather([*options.train, *options.test], advance)
+        paths = [*options.train, *options.test]
+        runs = gather(paths, advance, options.anyway)
+        if not options.anyway:
+            refuse_implausible(runs, paths, model)
         train = len(options.train)
         diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
         refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND

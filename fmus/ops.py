@@ -8,6 +8,7 @@ an infinity instead of raising.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 # Any: float, numpy array or symbol. The dispatch is by type, which Python's typing cannot express.
@@ -88,11 +89,30 @@ def choose(condition: Number, a: Any, b: Any) -> Any:
 def when(condition: Number, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
     """What ``a`` gives where the condition holds, else what ``b`` gives: for rare, costly work.
 
-    Both give numbers in the same nested tuples. On a bool only the one that counts is called.
+    Both give numbers in the same nested tuples. On a bool only the one that counts is called, and so it
+    is in generated code.
     """
     if condition.__class__ is bool:
         return a() if condition else b()
-    return choose(condition, a(), b())
+    branch = getattr(condition, "branch", None)
+    return choose(condition, a(), b()) if branch is None else branch(a, b)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Marks a pure function of nested tuples or lists of numbers as heavy work that is done often.
+
+    Generated code has it once, as a function of its own, in place of a copy for each call.
+    """
+
+    @wraps(function)
+    def called(*args: Any) -> Any:
+        first: Any = args
+        while first.__class__ is not float and isinstance(first, (tuple, list)):
+            first = first[0]
+        call = getattr(first, "call_kernel", None)
+        return function(*args) if call is None else call(function, args)
+
+    return called
 
 
 def put(rows: tuple[Any, ...], index: Number, row: Any) -> tuple[Any, ...]:
@@ -104,9 +124,9 @@ def pick(rows: Sequence[Any], index: Number) -> Any:
     """The row whose place is nearest to ``index``; the first or last one beyond the ends."""
     if index.__class__ is float:
         return rows[min(max(int(index + 0.5), 0), len(rows) - 1)]
-    found = rows[0]
+    found, place = rows[0], index + 0.5
     for k in range(1, len(rows)):
-        found = choose(index >= k - 0.5, rows[k], found)
+        found = choose(place >= k, rows[k], found)
     return found
 
 

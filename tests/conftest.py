@@ -9,6 +9,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
+from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
 from support.serial import Serial
@@ -19,6 +20,7 @@ from cosim.master import loop_surroundings
 from cosim.system import own_fmus
 from fmus.build import build
 from fmus.build.building import cache_folder
+from fmus.build.platforms import native_targets
 
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
 ACCEPTED = (
@@ -99,6 +101,27 @@ def _first_library(_session_cache):
 def fmus(_session_cache):
     """Name -> path of every FMU of the project."""
     return {path.stem: path for path in build([])}
+
+
+@pytest.fixture(scope="session")
+def native(_session_cache):
+    """Name -> path of the native FMUs of scenarios/ellipse.json."""
+    names = ["vessel", "thrusters", "observer_mdf", "guidance_ellipse", "controller_abs"]
+    return {path.stem: path for path in build(names, native=native_targets())}
+
+
+@pytest.fixture
+def opened_here(tmp_path):
+    """A function that opens an FMU in the test's folder; closed after the test."""
+    instances = []
+
+    def make(path, name="instance"):
+        instances.append(Opened(path, tmp_path, name))
+        return instances[-1]
+
+    yield make
+    for instance in instances:
+        instance.close()
 
 
 @pytest.fixture(autouse=True, scope="session")

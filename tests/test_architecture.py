@@ -26,7 +26,7 @@ COSIM_LAYERS = (
     ("system",),
     ("results",),
     ("master", "watch"),
-    ("export",),
+    ("export", "campaign"),
     ("run", "metrics", "plots", "interface"),  # commands
 )
 
@@ -44,7 +44,8 @@ DIAGNOSIS_LAYERS = (
     ("command_line",),
     ("compare", "learn"),  # commands
 )
-# And of fmus: what all components share, effects, components, the ship of them, their FMI face, the tools.
+# And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
+# the tools.
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
     ("frames", "hull"),
@@ -52,6 +53,7 @@ FMUS_LAYERS = (
     ("controller", "guidance", "observer", "thrusters", "vessel"),
     ("ship",),
     ("fmi",),
+    ("native",),
     ("build",),
     ("check",),
 )
@@ -60,6 +62,7 @@ LAYERS = {"cosim": COSIM_LAYERS, "diagnosis": DIAGNOSIS_LAYERS, "fmus": FMUS_LAY
 # What other packages may import of cosim: these modules, with their ``__all__``.
 PUBLIC = (
     "cosim",
+    "cosim.campaign",
     "cosim.command",
     "cosim.errors",
     "cosim.export",

@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from support import ccode
 from support.cases import slow
 from support.project import COMPONENTS
 
@@ -27,8 +26,6 @@ from fmus.fmi.trace import (
 )
 
 every_component = pytest.mark.parametrize("name", COMPONENTS)
-# Their stores make traces of up to 34,000 operations, at which a C compiler takes seconds.
-LARGE = [name for name in COMPONENTS if name.startswith("controller_cl_")]
 # The two of them that take longest; controller_cl_svd_z2 and controller_cl_win_eps are like them.
 LONGEST = ("controller_cl_svd_eps", "controller_cl_win_eps_all")
 every_component_longest_slow = pytest.mark.parametrize(
@@ -81,19 +78,6 @@ def test_traced_initial_state_is_the_plain_one(name):
     params, inputs, _ = arguments(component, random.Random(1))
     state = component.init(packer(component.inputs)(inputs), packer(component.params)(params))
     assert evaluate(trace.state, values_of(params, inputs, (), 0.0)) == flatten(state)
-
-
-@pytest.mark.parametrize("name", [slow(n) if n in LARGE else n for n in COMPONENTS])
-@pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
-def test_same_source_in_c_computes_the_same(name, tmp_path):
-    component = COMPONENTS[name]
-    trace = trace_step(component)
-    run = ccode.compiled(trace.state + trace.outputs, tmp_path)
-    rng = random.Random(name)
-    for _ in range(50):
-        params, inputs, state = arguments(component, rng)
-        expected = directly(component, params, inputs, state, 0.01)
-        assert run(params, inputs, flatten(state), 0.01) == pytest.approx(expected, rel=1e-14, abs=1e-16)
 
 
 @every_component

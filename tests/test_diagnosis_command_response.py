@@ -9,7 +9,7 @@ from support.cases import slow
 from support.measured import DATA, NOISE, needs_data, sail
 
 from diagnosis import Run, clean, read, smooth
-from diagnosis.smoothing.command_response import FORGETTING, Commands
+from diagnosis.smoothing.command_motion import FORGETTING, Commands
 from diagnosis.smoothing.spline import knots
 
 N = 3000

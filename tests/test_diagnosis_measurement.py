@@ -204,6 +204,21 @@ def test_unreadable_file_is_refused_with_one_line(tmp_path, name, content, messa
     refused(tmp_path / name, message)
 
 
+@pytest.mark.parametrize(
+    ("sep", "decimal", "line"),
+    [
+        (";", ".", '{"separator": ";"}'),
+        (";", ",", '{"separator": ";", "decimal": ","}'),
+        ("\t", ".", '{"separator": "\\t"}'),
+    ],
+)
+def test_other_separator_is_told_with_its_line(tmp_path, sep, decimal, line):
+    with_tau().to_csv(tmp_path / "a.csv", index=False, sep=sep, decimal=decimal)
+    refused(tmp_path / "a.csv", f"put {line} into")
+    (tmp_path / "a.csv.json").write_text(line)
+    np.testing.assert_allclose(diagnosis.read(tmp_path / "a.csv").pose, POSE, rtol=1e-12)
+
+
 def test_absent_file_suggests_the_nearest(tmp_path):
     with_tau().to_csv(tmp_path / "mine.csv", index=False)
     refused(tmp_path / "mime.csv", "did you mean 'mine.csv'?")

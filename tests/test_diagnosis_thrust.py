@@ -1,5 +1,6 @@
 """The force of the thrusters along a run: from series the same as from the steps of their FMU."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from diagnosis.model.thrust import Integral, Response, thrust
 from fmus.declare import variables
 from fmus.effects import STANDARD
 from fmus.signals import Force, Velocity
+from fmus.thrusters.allocation import allocate
 from fmus.thrusters.chain import Inputs
 from fmus.thrusters.thrusters import COMPONENT
 
@@ -33,6 +35,14 @@ VALUES = {
     "plant_F_bow": 2.0,
     "power_vsp": 0.7,
     "power_bow": 0.6,
+    "bow_outage_start_1": 3.0,
+    "bow_outage_end_1": 7.5,
+    "bow_outage_start_8": 20.0,
+    "bow_outage_end_8": 26.02,
+    "vsp_outage_start_1": 0.0,
+    "vsp_outage_end_1": 4.0,
+    "vsp_outage_start_2": 12.0,
+    "vsp_outage_end_2": 12.5,
 }
 EFFECTS = STANDARD.of_kind("actuator")
 BY_EFFECT = {e.id: {n: VALUES.get(n, 0.1) for n in e.coefficients} for e in EFFECTS}
@@ -80,6 +90,39 @@ def test_mean_force_over_each_interval_from_series_is_that_of_the_steps(values):
     forgotten = 2e-5 if values.get("lag") else 1e-9
     np.testing.assert_allclose(force, expected, atol=forgotten)
     assert np.abs(expected - by_steps(base(), true_nu(), {})).max() > 1e-3, "the value matters"
+
+
+@pytest.mark.parametrize(
+    "values",
+    [v for e, v in BY_EFFECT.items() if "vsp" in e],
+    ids=[e for e in BY_EFFECT if "vsp" in e],
+)
+def test_two_propellers_with_the_same_commands_are_twice_the_one_that_stands_for_both(values):
+    """One set of the FMU stands for both, at the mean of their places: to port and starboard alike."""
+    run, nu = base(), true_nu()
+    u = np.column_stack(allocate(*run.tau_cmd.T, Model().drive.params.allocation))
+    u[:, 2] = 0.0
+    one = replace(run, u=u)
+    two = replace(run, five=np.column_stack([u[:, :2], u[:, :2], u[:, 2]]))
+    if len(values) == 21:
+        values = {n: 0.01 * k for k, n in enumerate(values)}
+    model = Model(thrusters=values)
+    by_one, by_two = (thrust(r, Response(r, model), nu) for r in (one, two))
+    np.testing.assert_allclose(by_two, 2.0 * by_one, atol=1e-12)
+
+
+def test_a_propeller_to_port_that_pushes_ahead_turns_the_ship_to_starboard():
+    """By 0.055 m, whether it is a set of its own or half of one."""
+    still = Model()
+    for k, name in enumerate(("vsp1", "vsp2")):
+        model = Model(thrusters={f"curve_{name}_x_c_{node}": 0.2 for node in range(1, 22)})
+        for five in (None, np.zeros((base().time.size, 5))):
+            run = replace(base(), five=five)
+            push, none = (thrust(run, Response(run, m), true_nu()) for m in (model, still))
+            X, Y, N = (push - none).T
+            np.testing.assert_allclose(X, 0.2 if five is not None else 0.1)
+            np.testing.assert_allclose(Y, 0.0, atol=1e-12)
+            np.testing.assert_allclose(N, (0.055, -0.055)[k] * X)
 
 
 @pytest.mark.parametrize("period", [0.02, 0.05, 0.1])

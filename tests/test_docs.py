@@ -55,6 +55,7 @@ def constants():
 @pytest.mark.parametrize(("name", "value"), [*constants()])
 def test_constants_of_the_diagnosis_are_those_of_the_page(name, value):
     files = [*(ROOT / "diagnosis" / "smoothing").glob("*.py"), ROOT / "diagnosis/model/weak_form.py"]
+    files += [ROOT / "diagnosis/assessment/plausibility.py"]
     files += [f for f in (ROOT / "diagnosis/identification").glob("*.py") if f.name != "peers.py"]
     found = []
     for file in files:

@@ -136,7 +136,7 @@ def turn(psi):
 def adapt(model, rows, phi, gamma, steps, dt, omega=STILL, gamma_omega=OFF, rho=0.0, stale=0.0):
     """Learn from a frozen store alone; yield the estimates."""
     on = sum(gamma_omega) > 0.0
-    sums = summed(model, rows, on)
+    sums = summed(on, rows, model)
     memory = Memory(sums.count, sums.turned, sums.cross)
     rest = Drive(empty_store(model).last, 0.0, STILL)
     for _ in range(steps):

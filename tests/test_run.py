@@ -399,3 +399,68 @@ def test_metrics_never_overwrite_the_log(scenario, tmp_path):
     done = support.command.command(metrics.main, tmp_path / "out", "--out", tmp_path / "out" / "log.csv")
     assert done.returncode == 2
     assert "is the log itself" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("path", "place", "expected"),
+    [
+        ("vessel.m=15", ("fmus", "vessel", "parameters", "m"), 15),
+        ("fmus.vessel.parameters.m=15.5", ("fmus", "vessel", "parameters", "m"), 15.5),
+        ("controller=controller_bs.fmu", ("fmus", "controller", "path"), "controller_bs.fmu"),
+        ("faults.0.std=[0.001, 0.002]", ("faults", 0, "std"), [0.001, 0.002]),
+        ("metrics.from=0.5", ("metrics", "from"), 0.5),
+        ("seed=4", ("seed",), 4),
+    ],
+)
+def test_set_changes_one_value(ellipse, tmp_path, path, place, expected):
+    (tmp_path / "some.json").write_text(json.dumps(ellipse | {"stop": 1.0}))
+    out = tmp_path / "out"
+    done = command(tmp_path / "some.json", "--no-plots", "--out", out, "--set", path)
+    assert done.returncode == 0, done.stderr
+    value = json.loads((out / "log.json").read_text())["scenario"]
+    for key in place:
+        value = value[key]
+    assert value == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("vesel.m=15", "no instance 'vesel'; did you mean 'vessel'?"),
+        ("vessel.mm=15", "vessel.mm does not exist; did you mean 'm'?"),
+        ("faults.0.sdt=1", "faults[0].sdt: unknown key; did you mean 'std'?"),
+        ("faults.7.std=1", "there is no entry '7' in the list"),
+        ("fmus.vesel.path=x.fmu", "no instance 'vesel'"),
+        ("metrics.form=1", "unknown key; did you mean 'from'?"),
+        ("name.x=1", "'name' is a value"),
+        ("controller=./none.fmu", "no such FMU"),
+        ("vessel.m", "sets nothing"),
+    ],
+)
+def test_set_refuses_what_the_scenario_lacks(ellipse, tmp_path, text, message):
+    (tmp_path / "some.json").write_text(json.dumps(ellipse))
+    done = command(tmp_path / "some.json", "--out", tmp_path / "out", "--set", text)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_in_set_is_relative_to_the_working_directory(ellipse, tmp_path, fmus):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "some.json").write_text(json.dumps(ellipse | {"stop": 1.0}))
+    (tmp_path / "mine.fmu").write_bytes(fmus["controller_bs"].read_bytes())
+    arguments = (
+        "deep/some.json",
+        "--no-plots",
+        "--out",
+        "out",
+        "--set",
+        "controller=./mine.fmu",
+        "--seed",
+        3,
+    )
+    done = command(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads((tmp_path / "out" / "log.json").read_text())
+    assert told["seed"] == 3
+    assert told["fmus"]["controller"]["path"] == str(tmp_path / "mine.fmu")

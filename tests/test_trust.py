@@ -203,12 +203,12 @@ def test_text_in_a_scenario_stays_text(ellipse, tmp_path):
     assert not mark.exists()
 
 
-def no_native(tmp_path, *paths):
+def only_own(tmp_path, *paths):
     scenario = tmp_path / "scenario.json"
     fmus = {f"m{k}": {"path": str(path)} for k, path in enumerate(paths)}
     scenario.write_text(json.dumps({"name": "s", "step": 0.1, "stop": 0.2, "fmus": fmus}))
     return subprocess.run(
-        [sys.executable, "-m", "cosim.run", str(scenario), "--out", str(tmp_path / "out"), "--no-plots", "--no-native"],
+        [sys.executable, "-m", "cosim.run", str(scenario), "--out", str(tmp_path / "out"), "--no-plots", "--only-own"],
         capture_output=True, text=True, cwd=ROOT, check=False,
     )  # fmt: skip
 
@@ -220,7 +220,7 @@ def edited(source, target, edit):
     return archive(target, *content.items())
 
 
-def test_no_native_takes_what_was_built_here(fmus, tmp_path):
+def test_only_own_takes_what_was_built_here(fmus, tmp_path):
     moved = edited(
         fmus["vessel"],
         tmp_path / "moved.fmu",
@@ -229,7 +229,7 @@ def test_no_native_takes_what_was_built_here(fmus, tmp_path):
         ),
     )
     assert moved.read_bytes() != fmus["vessel"].read_bytes()
-    done = no_native(tmp_path, "vessel.fmu", fmus["thrusters"], moved)
+    done = only_own(tmp_path, "vessel.fmu", fmus["thrusters"], moved)
     assert done.returncode == 0, done.stderr
 
 
@@ -237,11 +237,11 @@ def test_no_native_takes_what_was_built_here(fmus, tmp_path):
     ("prefix", "suffix"),
     [("binaries/linux64/", ".so"), ("resources/vessel_", "hull.py"), ("resources/", "fmi2slave.py")],
 )
-def test_no_native_refuses_one_changed_program_file(fmus, tmp_path, prefix, suffix):
+def test_only_own_refuses_one_changed_program_file(fmus, tmp_path, prefix, suffix):
     def edit(name, data):
         return data + b" " if name.startswith(prefix) and name.endswith(suffix) else data
 
-    done = no_native(tmp_path, "vessel.fmu", edited(fmus["vessel"], tmp_path / "other.fmu", edit))
+    done = only_own(tmp_path, "vessel.fmu", edited(fmus["vessel"], tmp_path / "other.fmu", edit))
     assert done.returncode == 2
     assert "was not built here: it holds 'resources/" in done.stderr or "holds 'binaries/" in done.stderr
     assert suffix in done.stderr
@@ -256,15 +256,15 @@ def test_library_is_never_looked_for_elsewhere(fmus, tmp_path, library):
         old, new = b'modelIdentifier="vessel"', f'modelIdentifier="{library}"'.encode()
         return data.replace(old, new) if name == "modelDescription.xml" else data
 
-    done = no_native(tmp_path, edited(fmus["vessel"], tmp_path / "other.fmu", edit))
+    done = only_own(tmp_path, edited(fmus["vessel"], tmp_path / "other.fmu", edit))
     assert done.returncode == 2
     assert "is no identifier" in done.stderr
 
 
-def test_no_native_refuses_a_python_fmu_of_others(plain_fmu, tmp_path):
+def test_only_own_refuses_a_python_fmu_of_others(plain_fmu, tmp_path):
     """Its binaries are those of the installed pythonfmu; the program is its Python."""
     fmu = plain_fmu("Stranger", GAIN)
-    done = no_native(tmp_path, fmu)
+    done = only_own(tmp_path, fmu)
     assert done.returncode == 2
     assert "it holds 'resources/Stranger.py'" in done.stderr
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.effects import STANDARD
+from fmus.effects import EACH_VSP, STANDARD
 
 from .simulated_runs import FINE, STEP, STOP
 from .truth import NAMES, Motion, Values, force, over, windows
@@ -23,7 +23,9 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "bow exp(-(u/u0)^2)": ("bow_speed_loss", "curve_bow(|u|)"),
     "delay off the grid": ("delay",),
 }
-SINGLE = [*STANDARD, *FOREIGN]
+# The runs have one set of commands: what acts on one of the two propellers is no candidate there.
+SINGLE = [*(e.id for e in STANDARD.values() if EACH_VSP not in e.needs), *FOREIGN]
+OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 Scaled = Callable[[float], dict[str, float]]
 
 
@@ -66,9 +68,22 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
+    elif effect in STANDARD and STANDARD[effect].search.intervals:
+        values = outage(effect, rng)
     else:
         values = scaled(_solve(lambda s: share(pilot, effect, scaled(s)), size))
     return Draw(effect, values, share(pilot, effect, values))
+
+
+def outage(effect: str, rng: np.random.Generator) -> dict[str, float]:
+    """Three to eight intervals that take a share of the time, one in each equal part of it."""
+    names = STANDARD[effect].search.intervals
+    count = int(rng.integers(3, len(names) + 1))
+    room = STOP / count
+    lasts = np.maximum(SHORTEST, OUT * room * rng.uniform(0.5, 1.5, count))
+    starts = room * np.arange(count) + rng.uniform(0.1, 0.5, count) * room
+    spans = zip(names, starts.tolist(), lasts.tolist(), strict=False)
+    return {name: t for (a, b), start, last in spans for name, t in ((a, start), (b, start + last))}
 
 
 def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:

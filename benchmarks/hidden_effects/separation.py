@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from fmus.effects import STANDARD
+from fmus.effects import EACH_VSP, STANDARD
 from fmus.ship import ship
 
 from .truth import WEIGHTS, Motion, Values, over
@@ -33,6 +33,7 @@ CONTAINS = {
     "curve_vsp_x(c)": {"loss_surge", "thrust_curve"},
     "curve_bow(|u|)": {"loss_bow", "bow_speed_loss"},
     "thrust_curve": {"loss_surge"},
+    "bow_outage": {"bow_failure"},
 }
 STEPS = np.arange(0.02, 0.6, 0.02)
 GRIDS: dict[str, list[dict[str, float]]] = {
@@ -99,7 +100,8 @@ class Rivals:
         """
         target = flat(hidden)
         contained = [e for e, held in CONTAINS.items() if held & set(right)]
-        found = {e: self.left(target, e) for e in STANDARD if e not in {*right, *contained, "waves"}}
+        possible = [e.id for e in STANDARD.values() if EACH_VSP not in e.needs]
+        found = {e: self.left(target, e) for e in possible if e not in {*right, *contained, "waves"}}
         if self.nuisance:
             found[NOTHING] = self._share(target, target, [])
         return found

@@ -120,7 +120,7 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
     shares = m.commanded
     if delay:
         shares = np.where((m.time >= delay)[:, None], held(m.time, shares, delay), 0.0)
-    now = Running._make([m.time, *nu.T, *shares.T])
+    now = Running._make([m.time, *nu.T, *shares.T, 0.0])
     if lag:
         step = 1.0 - np.exp(-STEP / lag)
         shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)

@@ -171,7 +171,7 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
         baked = PurePath(entry.path).name == entry.path and model.path != beside / entry.path
         part = Part(name, model, f"{stem}.fmu", values, baked)
         if values and baked:
-            _bake(part, folder)
+            _bake(part, folder, ("--native",) if system.scenario.native else ())
         else:
             shutil.copyfile(model.path, folder / part.file)
         if values and not baked:
@@ -195,13 +195,13 @@ def _is_start(variable: Variable, value: Value) -> bool:
     return float(variable.start) == float(value)
 
 
-def _bake(part: Part, folder: Path) -> None:
-    """Build the project's FMU again, with other start values."""
+def _bake(part: Part, folder: Path, options: tuple[str, ...]) -> None:
+    """Build the project's FMU again, with other start values and options of the builder."""
     names = {f"{part.model.name}.{v.name}": (v, value) for v, value in part.values}
     work = folder / f".{part.file}"
     work.mkdir()
     start = work / "start.ssv"
     write_document(parameter_set(part.name, names, root=True), start)
-    run_builder("--parameters", start, "--out", work, "--", part.model.name)
+    run_builder(*options, "--parameters", start, "--out", work, "--", part.model.name)
     shutil.move(work / f"{part.model.name}.fmu", folder / part.file)
     shutil.rmtree(work)

@@ -22,7 +22,7 @@ from fmpy.logging import addLoggerProxy
 
 from ..errors import InputError, SimulationError
 from ..process.run_state import STATE
-from .fmu_model import Model
+from .fmu_model import PYTHON_SYMBOL, Model
 from .instance import OnMessage
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
@@ -106,6 +106,7 @@ class Component:
         saved_state: the ``fmi2FMUstate`` of the last save, if there was one.
         complaint: the last message of a warning or worse that the FMU logged.
         worst_status: the worst status that any call returned.
+        on_message: as given; another one may take its place between runs.
 
     Raises:
         InputError: no binary for this platform, or instantiation refused.
@@ -135,7 +136,7 @@ class Component:
 
         # A Python FMU takes the interpreter's lock at every call; keeping it held saves that. Others may
         # work in threads of their own and must not find it held.
-        self.is_python = hasattr(self.slave.dll, "finalizePythonInterpreter")
+        self.is_python = hasattr(self.slave.dll, PYTHON_SYMBOL)
         if self.is_python and not (folder / SLAVE_MODULE).is_file():
             raise InputError(f"'{model.path}' is a Python FMU without its {SLAVE_MODULE}")
         # A Python FMU saves its state in many small pieces, and does not report how far it got.
@@ -145,12 +146,13 @@ class Component:
         self.saved_state = ctypes.c_void_p()
         self.complaint = ""
         self.worst_status = 0
+        self.on_message = on_message
 
         def listen(status: int, text: str) -> None:
             text = " ".join(text.split())
             if status > 0:
                 self.complaint = text
-            on_message(name, status, text)
+            self.on_message(name, status, text)
 
         self._modules: list[ModuleType] = []
         self._classes: list[type] = []
@@ -230,7 +232,7 @@ class Component:
         # The first pythonfmu library in a process cannot be unloaded. Without this call it would
         # finalise when the process exits, after its own memory is gone, and now and then abort the
         # process.
-        finalize = getattr(self.slave.dll, "finalizePythonInterpreter", None)
+        finalize = getattr(self.slave.dll, PYTHON_SYMBOL, None)
         if self.is_python and finalize is not None:
             finalize()
         self.slave.freeLibrary()

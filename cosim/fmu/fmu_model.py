@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
+import fmpy
 from fmpy.model_description import ModelDescription, read_model_description
 
 from ..conversion import BASE_UNITS, Unit
@@ -20,6 +21,8 @@ from . import archive_check
 
 DESCRIPTION = "modelDescription.xml"
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
+# What only the library of pythonfmu exports.
+PYTHON_SYMBOL = "finalizePythonInterpreter"
 # fmi2Integer has 32 bits.
 INT_LIMIT = 2**31
 
@@ -148,6 +151,23 @@ class Model:
                     if name in feeds:
                         feeds[name].append(v.name)
         return feeds
+
+    @cached_property
+    def is_native(self) -> bool:
+        """Whether the library for this platform is machine code, no way into Python like pythonfmu's."""
+        co_simulation = self.description.coSimulation
+        assert co_simulation is not None
+        library = f"{co_simulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                content = archive.read(f"binaries/{fmpy.platform}/{library}")
+        except (
+            OSError,
+            KeyError,
+            zipfile.BadZipFile,
+        ):  # gone, or the library is elsewhere in it
+            return False
+        return PYTHON_SYMBOL.encode() not in content
 
     def unpack(self) -> Path:
         """Folder with the unpacked archive; made at the first call."""

@@ -99,5 +99,22 @@ class LocalInstance:
         if self.component.worst_status < ERROR:
             self._call("fmi2Terminate", self._slave.terminate)
 
+    def reset(self, on_message: OnMessage) -> None:
+        """Return to the state after instantiation, for another run (fmi2Reset).
+
+        Args:
+            on_message: receives the messages of the next run.
+
+        Raises:
+            SimulationError: the FMU refuses.
+        """
+        self.component.on_message = on_message
+        self._call("fmi2Reset", self._slave.reset)
+
+    @property
+    def sound(self) -> bool:
+        """Whether no call has been refused so far."""
+        return self.component.worst_status < ERROR
+
     def free(self) -> None:
         self.component.free()

@@ -10,11 +10,10 @@ from ..errors import SimulationError
 from ..fmu.component import WARNING
 from ..fmu.fmu_model import Variable
 from ..fmu.instance import Instance
-from ..fmu.isolated import TIMEOUT, IsolatedInstance
-from ..fmu.local import LocalInstance
 from ..process.run_state import INSTANCE, STATE, Owner
 from ..scenario.faults import TIME_TOLERANCE
 from ..scenario.schema import Event
+from ..system.instance_pool import InstancePool
 from ..system.system import System
 from .messages import Messages
 from .stepper import Stepper
@@ -28,6 +27,7 @@ class Master:
         system: checked system.
         show: receives lines for the user while it runs.
         interrupted: whether the user has asked for the end; read between the calls until it runs.
+        pool: gives the instances, and takes them back; by default one that keeps none.
 
     Raises:
         InputError: an FMU cannot be instantiated.
@@ -40,8 +40,10 @@ class Master:
         system: System,
         show: Callable[[str], None],
         interrupted: Callable[[], bool] = lambda: False,
+        pool: InstancePool | None = None,
     ) -> None:
         self.system = system
+        self._pool = pool or InstancePool()
         self._owner = Owner()
         self._interrupted = interrupted
         self.messages = Messages(show)
@@ -70,9 +72,7 @@ class Master:
 
     def _instantiate(self, name: str) -> Instance:
         model, entry = self.system.models[name], self.system.scenario.fmus[name]
-        if entry.isolate:
-            return IsolatedInstance(name, model, self.messages.add, entry.timeout or TIMEOUT)
-        return LocalInstance(name, model, self.messages.add)
+        return self._pool.take(name, model, entry, self.messages.add)
 
     def _leave_if_interrupted(self) -> None:
         if self._interrupted():
@@ -209,7 +209,7 @@ class Master:
         return [s.name for stepper in self._steppers for s in stepper.got if s.variable.type == "Real"]
 
     def close(self) -> None:
-        """Terminate and free all instances."""
+        """Terminate all instances, and free those that are not kept for another run."""
         self._owner.leave_copies()
         for instance in self._instances.values():
             if self._initialised:
@@ -217,6 +217,6 @@ class Master:
                     instance.terminate()
                 except SimulationError as error:
                     self.messages.add(instance.name, WARNING, str(error))
-            instance.free()
+            self._pool.give_back(instance)
         STATE.calls_nothing()
         self._instances.clear()

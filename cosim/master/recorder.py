@@ -20,16 +20,16 @@ class Recorder:
     Args:
         system: what runs.
         master: its master.
-        folder: for the log.
+        folder: for the log; None writes none.
 
     Attributes:
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
-    def __init__(self, system: System, master: Master, folder: Path) -> None:
+    def __init__(self, system: System, master: Master, folder: Path | None) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = LogWriter(folder / CSV, self.columns)
+        self._writer = None if folder is None else LogWriter(folder / CSV, self.columns)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
@@ -46,7 +46,7 @@ class Recorder:
     @property
     def rows(self) -> int:
         """Number of rows in the log."""
-        return self._writer.rows
+        return 0 if self._writer is None else self._writer.rows
 
     def flush(self) -> None:
         """Write the rows taken so far.
@@ -63,14 +63,16 @@ class Recorder:
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"
             times, taken = times[: k + 1], taken[: k + 1]
-        self._writer.write(self._pending.logged(len(times)))
+        if self._writer is not None:
+            self._writer.write(self._pending.logged(len(times)))
         self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
         self._pending.clear()
         if message:
             raise SimulationError(message)
 
     def close(self) -> None:
-        self._writer.close()
+        if self._writer is not None:
+            self._writer.close()
 
     def kept(self) -> dict[str, np.ndarray]:
         """The columns for metrics and pictures, at every step."""

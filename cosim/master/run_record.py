@@ -30,6 +30,7 @@ def describe(system: System) -> dict[str, Any]:
                 "model": model.name,
                 "guid": model.description.guid,
                 "sha256": model.sha256,
+                "native": model.is_native,
             }
             for name, model in system.models.items()
         },

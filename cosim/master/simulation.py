@@ -18,6 +18,7 @@ from ..process.scratch import sweep
 from ..results import log as logs
 from ..results.result_files import clear_results
 from ..scenario.schema import Scenario
+from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
@@ -37,9 +38,10 @@ def simulate(
     parameters: Sequence[str | Path] = (),
     realtime: float | None = None,
     pictures: bool = False,
-    native: bool = True,
+    only_own: bool = False,
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
+    pool: InstancePool | None = None,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
@@ -49,9 +51,10 @@ def simulate(
         parameters: SSP parameter sets whose values override the scenario's.
         realtime: simulated seconds per second of wall time; None runs as fast as it can.
         pictures: whether to draw.
-        native: whether FMUs may hold programs that were not built on this computer.
+        only_own: whether to refuse FMUs with programs that were not built on this computer.
         show: receives warnings and messages, a line each.
         progress: receives the simulated time [s] several times a second.
+        pool: FMUs that serve several runs, for a scenario whose paths are all files.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -70,12 +73,14 @@ def simulate(
     sweep()
     result: Result | None = None
     try:
-        system = prepare(scenario, overrides, native)
+        models = None if pool is None else pool.models(scenario)
+        system = prepare(scenario, overrides, only_own, models)
         try:
-            result, recorder = _run(system, folder, realtime, show, progress)
+            result, recorder = _run(system, folder, realtime, show, progress, pool)
         finally:
             owner.leave_copies()
-            system.close()
+            if pool is None:
+                system.close()
             os.chdir(here)
         if recorder is not None:
             finish(system, result, recorder, pictures, show)
@@ -95,6 +100,7 @@ def _run(
     realtime: float | None,
     show: Callable[[str], None],
     progress: Callable[[float], None],
+    pool: InstancePool | None,
 ) -> tuple[Result, Recorder | None]:
     """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log."""
     scenario, owner = system.scenario, Owner()
@@ -108,7 +114,7 @@ def _run(
     STATE.begin(str(folder), json.dumps(description), system.order)
     with interruptible() as interrupted:
         try:
-            master = Master(system, lambda text: show(f"warning: {text}"), interrupted)
+            master = Master(system, lambda text: show(f"warning: {text}"), interrupted, pool)
         except (SimulationError, InputError) as error:
             if interrupted():  # an FMU may report the interrupt as an error of its own
                 raise KeyboardInterrupt from None

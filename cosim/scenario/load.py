@@ -1,7 +1,7 @@
 """Scenarios from JSON, or from the formats of other tools, with messages for mistakes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from ..formats.systems import is_system, read_system
 from . import faults
 from .roles import Roles
 from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Scenario, Transformation
+from .setting import set_value
 
 # Parts of pydantic's error locations that name a validator or a type, not a place in the file.
 INTERNAL = ("function-", "constrained-", "bool", "int", "float", "str", "tuple", "list[")
@@ -57,6 +58,28 @@ def load_scenario(
     if isinstance(content, dict):
         content |= chosen
     return _validate(content, f"'{path}'", path.parent)
+
+
+def with_settings(
+    scenario: Scenario, settings: Iterable[tuple[str, Any]], folder: Path, name: str = "the scenario"
+) -> Scenario:
+    """A scenario with some values set by their paths; see :mod:`cosim.scenario.setting`.
+
+    Args:
+        scenario: is not changed.
+        settings: paths, each with its value.
+        folder: to which files named by the values are relative.
+        name: of what comes out, for messages.
+
+    Raises:
+        InputError: no such place, or a value that it cannot have.
+    """
+    content = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    for path, value in settings:
+        set_value(content, path, value, folder)
+    changed = _validate(content, name, scenario.folder)
+    changed.set_origin(scenario.folder, scenario.notes, scenario.unpacked)
+    return changed
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -139,6 +139,9 @@ class Scenario(Strict):
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
+    native: bool = Field(
+        False, description="compile the project's own FMUs, those with a bare name: no Python in them"
+    )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,
         description="[output, input] as instance.variable; a * on both sides connects all variables "
@@ -170,6 +173,11 @@ class Scenario(Strict):
     def notes(self) -> list[str]:
         """Assumptions and omissions in reading it from the format of another tool."""
         return self._notes
+
+    @property
+    def unpacked(self) -> Unpacked | None:
+        """The scratch folder that an archive was unpacked to, if there is one."""
+        return self._unpacked
 
     def set_origin(
         self, folder: Path, notes: Sequence[str] = (), unpacked: Unpacked | None = None

@@ -23,10 +23,10 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
     # A bare name is the project's own FMU; only one that the project lacks may be a file in the folder.
     beside = sorted(name for name in bare if (scenario.folder / name).is_file())
-    paths = _own_fmus(sorted(bare.difference(beside)))
+    paths = _own_fmus(sorted(bare.difference(beside)), scenario.native)
     for name in beside:
         try:
-            paths |= _own_fmus([name])
+            paths |= _own_fmus([name], scenario.native)
             warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name
@@ -40,11 +40,12 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     return found
 
 
-def _own_fmus(names: Sequence[str]) -> dict[str, Path]:
-    """Paths of the project's own FMUs, built if need be."""
+def _own_fmus(names: Sequence[str], native: bool) -> dict[str, Path]:
+    """Paths of the project's own FMUs, built if need be; compiled ones where the scenario wants them."""
     if not names:
         return {}
-    return dict(zip(names, map(Path, run_builder("--", *names)), strict=True))
+    options = ("--native",) if native else ()
+    return dict(zip(names, map(Path, run_builder(*options, "--", *names)), strict=True))
 
 
 def run_builder(*arguments: str | Path) -> list[str]:

@@ -1,11 +1,11 @@
 """Preparation of a system: a scenario checked against its FMUs. Nothing runs before this is done."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import InputError
-from ..fmu.fmu_model import NUMERIC
+from ..fmu.fmu_model import NUMERIC, Model
 from ..scenario.schema import Scenario
 from .checks import check_events, check_faults, check_processes, check_roles, check_window
 from .order import Link, execution_order
@@ -18,20 +18,27 @@ from .wiring import connect
 RATIO_TOLERANCE = 1e-6
 
 
-def prepare(scenario: Scenario, overrides: Overrides = (), native: bool = True) -> System:
+def prepare(
+    scenario: Scenario,
+    overrides: Overrides = (),
+    only_own: bool = False,
+    models: Mapping[str, Model] | None = None,
+) -> System:
     """Read the FMUs of a scenario and check all that can be checked without running.
 
     Args:
         scenario: what to run.
         overrides: parameter sets whose values override the scenario's.
-        native: whether FMUs may run programs that were not built on this computer.
+        only_own: whether to refuse FMUs with programs that were not built on this computer.
+        models: the FMU of each instance, where they have been read before.
 
     Raises:
         InputError: the first error.
     """
     warnings: list[str] = []
-    system = System(scenario, read_models(scenario, warnings), warnings=warnings)
-    if not native:
+    found = read_models(scenario, warnings) if models is None else dict(models)
+    system = System(scenario, found, warnings=warnings)
+    if only_own:
         run_builder("--verify", "--", *{str(model.path) for model in system.models.values()})
     check_processes(system)
     check_window(scenario)

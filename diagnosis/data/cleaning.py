@@ -11,20 +11,14 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from .reading import Run
+from .unit_check import refuse_time, refuse_units
 
 SHORTEST = 8.0  # s, of a run: one prediction window
-RAREST = 2.0  # s between two samples; a model ship's own time constants are shorter (chosen)
-OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 # Of what regular sampling would give, gaps of up to GAP seconds filled. Chosen: what is rarer comes in
 # bursts, of which nothing can be differentiated.
 SPARSE, GAP = 0.05, 30.0
-LONGEST = 1e9  # s, of a run; thirty years are a mistake in a time stamp
-FARTHEST = 1e9  # m, rad; beyond is no place on earth
 MOST_OUT = 0.1  # largest share of rows whose time may be out of order (chosen)
 LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate around it (chosen)
-# Beyond these no ship moves, so that the unit must be another one (chosen).
-FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
-TURN = 6.3  # rad, just above a turn; a heading that stays below is in radians, and may wrap
 
 
 class Counts(NamedTuple):
@@ -73,8 +67,12 @@ class Track:
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
-def clean(run: Run) -> Track:
+def clean(run: Run, anyway: bool = False) -> Track:
     """Judge the samples of a run.
+
+    Args:
+        run: as it was read.
+        anyway: whether a speed that no ship has, or a heading in degrees, is believed.
 
     Raises:
         InputError: too short, time not in order, another unit than said, nothing valid, no motion.
@@ -99,14 +97,7 @@ def clean(run: Run) -> Track:
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
     period = float(np.median(np.diff(run.time[fresh])))
-    if row > RAREST:
-        raise InputError(f"{where}: a sample each {row:.4g} s is too rare; is the time in another unit?")
-    if row < OFTENEST:
-        raise InputError(
-            f"{where}: a sample each {row:.4g} s is too frequent; is the time in another unit?"
-        )
-    if seconds > LONGEST:
-        raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
+    refuse_time(row, seconds, where)
     steps = np.minimum(np.diff(run.time), GAP)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
@@ -119,7 +110,7 @@ def clean(run: Run) -> Track:
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
     pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
-    _plausible(run.time[fresh], pose[fresh], where)
+    refuse_units(run.time[fresh], pose[fresh], where, anyway)
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
     _moves(pose[fresh], where)
     notes += _gaps(run.time[fresh], period)
@@ -172,27 +163,6 @@ def unwrap(time: np.ndarray, psi: np.ndarray, period: float) -> np.ndarray:
         turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
         step[k] = turn + wrap(step[k] - turn)
     return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
-
-
-def _plausible(time: np.ndarray, pose: np.ndarray, where: str) -> None:
-    """Refuse units that no ship's motion can be in."""
-    far = float(np.sort(np.abs(pose), axis=0)[time.size // 2].max())
-    if far > FARTHEST:
-        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
-    second = np.searchsorted(time, time + 1.0)
-    second = second[second < time.size]
-    dt = time[second] - time[: second.size]
-    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
-    speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
-    if speed > FASTEST:
-        raise InputError(f"{where} goes {speed:.3g} m/s: is its position in mm?")
-    psi = pose[:, 2]
-    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
-        return
-    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
-    turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
-    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
-        raise InputError(f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?")
 
 
 def _moves(pose: np.ndarray, where: str) -> None:

@@ -161,7 +161,11 @@ def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
     ]
     if not groups:
         forms = ", or ".join(", ".join(group) for group in COMMANDS)
-        raise InputError(f"{where} has no commands: {forms}{nearest(TAU[0], names)}")
+        told = '{"columns": {"tau_X": "name of its column", "tau_Y": ...}}'
+        raise InputError(
+            f"{where} has no commands: {forms}{nearest(TAU[0], names)}; "
+            f"if they have other names, put {told} into a file of the same name with .json behind it"
+        )
     if FIVE in groups and any(layout.column(s).name in names for s in POWER):
         groups.append(POWER)
     named = [signal for signal in layout.columns if layout is not LOG]

@@ -15,11 +15,12 @@ from scipy.io import loadmat
 
 from cosim import InputError
 from cosim.errors import nearest
+from fmus.effects.single_propellers import ASIDE
 from fmus.thrusters.allocation import Allocation, thrust
 
+from .beside import refuse_separator
 from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
 
-ASIDE = (-0.055, 0.055)  # m; to starboard: where the two VSP sit (inferred from data)
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
@@ -179,6 +180,8 @@ def _tabular(path: Path) -> dict[str, np.ndarray]:
     given = read_layout(path)
     try:
         names = _names(path, given or Layout())
+        if given is None and len(names) == 1:
+            refuse_separator(path, names[0])
         layout = given or (LOG if LOG.column("x").name in names else Layout())
         wanted = signals(layout, names, f"'{path}'")
         table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))

@@ -12,8 +12,11 @@ from itertools import combinations
 import numpy as np
 
 from fmus.effects import Effect
+from fmus.effects.effect import EACH_VSP
 
 from ..model import Integrals, Model, omega
+from .multistart import Landscape, best_values
+from .segmentation import FLOOR, Interval, intervals, problem
 
 SMALL = (
     1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
@@ -26,6 +29,9 @@ CLOSEST = 5.0  # s, between two of them: the model error is an average over 3 s
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
 SMALLEST, LARGEST = 1e-6, 1e6
 MOST = 0.5  # share of its largest force from which on it counts as saturated; chosen
+# Share of a curve's weight that a node must have: half a second of four minutes.
+INSIDE = 2e-3
+FEWEST = 3  # nodes of a curve: of fewer there is no bend
 SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
 
 
@@ -83,6 +89,23 @@ def spacing(data: Sequence[Integrals]) -> float:
     return max(CLOSEST, float(max(w.run.time[-1] for w in data)) / CHANGE_POINTS)
 
 
+def covered(columns: np.ndarray) -> np.ndarray:
+    """(p,), which nodes of a curve the data reach, and those between them.
+
+    A node counts from a share of INSIDE of what all nodes together give. What lies outside stays zero:
+    there the curve is the model's, and nothing is told of it.
+
+    Args:
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    weight = np.square(columns).sum(axis=(0, 1))
+    reached = np.flatnonzero(weight > INSIDE * max(float(weight.sum()), SLIGHT))
+    inside = np.zeros(weight.size, bool)
+    if reached.size:
+        inside[reached[0] : reached[-1] + 1] = True
+    return inside
+
+
 def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Prior precision of the values of a curve: its second differences are N(0, size^2).
 
@@ -100,12 +123,24 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     return bend.T @ bend
 
 
+def curve(base: np.ndarray, plain: Shape) -> list[Shape]:
+    """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
+    inside = covered(plain.columns)
+    if inside.sum() < FEWEST:
+        return []
+    columns = plain.columns[:, :, inside]
+    fitted = [n for n, kept in zip(plain.fitted, inside, strict=True) if kept]
+    return [replace(plain, fitted=fitted, columns=columns, precision=smoothness(base, columns))]
+
+
 def values_to_try(
     data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
 ) -> list[Mapping[str, float]]:
     """The values at which a nonlinear effect is tried."""
     times = e.search.change_points
     declared = e.search.values(model.values)
+    if e.search.intervals:
+        return with_intervals(data, model, base, e)
     if times:
         # Of several times as many as there would be of one.
         share = CHANGE_POINTS ** (1.0 - 1.0 / len(times))
@@ -117,6 +152,58 @@ def values_to_try(
     if declared or e.differentiable:
         return declared
     return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
+
+
+def spread(e: Effect) -> bool:
+    """Whether an effect has parameters that it is not linear in, and declares no values of them.
+
+    One with a memory takes long to compute: it is tried at few values.
+    """
+    several = bool(e.shape_parameters) or (not e.differentiable and len(e.coefficients) > 1)
+    told = e.search.times or e.search.tries or e.search.smooth
+    return several and not told and e.memory is None
+
+
+def by_starts(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, step: float
+) -> list[Shape]:
+    """The shapes of an effect at the best values of what it is not linear in."""
+    sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR
+
+    def force(values: Mapping[str, float]) -> np.ndarray:
+        changed = model.plus({n: x - model.value(n) for n, x in values.items()})
+        return ((base - model_error(data, changed)) / sigma).ravel()
+
+    def tried(shape: Mapping[str, float]) -> list[dict[str, float]]:
+        at = model.plus({n: x - model.value(n) for n, x in shape.items()})
+        return [{**v} for name in e.coefficients for v in scaled(data, at, base, e, name)]
+
+    poses = np.concatenate([w.smoothed.eta[w.known, :2] for w in data])
+    extent = float(np.linalg.norm(np.ptp(poses, axis=0)))
+    present = {p.name: model.value(p.name) for p in e.parameters}
+    of = Landscape(e, force, (base / sigma).ravel(), extent, present)
+    found, fitted = best_values(of, tried)
+    return [shape(data, model, base, additions(model, e, v), fitted, step) for v in found]
+
+
+def with_intervals(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
+) -> list[Mapping[str, float]]:
+    """The intervals in which an effect seems to act, as additions to a model; none: no values.
+
+    A single one without an end is the effect that lasts, if there is such.
+    """
+    p = problem(data, model, base, e)
+    spans = [] if p is None else intervals(p)
+    if p is None or not spans or (e.search.lasting and len(spans) == 1 and spans[0][1] == p.count):
+        return []
+    return [additions(model, e, named(e, p.seconds(spans)))]
+
+
+def named(e: Effect, found: Sequence[Interval]) -> dict[str, float]:
+    """Intervals [s] by the names of an effect's parameters."""
+    pairs = zip(e.search.intervals, found, strict=False)
+    return {name: time for names, times in pairs for name, time in zip(names, times, strict=True)}
 
 
 def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str, float]:
@@ -158,18 +245,24 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     # By inertia, current and measurement the model error changes smoothly, but not linearly.
     hull = e.kind in ("force", "environment", "actuator") and e.linear
     step = 1.0 if hull or not e.differentiable else SMALL
-    if e.differentiable and not e.search.change_points:
+    if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
-        precision = smoothness(base, plain.columns) if e.search.smooth else None
-        shapes.append(replace(plain, precision=precision))
+        shapes += [plain] if not e.search.smooth else curve(base, plain)
+    if spread(e):
+        return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
     for values in values_to_try(data, model, base, e):
         shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
     return Candidate(e, shapes)
 
 
 def candidates(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[Candidate]:
-    """All effects that the ship can have and that a regression can find."""
+    """All effects that the ship can have and that a regression can find.
+
+    Those of a single propeller only where the propellers have commands of their own.
+    """
     ship = model.ship
+    each = any(w.run.five is not None for w in data)
     effects = [ship.effects[name] for name in ship.candidates]
-    found = [candidate(data, model, base, e) for e in effects if e.search.by == "regression"]
+    possible = [e for e in effects if e.search.by == "regression" and (each or EACH_VSP not in e.needs)]
+    found = [candidate(data, model, base, e) for e in possible]
     return [c for c in found if c.shapes]

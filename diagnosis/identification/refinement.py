@@ -10,20 +10,22 @@ parameters hardly change on the way and are taken once; those of a new effect an
 Change points have no slope: they are searched around their first guess.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from fmus.effects import Effect
 from fmus.ship import Ship
 
 from ..model import Integrals, Model
 from ..model.weak_form import OVERLAP
-from .candidates import SMALL, Shape, model_error, spacing
+from .candidates import SMALL, Shape, model_error, named, spacing
 from .gram import Nuisance
 from .map_regression import RIDGE
 from .prior import NominalPrior
+from .segmentation import LIKELY, likely, problem, segmented
 
 STEPS = 5  # of Gauss-Newton, at the most
 ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
@@ -32,7 +34,6 @@ HALVINGS = (1.0, 0.5, 0.25)
 # Steps [s] by which a change point is searched, the last a few samples of a slow measurement.
 CHANGE_POINT_STEPS = (1.0, 0.2)
 REACH = 5  # of these steps to both sides
-LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one degree of freedom
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class Estimate:
 
 def change_points(ship: Ship) -> frozenset[str]:
     """Parameters of a ship's effects that are times within a run."""
-    return frozenset(n for e in ship.effects.values() for n in e.search.change_points)
+    return frozenset(n for e in ship.effects.values() for n in e.search.times)
 
 
 def bounded(start: Model, name: str, addition: float) -> float:
@@ -177,6 +178,10 @@ class Refined:
     cost: float
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def own(self, at: Estimate) -> dict[str, float]:
+        """The candidate's own values, beside those of a model that it was not in."""
+        return {n: v for n, v in self.estimate.values.items() if n not in at.values}
+
 
 def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
     """A candidate, the effects found before and the nominal coefficients at their most likely values.
@@ -188,7 +193,8 @@ def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refin
         start: of the new effect.
     """
     if change_points(at.start.ship) & set(start.values):
-        return _with_change_points(t, at, along, start)
+        several = owner(at.start.ship, start.values).search.intervals
+        return (_with_intervals if several else _with_change_points)(t, at, along, start)
     return _gauss_newton(t, at, along, start)
 
 
@@ -262,9 +268,47 @@ def _with_change_points(t: TrainingSet, at: Estimate, along: Nuisance, start: St
     return replace(found, intervals=intervals)
 
 
+def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+    """The same with the intervals found anew at each fit of all else, until they stay."""
+    e = owner(at.start.ship, start.values)
+    found = _gauss_newton(t, at, along, start)
+    present, p = dict(start.values), None
+    for _ in range(STEPS):
+        estimate = found.estimate
+        without = {n: v for n, v in estimate.values.items() if n not in present}
+        model = replace(estimate, values=without).model(t.prior)
+        theta = np.array([*[estimate.values[n] for n in at.fitted], *estimate.offset])
+        parts = along.columns, along.precision, theta
+        whole = problem(t.data, model, model_error(t.data, model), e, parts)
+        if whole is None:
+            break
+        p = whole.weighted(np.asarray(t.sigma))
+        spans = p.cells(intervals_of(e, present))
+        better = segmented(p, spans)
+        if not better or p.cost(better) > p.cost(spans) - ENOUGH:
+            break
+        present = named(e, p.seconds(better))
+        found = _gauss_newton(t, at, along, replace(start, values=present))
+    if p is None:
+        return found
+    ends = likely(p, p.cells(intervals_of(e, present)))
+    return replace(found, intervals=dict(zip(present, ends, strict=True)))
+
+
+def intervals_of(e: Effect, values: Mapping[str, float]) -> list[tuple[float, float]]:
+    """The intervals [s] among the values of an effect."""
+    return [(values[a], values[b]) for a, b in e.search.intervals if a in values]
+
+
+def owner(ship: Ship, values: Iterable[str]) -> Effect:
+    """The effect of a ship that some times within a run are of."""
+    names = set(values)
+    return next(e for e in ship.effects.values() if names & {*e.search.times})
+
+
 def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:
     """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
-    given = {n: v for n, v in r.estimate.values.items() if n not in at.values}
+    given = r.own(at)
     fitted = [r.estimate.values[n] for n in at.fitted]
     offset = np.array([*fitted, *r.estimate.offset])
     return Shape(given, list(start.fitted), base - r.left, r.columns, offset, start.precision)

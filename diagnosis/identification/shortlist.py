@@ -24,6 +24,7 @@ from .refinement import (
     nuisance,
     refine,
 )
+from .segmentation import FLOOR
 
 LENGTH = 8  # of the shortlist
 # Share of a force that must be its own for data to tell its cause from another, or from those found:
@@ -33,7 +34,6 @@ REWEIGHTINGS = 4  # at the most
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
 # A curve that can do what an effect with this many parameters fewer does is no other explanation of it.
 FREE_SHAPE = 5
-FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
 # Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
 # own: as much as its score must fall to be accepted.
 NEW = 10.0
@@ -126,7 +126,7 @@ class Shortlist:
 
     Attributes:
         ids: of their effects.
-        starts, refined: where they started from, and where they came to.
+        starts, refined: what is fitted of them, and where they came to.
         table: all of them.
         scored: best first; their candidates are indices of the above.
     """
@@ -156,6 +156,7 @@ def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
     effects = [ranking.candidates[s.candidate].effect for s in best]
     starts = [start(at, ranking, s) for s in best]
     refined = [refine(t, at, ranking.nuisance, s) for s in starts]
+    starts = [replace(s, values=r.own(at)) for r, s in zip(refined, starts, strict=True)]
     shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
     found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
     table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)

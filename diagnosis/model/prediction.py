@@ -18,9 +18,9 @@ from fmus.signals import Force
 from fmus.thrusters import chain
 from fmus.vessel import vessel
 
-from ..smoothing import Smoothed
+from ..smoothing import IDLE, Smoothed
 from .ship_model import Model
-from .thrust import IDLE, Response, commanded_shares, placed, places
+from .thrust import Response, commanded_shares, placed, places
 
 LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
@@ -125,7 +125,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         for k, shares in enumerate(acting):
             if power is not None:
                 thrusters = placed(drive, aside, chain.Power(*power[k]))
-            now = Running._make((s.t + h, s.u, s.v, s.r, *given[k]))
+            now = Running._make((s.t + h, s.u, s.v, s.r, *given[k], aside))
             forces = chain.act(tuple(shares), now, thrusters)
             s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
             found[k + 1] = vessel.measured(s, body)

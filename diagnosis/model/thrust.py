@@ -24,8 +24,6 @@ from .ship_model import Model
 STEP = 0.02
 LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond what windows of some seconds show
 PART = 4.0  # s; about as long as a memory, which costs least
-# m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
-IDLE = (0.02, 0.02, 0.05)
 
 
 def commanded_shares(run: Run, model: Model) -> np.ndarray:
@@ -68,7 +66,7 @@ def thrust(run: Run, response: "Response", nu: np.ndarray) -> np.ndarray:
     given, acting = response.between_samples
     total = np.zeros_like(run.tau_cmd)
     for k, aside in enumerate(places(run)):
-        now = Running._make([run.time, *nu.T, *given[:, k].T])
+        now = Running._make([run.time, *nu.T, *given[:, k].T, aside])
         drive = placed(response.model.drive, aside, power)
         total += np.column_stack(np.broadcast_arrays(*chain.act(tuple(acting[:, k].T), now, drive)))
     return total

@@ -24,8 +24,8 @@ from .thrust import Response, thrust
 
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
-# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
-# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
+# Windows overlap: so many carry as much as one that is independent. The correlations of the kernel
+# (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
@@ -158,13 +158,23 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
     eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
-    def force() -> np.ndarray:
-        key = Response.key(model)
-        response = w.recall("response", key, lambda: Response(w.run, model, not at_rest(w.smoothed)))
-        return w.held @ thrust(w.run, response.of(model), nu)
-
-    driven = w.recall("driven", drive, force)
+    driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, nu))
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
+
+
+def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
+
+    Args:
+        w: windows of the run.
+        model: whose thrusters.
+        nu: (n, 3), body-fixed velocity, zero where it is not known; by default the smoothed one.
+    """
+    if nu is None:
+        nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
+    key = Response.key(model)
+    response = w.recall("response", key, lambda: Response(w.run, model, not at_rest(w.smoothed)))
+    return thrust(w.run, response.of(model), nu)
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from fmus.effects import Effect, Motion, Running, Thrust
 from fmus.effects.effect import Picture
+from fmus.effects.single_propellers import ASIDE, PICTURES
 from fmus.hull import damping_force
 
 from ..assessment.evaluation import Evaluation
@@ -65,9 +66,9 @@ def surge_speed(e: Evaluation, _: Model) -> np.ndarray:
     return u[np.isfinite(u)]
 
 
-def command(k: int) -> Callable[[Evaluation, Model], np.ndarray]:
-    """The k-th command of all sets of thrusters; the bow thruster is of the first."""
-    sets = slice(None) if k < 2 else slice(1)
+def command(k: int, sets: slice = slice(None)) -> Callable[[Evaluation, Model], np.ndarray]:
+    """The k-th command of sets of thrusters, by default of all; the bow thruster is of the first."""
+    sets = sets if k < 2 else slice(1)
     return lambda e, m: commanded_shares(e.integrals.run, m)[:, sets, k].T.ravel()
 
 
@@ -86,6 +87,16 @@ def vsp_surge(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray
 
 def vsp_sway(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
     return effect(Thrust(vsp_y=m.value("plant_F_vsp") * c), Running(u_vsp_y=c)).vsp_y
+
+
+def one_vsp(k: int, way: str) -> Force:
+    """The force of VSP k + 1 over its command, in the direction ``x`` or ``y``."""
+    law = {"x": vsp_surge, "y": vsp_sway}[way]
+
+    def force(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
+        return law(c, lambda f, now: effect(f, now._replace(aside=ASIDE[k])), m)
+
+    return force
 
 
 def vsp_given(f: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
@@ -129,6 +140,16 @@ SWEEPS: dict[Picture, Sweep] = {
         vsp_sway,
         command(1),
     ),
+    **{
+        picture: Sweep(
+            f"VSP {k + 1} command in {(way := {'x': 'surge', 'y': 'sway'}[axis])} [1]",
+            f"VSP {k + 1} {way} force [N]",
+            lambda _: (-1.0, 1.0),
+            one_vsp(k, axis),
+            command("xy".index(axis), slice(k, k + 1)),
+        )
+        for (k, axis), picture in PICTURES.items()
+    },
     "bow effectiveness over surge speed": Sweep(
         "surge speed |u| [m/s]",
         "bow effectiveness [1]",

@@ -1,5 +1,6 @@
 """Pose, velocity, acceleration of a measured run with their uncertainty, without a model of a ship."""
 
+from .command_motion import IDLE
 from .smoother import Smoothed, smooth
 
-__all__ = ["Smoothed", "smooth"]
+__all__ = ["IDLE", "Smoothed", "smooth"]

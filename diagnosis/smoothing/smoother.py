@@ -17,7 +17,9 @@ from fmus.frames import rotate_to_body
 
 from ..data import Counts, Track
 from ..data.cleaning import noise
-from .command_response import CommandResponse, Commands, with_commands
+from .command_motion import IDLE, CommandResponse, Commands
+from .command_response import with_commands
+from .delay import NOTICED
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
 from .spline import Knots, basis, inverse_band, knots, roughness, variance
@@ -26,7 +28,6 @@ from .spline import Knots, basis, inverse_band, knots, roughness, variance
 BREAK = 3.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
-NOTICED = 0.1  # s; a shorter delay is not reported (chosen)
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
@@ -47,6 +48,7 @@ class Smoothed:
         noise: (3,), standard deviation of the measurement [m, m, rad].
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
+        late: whether the whole run agrees on that delay.
     """
 
     track: Track
@@ -62,6 +64,7 @@ class Smoothed:
     noise: np.ndarray
     jerk: np.ndarray
     delay: float
+    late: bool
 
     @property
     def time(self) -> np.ndarray:
@@ -76,7 +79,7 @@ class Smoothed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was found in the data, a line each."""
-        if not self.delay >= NOTICED:
+        if not (self.late and self.delay >= NOTICED):
             return self.track.notes
         delay = (
             f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
@@ -129,7 +132,9 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     fit, response = solve(adapted, smoothness, weights), CommandResponse.none(time.size)
     if driven:
         psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
-        commands = Commands(track, psi, grid)
+        first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
+        slow = np.hypot(*first[:2]) < IDLE[0] and abs(first[2]) < IDLE[2]
+        commands = Commands(track, psi, grid, bool(slow))
         smoothness, fit, response = with_commands(even, smoothness, fit, weights, commands)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
@@ -157,6 +162,7 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
         sigma,
         sigma**2 / (smoothness * grid.spacing**5),
         response.delay,
+        response.sure,
     )
 
 

@@ -16,8 +16,9 @@ from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD, EffectSet
 from ..interruption import run_interruptible
 from . import ledger
-from .building import build, cache_folder
+from .building import build, cache_folder, export
 from .finding import BuildError, load, which
+from .platforms import native_targets
 from .start_values_file import read_starts
 
 
@@ -32,6 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           python -m fmus.build --list vessel\n"
         "           python -m fmus.build vessel --effects my_effects.py --out fmu\n"
         "           python -m fmus.build --parameters model.ssv --out fmu\n"
+        "           python -m fmus.build --native --parameters model.ssv --out fmu\n"
+        "           python -m fmus.build --native vessel --target linux64,win64,darwin64 --out fmu\n"
+        "           python -m fmus.build --native vessel thrusters --source firmware\n"
         "           python -m fmus.build --verify fmu/vessel.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -59,7 +63,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="FILE.ssv",
         help="SSP parameter set whose values become start values (without NAME: of the FMUs it names)",
     )
+    parser.add_argument(
+        "--native",
+        action="store_true",
+        help="compile the FMUs, which then need no Python",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="PLATFORM,...",
+        help="with --native: linux64, win64, darwin64 (this computer); python: all others run in Python",
+    )
+    parser.add_argument(
+        "--source", type=Path, metavar="DIR", help="with --native: write plain C there, build no FMU"
+    )
     options = parser.parse_args(arguments)
+    if not options.native and (options.target is not None or options.source is not None):
+        parser.error("--target and --source need --native")
     try:
         effects = STANDARD
         for file in options.effects:
@@ -70,7 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _print_list(options.names, effects)
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
-            for path in build(options.names, options.out, starts, _note, effects):
+            if options.source is not None:
+                made = export(options.names, options.source, starts, _note, effects)
+            else:
+                native = native_targets(options.target) if options.native else None
+                made = build(options.names, options.out, starts, _note, effects, native)
+            for path in made:
                 print(path)
         sys.stdout.flush()
     except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends

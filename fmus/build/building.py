@@ -11,11 +11,16 @@ from pathlib import Path
 from filelock import FileLock
 from platformdirs import user_cache_path
 
-from ..declare import discover
+from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
+from ..fmi.trace import TraceError
+from ..native.compilers import CompilerError
+from ..native.export_source import export_source
+from ..native.native_fmu import native_fmu
 from . import ledger
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, pack
+from .platforms import Native
 from .start_values_file import Starts
 
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
@@ -27,6 +32,7 @@ def build(
     starts: Starts | None = None,
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
+    native: Native | None = None,
 ) -> list[Path]:
     """FMUs that are up to date with the source.
 
@@ -37,12 +43,13 @@ def build(
             the ones that are built.
         note: receives a line where a part of the parameter set is not used.
         effects: that vessel and thrusters are to have.
+        native: the platforms to compile for; None means FMUs that run in Python.
 
     Returns:
         Path of each FMU, in the order of the names.
 
     Raises:
-        BuildError: unknown name, or a file that declares no component.
+        BuildError: unknown name, a file that declares no component, or no compiler.
         DeclarationError: a parameter set that does not fit.
     """
     if out is not None:
@@ -50,13 +57,36 @@ def build(
             out.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
             raise BuildError(f"'{out}' is a file, not a folder") from None
-    if starts is None:
-        every = names or [component.name for _, component in discover()]
-        built = [_cached(name, effects) for name in every]
-    else:
-        built = [_cached(name, effects, starts) for name in names or starts.values]
+    built = [_cached(name, effects, starts, native) for name in _every(names, starts)]
+    if starts is not None:
         _tell_unused(starts, [fmu.stem for fmu in built], note)
     return built if out is None else [_place(fmu, out / fmu.name) for fmu in built]
+
+
+def export(
+    names: Sequence[str],
+    folder: Path,
+    starts: Starts | None = None,
+    note: Callable[[str], None] = lambda _: None,
+    effects: EffectSet = STANDARD,
+) -> list[Path]:
+    """Components as plain C; arguments and errors are those of :func:`build`.
+
+    Returns:
+        The files written.
+    """
+    found = [load(*which(name), effects)[1] for name in _every(names, starts)]
+    if starts is not None:
+        found = [starts.baked(component) for component in found]
+        _tell_unused(starts, [component.name for component in found], note)
+    return export_source(found, folder)
+
+
+def _every(names: Sequence[str], starts: Starts | None) -> Sequence[str]:
+    """The components asked for; without names those of the parameter set, or all."""
+    if starts is not None:
+        return names or list(starts.values)
+    return names or [component.name for _, component in discover()]
 
 
 def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], None]) -> None:
@@ -92,17 +122,19 @@ def cache_folder() -> Path:
     return Path(chosen) if chosen else user_cache_path("cybership")
 
 
-def _cached(name: str, effects: EffectSet, starts: Starts | None = None) -> Path:
+def _cached(
+    name: str, effects: EffectSet, starts: Starts | None = None, native: Native | None = None
+) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = which(name)
-    folder = cache_folder() / _source_hash(own_file, effects, {})
+    folder = cache_folder() / _source_hash(own_file, effects, {}, native)
     fmu = folder / f"{stem}.fmu"
     if starts is None and fmu.is_file():
         return fmu
     module, component = load(stem, own_file, effects)
     if starts is not None:
         component = starts.baked(component)
-        folder = cache_folder() / _source_hash(own_file, effects, component.starts)
+        folder = cache_folder() / _source_hash(own_file, effects, component.starts, native)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -110,21 +142,37 @@ def _cached(name: str, effects: EffectSet, starts: Starts | None = None) -> Path
             f"cannot keep FMUs in '{folder}' ({error.strerror}); CYBERSHIP_CACHE may name another folder"
         ) from None
     fmu = folder / f"{component.name}.fmu"
+    python = _cached(name, effects, starts) if native is not None and native.python else None
     with FileLock(folder / "lock"):
         if not fmu.is_file():
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-                built = pack(component, module, own_file, Path(work), effects)
+                if native is None:
+                    built = pack(component, module, own_file, Path(work), effects)
+                else:
+                    built = _compiled(component, native, Path(work), python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
                 _place(built, fmu)
     return fmu
 
 
-def _source_hash(own_file: Path | None, effects: EffectSet, starts: Mapping[str, float]) -> str:
-    """Hash of everything that a build reads, and of the start values that it changes."""
+def _compiled(component: Component, native: Native, work: Path, python: Path | None) -> Path:
+    try:
+        return native_fmu(component, native.targets, work, python)
+    except (CompilerError, TraceError) as error:
+        raise BuildError(f"{component.name} cannot be compiled: {error}") from error
+
+
+def _source_hash(
+    own_file: Path | None, effects: EffectSet, starts: Mapping[str, float], native: Native | None = None
+) -> str:
+    """Hash of all that a build reads, of the start values that it changes, and of its compilers."""
     digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
     own = [*effects.files, *([own_file] if own_file else [])]
-    for path in [*sorted(p for p in ROOT.rglob("*.py") if CHECKER not in p.parents), *own]:
+    ours = [p for suffix in ("py", "c") for p in ROOT.rglob(f"*.{suffix}") if CHECKER not in p.parents]
+    for path in [*sorted(ours), *own]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     digest.update(changes(starts).encode())
+    if native is not None:
+        digest.update(native.key.encode())
     return digest.hexdigest()[:16]

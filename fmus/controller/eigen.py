@@ -7,7 +7,7 @@ exceeds a bound, at a fraction of the cost of an eigenvalue, and twenty paramete
 from collections.abc import Sequence
 from typing import Any
 
-from ..ops import Number, fmax, fmin, sqrt, where
+from ..ops import Number, fmax, fmin, kernel, sqrt, where
 
 Matrix = Sequence[Sequence[Any]]
 # Diagonal and squared off-diagonal of a tridiagonal matrix.
@@ -26,6 +26,7 @@ def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     return total
 
 
+@kernel
 def tridiagonal(matrix: Matrix) -> Tridiagonal:
     """A symmetric matrix (n, n) in tridiagonal form, by Householder's reflections."""
     rest = [list(row) for row in matrix]
@@ -63,6 +64,7 @@ def exceed(matrices: Sequence[Tridiagonal], bound: Number) -> Number:
     return least > 0.0
 
 
+@kernel
 def smallest(matrices: Sequence[Tridiagonal], low: Number = 0.0) -> Any:
     """The smallest of all eigenvalues of all matrices, if above ``low``; else ``low``."""
     high = matrices[0][0][0]

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import FIXED, POSITIVE, Range
 from ..frames import rotate_to_earth
 from ..hull import Triple
-from ..ops import Number, choose, fmax, fmin, put, when, where
+from ..ops import Number, choose, fmax, fmin, kernel, put, when, where
 from .eigen import dot, exceed, smallest, tridiagonal
 from .parametrisation import Parametrisation, Regressors
 
@@ -107,10 +107,11 @@ def empty_row(F: Regressors) -> Row:
 def empty_store(model: Parametrisation) -> Store:
     F: Any = tuple([tuple([0.0] * len(indices)) for indices in model.pattern])
     rows = (empty_row(F),) * SIZE
-    return Store(rows, F, summed(model, rows, False))
+    return Store(rows, F, summed(False, rows, model))
 
 
-def summed(model: Parametrisation, rows: tuple[Row, ...], omega_on: Number) -> Sums:
+@kernel
+def summed(omega_on: Number, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
     count, oldest = 0.0, NEVER
     projected: tuple[Any, ...] = (0.0,) * len(model.coefficients)
@@ -204,6 +205,6 @@ def offer(
         )
         rows = when(considered, lambda: storage(model, kept, store.sums, row), lambda: kept)
         last = choose(considered, row.F, store.last)
-        return Store(rows, last, summed(model, rows, omega_on))
+        return Store(rows, last, summed(omega_on, rows, model))
 
     return when(considered | expired, revised, lambda: store)

@@ -6,14 +6,17 @@ from . import (
     force,
     inertia,
     measurement,
+    outages,
+    single_propellers,
     thrust_curves,
     thruster_dynamics,
 )
-from .effect import Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
+from .effect import EACH_VSP, Effect, Memory, Motion, Running, Search, Thrust, Wording, effect
 from .effect_set import EffectSet, effects_of
 from .families import Family
 
 __all__ = [
+    "EACH_VSP",
     "STANDARD",
     "Effect",
     "EffectSet",
@@ -33,7 +36,9 @@ STANDARD = EffectSet(
     e
     for module in (
         thrust_curves,
+        single_propellers,
         actuator,
+        outages,
         thruster_dynamics,
         environment,
         force,

@@ -27,7 +27,10 @@ def _cell(text: str) -> str:
 
 
 def _parameters(e: Effect) -> str:
-    """Names of the parameters with their units, a curve's nodes as one."""
+    """Names of the parameters with their units, a curve's nodes or many times as one."""
+    if e.search.intervals:
+        first, *_, last = e.parameters
+        return f"`{first.name}`, `{e.parameters[1].name}` … `{last.name}` [{first.unit}]"
     if len(e.parameters) > 8:
         first, *_, last, reach = e.parameters
         return f"`{first.name}` … `{last.name}` [{first.unit}], {_one(reach)}"

@@ -40,7 +40,8 @@ def loss_vsp(
     f: Thrust, now: Running, loss_vsp: Annotated[float, "1", "share of VSP force lost", SHARE] = 0.0
 ) -> Thrust:
     """Force lost by the Voith Schneider propellers."""
-    return f._replace(vsp_x=f.vsp_x * (1.0 - loss_vsp), vsp_y=f.vsp_y * (1.0 - loss_vsp))
+    left = 1.0 - loss_vsp
+    return f._replace(vsp_x=f.vsp_x * left, vsp_y=f.vsp_y * left, turn=f.turn * left)
 
 
 @effect(

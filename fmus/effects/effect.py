@@ -32,12 +32,18 @@ from ..docstring import docstring
 from .families import UNKNOWN, Family
 
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
-Device = Literal["vsp", "bow"]
+Device = Literal["vsp", "bow", "each vsp"]
+# Of an effect on one of the two propellers: these have commands of their own.
+EACH_VSP: Device = "each vsp"
 # Pictures that show an effect: its force over speed or command, drawn by the report.
 Picture = Literal[
     "hull surge force over surge speed",
     "VSP surge force over command",
     "VSP sway force over command",
+    "surge force of VSP 1 over its command",
+    "sway force of VSP 1 over its command",
+    "surge force of VSP 2 over its command",
+    "sway force of VSP 2 over its command",
     "bow effectiveness over surge speed",
     "VSP force given over commanded",
     "bow force given over commanded",
@@ -60,7 +66,10 @@ class Motion(NamedTuple):
 
 
 class Running(NamedTuple):
-    """What a thruster's force may depend on: time [s], velocity, commands -1...1."""
+    """What a thruster's force may depend on: time [s], velocity, commands -1...1, place.
+
+    ``aside`` [m] is how far to starboard the propellers sit: 0 where one set stands for both.
+    """
 
     t: Any = 0.0
     u: Any = 0.0
@@ -69,18 +78,21 @@ class Running(NamedTuple):
     u_vsp_x: Any = 0.0
     u_vsp_y: Any = 0.0
     u_bow: Any = 0.0
+    aside: Any = 0.0
 
 
 class Thrust(NamedTuple):
     """Forces of the thrusters [N], and what turns their sum into tau.
 
-    ``loss_*`` is the part of tau that is lost on each axis; ``dx`` and ``dy`` [m] is how far from the
-    assumed point the force acts.
+    ``turn`` [N m] is the moment of propellers that push each to one side of the middle; ``loss_*`` is
+    the part of tau that is lost on each axis; ``dx`` and ``dy`` [m] is how far from the assumed point
+    the force acts.
     """
 
     vsp_x: Any = 0.0
     vsp_y: Any = 0.0
     bow: Any = 0.0
+    turn: Any = 0.0
     loss_X: Any = 0.0
     loss_Y: Any = 0.0
     loss_N: Any = 0.0
@@ -127,6 +139,9 @@ class Search:
             coefficients of a differentiable effect, else none.
         change_points: parameters that are times within a run [s]: tried throughout each run, and refined
             by search, as the fit has no slope by them.
+        intervals: start and end [s] of each interval in which the effect acts, of which there may be any
+            number up to these: found by segmentation of the runs.
+        lasting: id of the effect that is the same as one interval without an end.
         smooth: whether the coefficients are values of a curve at equally spaced nodes, of which
             neighbours are alike.
     """
@@ -136,7 +151,14 @@ class Search:
     tries: Iterable[Values] | Callable[[Values], Iterable[Values]] = ()
     fitted: tuple[str, ...] | None = None
     change_points: tuple[str, ...] = ()
+    intervals: tuple[tuple[str, str], ...] = ()
+    lasting: str = ""
     smooth: bool = False
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Parameters that are times within a run [s]."""
+        return (*self.change_points, *(name for pair in self.intervals for name in pair))
 
     def values(self, nominal: Values) -> list[Values]:
         """The values to try, for a model with these parameters."""
@@ -292,7 +314,7 @@ def effect(
         if not strengths:
             raise DeclarationError(f"{id} needs a parameter that starts at 0, where it has no effect")
         search: Search = more.get("search", Search())
-        named = {*how, *(search.fitted or ()), *search.change_points}
+        named = {*how, *(search.fitted or ()), *search.times}
         strange = sorted(named - {p.name for p in parameters})
         if strange:
             raise DeclarationError(f"{id} has no parameter '{strange[0]}'")

@@ -139,6 +139,12 @@ def is_linear(e: Effect) -> bool:
             off = [abs(a - 2.0 * b + c) for a, b, c in zip(none, once, twice, strict=True)]
             if max(off) > 1e-6 * size:
                 return False
+        parts = [{name: 0.5 * _unit(e, name)} for name in e.coefficients]
+        alone = [_flat(e, at, one) for one in ({}, *parts)]
+        whole = _flat(e, at, {name: x for one in parts for name, x in one.items()})
+        rest = [w - sum(p) + (len(parts) - 1) * n for w, n, *p in zip(whole, *alone, strict=True)]
+        if max(map(abs, rest)) > 1e-6 * max(map(abs, whole)):
+            return False
     return True
 
 

@@ -23,7 +23,7 @@ _GOLDEN = 2.0 * math.pi * (math.sqrt(5.0) - 1.0) / 2.0
     formula="(X, Y) = R^T(psi) (F_n, F_e) (1 + swing sin(2 pi t / period))",
     sign="F_n pushes north, F_e pushes east",
     source="(2.3), (2.33)",
-    settings=("earth_force_swing",),
+    settings=("earth_force_period", "earth_force_swing"),
     wording=Wording(
         lambda f: (
             f"A steady force of {number(math.hypot(f['F_n'], f['F_e']))} N pushes the ship towards "

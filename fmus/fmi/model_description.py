@@ -13,13 +13,17 @@ LOG_CATEGORIES = {
 }
 
 
-def model_description(component: Component, guid: str, version: str) -> Element:
+def model_description(
+    component: Component, guid: str, version: str, needs_tool: bool = True, tool: str = "pythonfmu"
+) -> Element:
     """The XML description of the FMU of a component.
 
     Args:
         component: the declaration.
         guid: identifies code and declaration.
         version: of the project.
+        needs_tool: whether the FMU needs Python to run, on any platform.
+        tool: what has made the FMU.
 
     Returns:
         Root element. Value references count parameters, inputs and outputs, in this order.
@@ -31,7 +35,7 @@ def model_description(component: Component, guid: str, version: str) -> Element:
         guid=guid,
         description=component.description,
         version=version,
-        generationTool="pythonfmu",
+        generationTool=tool,
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
@@ -39,7 +43,7 @@ def model_description(component: Component, guid: str, version: str) -> Element:
         root,
         "CoSimulation",
         modelIdentifier=component.name,
-        needsExecutionTool="true",
+        needsExecutionTool=str(needs_tool).lower(),
         canHandleVariableCommunicationStepSize="true",
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",

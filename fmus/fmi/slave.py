@@ -102,8 +102,9 @@ class Slave(Fmi2Slave):
     def _arguments(self) -> tuple[Any, Any]:
         """Inputs and parameters as the component wants them."""
         if self._params is None:
-            self._params = self._pack_params(self._values[self._slices[0]])
-            self._prepared = self.component.prepared(self._params)
+            params = self._pack_params(self._values[self._slices[0]])
+            self._prepared = self.component.prepared(params)
+            self._params = params  # where that fails, it is tried again before the next step
         return self._pack_inputs(self._values[self._slices[1]]), self._params
 
     def _initialise(self) -> None:

@@ -62,60 +62,60 @@ class Symbol:
         return Symbol(name, args)
 
     def __add__(self, other: Any) -> Symbol:
-        return Symbol("add", (self, other))
+        return self.apply_operation("add", (self, other))
 
     def __radd__(self, other: Any) -> Symbol:
-        return Symbol("add", (other, self))
+        return self.apply_operation("add", (other, self))
 
     def __sub__(self, other: Any) -> Symbol:
-        return Symbol("sub", (self, other))
+        return self.apply_operation("sub", (self, other))
 
     def __rsub__(self, other: Any) -> Symbol:
-        return Symbol("sub", (other, self))
+        return self.apply_operation("sub", (other, self))
 
     def __mul__(self, other: Any) -> Symbol:
-        return Symbol("mul", (self, other))
+        return self.apply_operation("mul", (self, other))
 
     def __rmul__(self, other: Any) -> Symbol:
-        return Symbol("mul", (other, self))
+        return self.apply_operation("mul", (other, self))
 
     def __truediv__(self, other: Any) -> Symbol:
-        return Symbol("div", (self, other))
+        return self.apply_operation("div", (self, other))
 
     def __rtruediv__(self, other: Any) -> Symbol:
-        return Symbol("div", (other, self))
+        return self.apply_operation("div", (other, self))
 
     def __neg__(self) -> Symbol:
-        return Symbol("neg", (self,))
+        return self.apply_operation("neg", (self,))
 
     def __abs__(self) -> Symbol:
-        return Symbol("abs", (self,))
+        return self.apply_operation("abs", (self,))
 
     def __lt__(self, other: Any) -> Symbol:
-        return Symbol("lt", (self, other))
+        return self.apply_operation("lt", (self, other))
 
     def __le__(self, other: Any) -> Symbol:
-        return Symbol("le", (self, other))
+        return self.apply_operation("le", (self, other))
 
     def __gt__(self, other: Any) -> Symbol:
-        return Symbol("gt", (self, other))
+        return self.apply_operation("gt", (self, other))
 
     def __ge__(self, other: Any) -> Symbol:
-        return Symbol("ge", (self, other))
+        return self.apply_operation("ge", (self, other))
 
     def __eq__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return Symbol("eq", (self, other))
+        return self.apply_operation("eq", (self, other))
 
     def __ne__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return Symbol("ne", (self, other))
+        return self.apply_operation("ne", (self, other))
 
     def __and__(self, other: Any) -> Symbol:
-        return Symbol("and", (self, other))
+        return self.apply_operation("and", (self, other))
 
     __rand__ = __and__
 
     def __or__(self, other: Any) -> Symbol:
-        return Symbol("or", (self, other))
+        return self.apply_operation("or", (self, other))
 
     __ror__ = __or__
 

@@ -1,4 +1,4 @@
-"""Helpers of several tests: traced components in C, FMUs made on purpose, closed loops, made-up measured runs."""
+"""Helpers of several tests: components in C, FMUs made on purpose, closed loops, made-up measured runs."""
 
 __all__ = [
     "cases",

@@ -1,82 +1,71 @@
-"""A traced component as C, compiled and called: proof that the source can run without Python."""
+"""A component's generated C, compiled and called without the FMI face around it."""
 
 import ctypes
 import shutil
 import subprocess
 
-from fmus.fmi.trace import Symbol, ordered
+from fmus.native.model_source import model_source, sizes
+from fmus.native.program import program
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 
-_INFIX = {
-    "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
-    "eq": "==", "ne": "!=", "and": "&&", "or": "||",
-}  # fmt: skip
-_FORMS = {
-    "neg": "(-{0})",
-    "abs": "fabs({0})",
-    "logical_not": "(!{0})",
-    "where": "({0} ? {1} : {2})",
-    # As fmus.ops has it; C's fmin and fmax treat NaN otherwise.
-    "fmin": "({0} < {1} ? {0} : {1})",
-    "fmax": "({0} > {1} ? {0} : {1})",
-}
 
+class Compiled:
+    """The functions of a component in C, with lists in place of arrays.
 
-def function(results):
-    """C source of ``void run(params, inputs, state, h, out)`` that computes traced results."""
-    names = {}
-    lines = []
+    Args:
+        component: what to compile.
+        folder: where source and library are kept.
+        optimise: option for the compiler, most of whose time goes into optimising.
+    """
 
-    def text(node):
-        if isinstance(node, Symbol):
-            return names[id(node)]
-        return repr(float(node)) if not isinstance(node, bool) else str(int(node))
-
-    for k, node in enumerate(ordered(results)):
-        if node.operation == "variable":
-            names[id(node)] = node.args[0]
-            continue
-        args = [text(a) for a in node.args]
-        if node.operation in _INFIX:
-            value = f"({args[0]} {_INFIX[node.operation]} {args[1]})"
-        else:
-            value = _FORMS.get(node.operation, f"{node.operation}({', '.join(args)})").format(*args)
-        names[id(node)] = f"x{k}"
-        lines.append(f"const double x{k} = {value};")
-    lines += [f"out[{k}] = {text(result)};" for k, result in enumerate(results)]
-    head = "const double *params, const double *inputs, const double *state, double h, double *out"
-    body = "\n".join(lines)
-    return f"#include <math.h>\nvoid run({head}) {{\n{body}\n}}\n"
-
-
-def compiled(results, folder):
-    """The same as a Python function of (params, inputs, state, h)."""
-    (folder / "run.c").write_text(function(results))
-    library = folder / "run.so"
-    subprocess.run(
-        [
+    def __init__(self, component, folder, optimise="-O0"):
+        recorded = program(component)
+        for name, text in model_source(recorded).items():
+            (folder / name).write_text(text)
+        library = folder / f"{component.name}.so"
+        command = [
             COMPILER,
-            "-O0",  # the compiler is most of these tests' time
+            optimise,
+            "-w",
+            "-std=c99",
             "-ffp-contract=off",
+            "-fno-builtin",
             "-shared",
             "-fPIC",
-            "-o",
-            library,
-            folder / "run.c",
-            "-lm",
-        ],
-        check=True,
-    )
-    run = ctypes.CDLL(str(library)).run
-    run.restype = None
+        ]
+        subprocess.run([*command, "-o", library, folder / f"{component.name}.c", "-lm"], check=True)
+        dll = ctypes.CDLL(str(library))
+        names = ("init", "prepare", "step")
+        self._functions = {name: getattr(dll, f"{component.name}_{name}") for name in names}
+        self.sizes = sizes(recorded)
 
-    def call(params, inputs, state, h):
-        def array(values):
-            return (ctypes.c_double * max(1, len(values)))(*values)
+    def init(self, params, inputs):
+        """The initial state, None where C reports an error."""
+        (state,) = self._call("init", [params, inputs], ["states"]) or [None]
+        return state
 
-        out = array([0.0] * len(results))
-        run(array(params), array(inputs), array(state), ctypes.c_double(h), out)
-        return list(out)
+    def step(self, params, inputs, state, h):
+        """State and outputs after a step, one behind the other; None where C reports an error."""
+        prepared = self._call("prepare", [params], ["prepared"])
+        if prepared is None:
+            return None
+        given = [params, *prepared, inputs, state, ctypes.c_double(h)]
+        results = self._call("step", given, ["states", "outputs"])
+        return None if results is None else results[0] + results[1]
 
-    return call
+    def _call(self, name, given, results):
+        arrays = [_array(x) if isinstance(x, list) else x for x in given]
+        filled = [_array([0.0] * self.sizes[group]) for group in results]
+        if self._functions[name](*arrays, *filled):
+            return None
+        return [list(array)[: self.sizes[group]] for array, group in zip(filled, results, strict=True)]
+
+
+def _array(values):
+    return (ctypes.c_double * max(1, len(values)))(*values)
+
+
+def same_bits(a, b):
+    """Whether two lists of numbers are equal to the sign of a zero; NaN equals NaN."""
+    return [float(x).hex() for x in a] == [float(x).hex() for x in b]

@@ -32,22 +32,50 @@ def commands(t, quick=0.0):
     return slow + quick * np.sin(2.0 * np.pi * 0.85 * t)[:, None] * [1.0, 1.0, 0.3]
 
 
-def sail(seconds=64.0, h=0.02, ship=None, thrusters=None, noise=1.0, seed=1, quick=0.0, craft=None):
+def jumps(t):
+    """tau [N, N, N m] that is held for seven seconds and jumps."""
+    return np.random.default_rng(5).uniform(-1.0, 1.0, (t.size, 3))[(t / 7.0).astype(int)] * [
+        0.8,
+        0.4,
+        0.2,
+    ]
+
+
+def slow_swings(t):
+    """tau [N, N, N m] that swings once in two minutes."""
+    return np.column_stack(
+        [0.5 + 0.3 * np.sin(0.05 * t), 0.1 * np.sin(0.07 * t), 0.1 * np.sin(0.06 * t)]
+    )
+
+
+def sail(
+    seconds=64.0,
+    h=0.02,
+    ship=None,
+    thrusters=None,
+    noise=1.0,
+    seed=1,
+    quick=0.0,
+    craft=None,
+    given=commands,
+):
     """A run, and the true nu (n, 3): one sample each h [s], pose in (-pi, pi] with noise.
 
-    ``ship`` and ``thrusters`` are their parameters; ``craft`` is a ship with a user's effects.
+    ``ship`` and ``thrusters`` are their parameters; ``craft`` is a ship with a user's effects; ``given``
+    are the commands over time.
     """
-    given = (seconds, h, ship or {}, thrusters or {}, quick)
-    time, true, nu, tau_cmd = voyage(*given, craft) if craft else kept(voyage, *given)
+    each = (seconds, h, ship or {}, thrusters or {}, quick)
+    made = voyage(*each, craft) if craft else kept(voyage, *each, None, given)
+    time, true, nu, tau_cmd = made
     pose = true + noise * NOISE * np.random.default_rng(seed).standard_normal(true.shape)
     pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
     return Run("made", time, pose, tau_cmd), nu
 
 
-def voyage(seconds, h, ship, thrusters, quick, craft=None):
+def voyage(seconds, h, ship, thrusters, quick, craft=None, given=commands):
     """Time (n,), pose and nu (n, 3) of the ship under the commands, and these."""
     t = np.arange(round(seconds / h)) * h
-    tau_cmd = commands(t, quick)
+    tau_cmd = commands(t, quick) if given is commands else given(t)
     hull, drive = (craft.vessel, craft.thrusters) if craft else (vessel.COMPONENT, THRUSTERS)
     p = parameters(hull, START | ship)
     plan = parameters(drive, thrusters)

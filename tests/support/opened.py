@@ -1,5 +1,6 @@
 """An FMU as FMPy opens it, with variables by name."""
 
+import random
 import zlib
 from functools import cache
 from pathlib import Path
@@ -63,6 +64,15 @@ class Opened:
 
     def step(self, t, h=0.01):
         return self.fmu.doStep(t, h)
+
+    def play(self, seed, steps=20):
+        """Outputs after each of some steps with random inputs."""
+        rng, rows = random.Random(seed), []
+        for k in range(steps):
+            self.set(**{name: rng.uniform(-0.5, 0.5) for name in self.inputs})
+            self.step(k * 0.01)
+            rows.append(self.get())
+        return rows
 
     def close(self):
         self.fmu.terminate()

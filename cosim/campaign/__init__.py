@@ -1,0 +1,25 @@
+"""Many runs of a scenario that differ by named axes, on one or many computers, and one table of them.
+
+``python -m cosim.campaign campaign.json``; from Python :func:`cosim.run_campaign`. Needs the extra
+``campaign``.
+"""
+
+from ..lazy import lazy_names
+
+TYPE_CHECKING = False  # typing itself takes a while to import
+if TYPE_CHECKING:
+    from .campaign_file import campaign_schema
+    from .comparison import differences, pareto
+    from .conduct import run_campaign
+
+__all__ = ["campaign_schema", "differences", "pareto", "run_campaign"]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "campaign_schema": "campaign_file",
+        "differences": "comparison",
+        "pareto": "comparison",
+        "run_campaign": "conduct",
+    },
+)

@@ -1,0 +1,203 @@
+"""Run a campaign: ``python -m cosim.campaign campaign.json [--out DIR] [--workers N]``."""
+
+from __future__ import annotations
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+import os
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ..command import BAD_INPUT, FAILED, Output, complain, printable, run_command
+from ..errors import InputError, SimulationError
+from ..files import atomic_write
+from .conduct import Progress as Told
+from .conduct import result_folder, run_campaign
+
+if TYPE_CHECKING:
+    import pandas
+
+# Metrics of tables and pictures where the user names none: an error, its heading, and what it costs.
+USUAL = ("e_pos_rms", "cross_track_rms", "heading_rms", "W", "I_tau_dot")
+
+# Messages of failed runs that are shown; chosen: the table has all.
+MESSAGES = 3
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    out = result_folder(options.campaign, options.out)
+    visible = not options.quiet and console.is_terminal
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+    try:
+        with bar if visible else nullcontext():
+            made = run_campaign(
+                options.campaign,
+                out,
+                options.workers,
+                options.scheduler,
+                options.keep_logs,
+                options.stop_when,
+                lambda text: None if options.quiet else console.print(printable(text), markup=False),
+                _on(bar) if visible else lambda ended, failed, of: None,
+            )
+        failed = made.query("status == 'failed'")
+        for message, count in Counter(failed["message"]).most_common(MESSAGES):
+            complain(message, kind=f"{count} of {len(made)} runs failed: ")
+        if not options.quiet:
+            Output(highlight=False).print(printable(f"{len(made)} runs in {out}"), soft_wrap=True)
+        if len(failed) == len(made):
+            return FAILED
+        _evaluate(options, made, out)
+    except InputError as error:
+        complain(error)
+        return BAD_INPUT
+    except SimulationError as error:
+        complain(error)
+        return FAILED
+    except KeyboardInterrupt:
+        complain(f"interrupted: what has finished is in '{out}'; the same command goes on", kind="")
+        raise
+    return 0
+
+
+def _on(bar: Progress) -> Told:
+    task = bar.add_task("runs", total=None)
+
+    def progress(ended: int, failed: int, of: int) -> None:
+        said = f"runs ({failed} failed)" if failed else "runs"
+        bar.update(task, completed=ended, total=of, description=said)
+
+    return progress
+
+
+def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) -> None:
+    """What is made of the table on request: the Pareto set, differences, pictures."""
+    from .campaign_file import LoadedCampaign
+    from .comparison import differences, pareto
+
+    campaign = LoadedCampaign(options.campaign).campaign
+    axes = list(campaign.axes)
+    over = [name for name, axis in campaign.axes.items() if axis.paths == ["seed"] and len(axes) > 1]
+    metrics = options.metrics or [m for m in USUAL if made[m].notna().any()]
+    if options.pareto:
+        found = pareto(made, axes, options.pareto, over)
+        _write(found, out / "pareto.csv")
+        rows = [[_number(x) for x in row] for row in found.itertuples(index=False)]
+        _print(f"not beaten in both {' and '.join(options.pareto)}", [*found.columns], rows)
+    if options.compare:
+        found = differences(made, axes, options.compare, metrics)
+        _write(found, out / "differences.csv")
+        rows = [
+            [
+                *(str(row[key]) for key in ("value", "against", "metric", "pairs")),
+                f"{row['difference']:.3g} ± {row['half']:.2g}",
+                "{percent:+.2f} ({percent_low:+.2f} to {percent_high:+.2f})".format(**row),
+            ]
+            for row in found.to_dict("records")
+        ]
+        header = [options.compare, "against", "metric", "pairs", "difference", "percent"]
+        _print("paired differences with 95 % intervals", header, rows)
+    if options.plot:
+        from .charts import draw_campaign
+
+        for path in draw_campaign(made, axes, over, metrics, out, options.compare):
+            print(path)
+
+
+def _write(found: pandas.DataFrame, path: Path) -> None:
+    with atomic_write(path) as scratch:
+        found.to_csv(scratch, index=False)
+
+
+def _print(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    shown = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for name in header:
+        shown.add_column(printable(name), no_wrap=True)
+    for row in rows:
+        shown.add_row(*map(printable, row))
+    Output(highlight=False, soft_wrap=True).print(shown)
+
+
+def _number(x: object) -> str:
+    return f"{x:.4g}" if isinstance(x, float) else str(x)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"needs a whole number from zero on, not '{text}'")
+    return int(text)
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m cosim.campaign",
+        description="Run a scenario many times, and write one table: runs.parquet.",
+        epilog="examples:  python -m cosim.campaign scenarios/campaigns/gains.campaign.json\n"
+        "           python -m cosim.campaign gains.campaign.json --compare controller --plot\n"
+        "           python -m cosim.campaign campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
+        "           python -m cosim.campaign campaign.json --scheduler tcp://10.0.0.1:8786\n"
+        "exit codes: 0 done, 2 bad input, 3 every run failed or the workers were lost, 130 interrupted\n"
+        "A finished run is never made again: the same command goes on where it was interrupted.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "campaign", metavar="CAMPAIGN", type=Path, help="JSON file, see docs/campaign.md"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="result folder (results/<file name>)")
+    parser.add_argument(
+        "--workers",
+        type=_count,
+        metavar="N",
+        help=f"processes on this computer ({os.cpu_count()}); 0: all in this one, without Dask",
+    )
+    parser.add_argument(
+        "--scheduler", metavar="tcp://HOST:PORT", help="run on the workers of this Dask scheduler"
+    )
+    parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
+    parser.add_argument(
+        "--stop-when",
+        metavar="'AXIS METRIC WIDTH'",
+        help="stop when the paired differences of a metric between the first and each other value of an "
+        "axis are known to +- WIDTH, in its unit or in percent",
+    )
+    parser.add_argument(
+        "--compare", metavar="AXIS", help="paired differences between its values, with intervals"
+    )
+    parser.add_argument(
+        "--pareto", type=_names, metavar="M1,M2", help="the choices that none beats in all of these"
+    )
+    parser.add_argument("--plot", action="store_true", help="pictures of metrics against axes")
+    parser.add_argument(
+        "--metrics", type=_names, metavar="M1,M2", help=f"for pictures and --compare ({','.join(USUAL)})"
+    )
+    parser.add_argument("--quiet", action="store_true", help="only errors")
+    return parser
+
+
+if __name__ == "__main__":
+    run_command(main)

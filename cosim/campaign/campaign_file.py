@@ -1,0 +1,199 @@
+"""The content of a campaign file, and its checks that need no FMU."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PositiveInt, ValidationError, field_validator, model_validator
+
+from ..errors import InputError, nearest
+from ..results.performance import METRICS
+from ..scenario.load import load_scenario
+from ..scenario.schema import Scenario
+from ..scenario.setting import place_of
+from ..scenario.strict import Strict
+
+# Columns of the table that are no axes.
+OUTCOME = ("status", "message", "wall_s", "hash")
+TAKEN = (*(metric.name for metric in METRICS), *OUTCOME)
+DISTRIBUTIONS = ("uniform", "normal", "log_uniform")
+# Runs of a campaign; chosen: a grid with a slip in it is larger, and would fill the memory first.
+MOST_RUNS = 1_000_000
+
+Pair = tuple[float, float]
+
+
+class Axis(Strict):
+    """One quantity that differs from run to run: where it is set, and which values it takes."""
+
+    set: str | Annotated[list[str], Field(min_length=1)] = Field(
+        description="path of a value in the scenario, or several that get the same value"
+    )
+    values: Annotated[list[Any], Field(min_length=1)] | None = Field(
+        None, description="one after the other"
+    )
+    labels: list[str] | None = Field(None, description="what the table shows in place of the values")
+    uniform: Pair | None = Field(None, description="lowest and highest")
+    normal: Pair | None = Field(None, description="mean and standard deviation")
+    log_uniform: Pair | None = Field(None, description="lowest and highest; its logarithm is uniform")
+    cross: bool = Field(
+        False, description="under latin and sobol: every sample runs with each of the values"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "Axis":
+        kinds = ("values", *DISTRIBUTIONS)
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of {', '.join(kinds)}")
+        for kind in ("uniform", "log_uniform"):
+            pair = getattr(self, kind)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{kind} [{pair[0]:g}, {pair[1]:g}]: the lowest comes first")
+        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
+            raise ValueError(f"log_uniform [{self.log_uniform[0]:g}, ...]: has to be above zero")
+        if self.normal is not None and self.normal[1] <= 0.0:
+            raise ValueError(f"normal: a standard deviation of {self.normal[1]:g} has to be above zero")
+        if self.labels is not None and len(self.labels) != len(self.values or ()):
+            raise ValueError("labels needs one for each of the values")
+        if self.labels is not None and len(set(self.labels)) != len(self.labels):
+            raise ValueError("labels: two are the same")
+        if self.cross and self.values is None:
+            raise ValueError("cross needs values")
+        return self
+
+    @property
+    def distribution(self) -> str:
+        """The name of the distribution from which it is drawn; empty where it has values."""
+        return next((kind for kind in DISTRIBUTIONS if getattr(self, kind) is not None), "")
+
+    @property
+    def paths(self) -> list[str]:
+        """Where it is set."""
+        return [self.set] if isinstance(self.set, str) else self.set
+
+
+class Latin(Strict):
+    """A Latin hypercube sample: each axis is divided in as many strata as there are samples."""
+
+    latin: PositiveInt = Field(le=MOST_RUNS, description="number of samples")
+
+
+class Sobol(Strict):
+    """A scrambled Sobol sequence."""
+
+    sobol: PositiveInt = Field(le=MOST_RUNS, description="number of samples, best a power of two")
+
+
+class Campaign(Strict):
+    """Many runs: a scenario, what differs between them, and how the values are combined."""
+
+    scenario: str = Field(min_length=1, description="path, relative to the campaign file")
+    axes: dict[str, Axis] = Field(min_length=1, description="by the name of their column in the table")
+    design: Literal["grid", "list"] | Latin | Sobol = Field(
+        "grid", description="all combinations, the k-th value of each axis together, or a sample"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="of samples and of their order")
+
+    @field_validator("axes")
+    @classmethod
+    def _free_names(cls, axes: dict[str, Axis]) -> dict[str, Axis]:
+        for name in axes:
+            if name in TAKEN or not name.strip() or not name.isprintable():
+                raise ValueError(f"'{name}' cannot be an axis: the table has a column of that name")
+        return axes
+
+    @model_validator(mode="after")
+    def _check_design(self) -> "Campaign":
+        sampled = not isinstance(self.design, str)
+        for name, axis in self.axes.items():
+            if axis.distribution and not sampled:
+                raise ValueError(
+                    f"axes.{name}: {axis.distribution} cannot be in a {self.design}; "
+                    'give it values, or "design": {"latin": 100}'
+                )
+            if axis.cross and not sampled:
+                raise ValueError(
+                    f"axes.{name}: cross is for latin and sobol; a grid has all combinations"
+                )
+        lengths = {name: len(axis.values or ()) for name, axis in self.axes.items()}
+        if self.design == "list" and len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name} has {count}" for name, count in lengths.items())
+            raise ValueError(f"a list needs as many values in each axis: {told}")
+        if sampled and all(axis.cross for axis in self.axes.values()):
+            raise ValueError("all axes are crossed, so that none is left to sample")
+        return self
+
+
+class LoadedCampaign:
+    """A campaign with the scenario that its runs vary.
+
+    Args:
+        source: path of the file, or the same content as a dict, as if it lay in the working directory.
+
+    Attributes:
+        campaign: what the file says.
+        base: the scenario.
+        folder: to which paths in the campaign are relative.
+
+    Raises:
+        InputError: no such file, an unknown key, a value that cannot be, or a path that the scenario
+            does not have.
+    """
+
+    def __init__(self, source: str | Path | dict[str, Any]) -> None:
+        self.folder = Path.cwd() if isinstance(source, dict) else Path(source).resolve().parent
+        shown = "campaign" if isinstance(source, dict) else f"'{source}'"
+        content = source if isinstance(source, dict) else _read(Path(source))
+        try:
+            self.campaign = Campaign.model_validate_json(json.dumps(content), strict=True)
+        except ValidationError as error:
+            raise InputError(_message(error, shown)) from None
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"{shown} cannot be written as JSON: {error}") from None
+        self.base: Scenario = load_scenario(self.folder / self.campaign.scenario)
+        dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
+        taken: dict[tuple[str, ...], str] = {}
+        for name, axis in self.campaign.axes.items():
+            for path in axis.paths:
+                try:
+                    place = place_of(dumped, path)
+                except InputError as error:
+                    raise InputError(f"{shown}: axes.{name}.set: {error}") from None
+                if place in taken:
+                    raise InputError(f"{shown}: axes {taken[place]} and {name} set the same, {path}")
+                taken[place] = name
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
+        raise InputError(f"no such campaign: '{path}'{nearest(path.name, near)}") from None
+    except json.JSONDecodeError as error:
+        raise InputError(f"'{path}' is not JSON: {error}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"'{path}' cannot be read: {error}") from None
+
+
+def _message(error: ValidationError, name: str) -> str:
+    """The first error in one line."""
+    first = error.errors()[0]
+    place = ".".join(
+        str(part) for part in first["loc"] if not str(part).startswith(("literal", "list["))
+    )
+    text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        fields = (Axis if first["loc"][0] == "axes" else Campaign).model_fields
+        text = f"unknown key{nearest(str(first['loc'][-1]), fields)}"
+    elif first["type"] == "missing":
+        text = "is missing"
+    elif first["loc"][:1] == ("design",):
+        place, text = "design", 'is "grid", "list", {"latin": N} or {"sobol": N}'
+    return f"{name}: {f'{place}: ' if place else ''}{text}"
+
+
+def campaign_schema() -> dict[str, Any]:
+    """The JSON Schema of a campaign file."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}

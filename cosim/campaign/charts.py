@@ -1,0 +1,140 @@
+"""Pictures of a campaign: metrics against axes, heat maps, box plots over seeds, paired differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..errors import InputError
+from ..files import atomic_write
+from ..results.performance import METRICS
+from .comparison import differences
+
+if TYPE_CHECKING:
+    import pandas
+
+UNITS = {metric.name: metric.unit for metric in METRICS}
+# Pairs of axes of which heat maps are drawn; chosen: three axes give three.
+MOST_MAPS = 3
+# Resolution [dots per inch] and size of one panel [inch]; taste.
+DPI, PANEL = 110, (4.2, 3.2)
+
+
+def draw_campaign(
+    made: pandas.DataFrame,
+    axes: Sequence[str],
+    over: Sequence[str],
+    metrics: Sequence[str],
+    folder: Path,
+    compared: str | None = None,
+) -> list[Path]:
+    """Draw what the table holds.
+
+    Args:
+        made: the table of the campaign.
+        axes: all axes.
+        over: those over which a box plot spreads, as seeds.
+        metrics: columns.
+        folder: for the pictures.
+        compared: axis whose paired differences are drawn.
+
+    Returns:
+        Paths of the pictures.
+
+    Raises:
+        InputError: a metric that the table lacks, or nothing to compare.
+    """
+    for metric in metrics:
+        if metric not in made.columns:
+            raise InputError(f"no metric '{metric}' in the table")
+    done = made.query("status == 'done'")
+    choices = [name for name in axes if name not in over and len(set(done[name])) > 1]
+    figures: dict[str, Figure] = {}
+    if choices:
+        figures["metrics"] = _against_axes(done, choices, metrics)
+    numbers = [name for name in choices if _is_number(done, name)]
+    for a, b in list(combinations(numbers, 2))[:MOST_MAPS]:
+        figures[f"map_{a}_{b}"] = _maps(done, a, b, metrics)
+    if compared is not None:
+        figures[f"differences_{compared}"] = _differences(
+            differences(made, axes, compared, metrics), compared, metrics
+        )
+    paths: list[Path] = []
+    for name, figure in figures.items():
+        stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+        path = folder / f"{stem}.png"
+        with atomic_write(path) as scratch:
+            figure.savefig(scratch, dpi=DPI, format="png")
+        paths.append(path)
+    return paths
+
+
+def _is_number(made: pandas.DataFrame, name: str) -> bool:
+    return made[name].dtype.kind in "if"
+
+
+def _panels(rows: int, columns: int) -> tuple[Figure, np.ndarray]:
+    figure = Figure(figsize=(PANEL[0] * columns, PANEL[1] * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def _named(axes: Axes, x: str, metric: str) -> None:
+    axes.set(xlabel=x, ylabel=f"{metric} [{UNITS.get(metric, '')}]")
+    axes.grid(alpha=0.3)
+
+
+def _against_axes(done: pandas.DataFrame, choices: Sequence[str], metrics: Sequence[str]) -> Figure:
+    """A row for each metric, a column for each axis: points over numbers, boxes over categories."""
+    figure, panels = _panels(len(metrics), len(choices))
+    for k, metric in enumerate(metrics):
+        for j, name in enumerate(choices):
+            panel: Axes = panels[k, j]
+            if _is_number(done, name):
+                panel.plot(done[name], done[metric], ".", alpha=0.5)
+                if done[name].nunique() <= len(done) // 2:  # several runs at each value
+                    median = done.groupby(name)[metric].median()
+                    panel.plot(median.index, median, "-", label="median")
+                    panel.legend(fontsize=7)
+            else:
+                groups = {
+                    str(value): part[metric].dropna() for value, part in done.groupby(name, sort=False)
+                }
+                panel.boxplot(list(groups.values()))
+                panel.set_xticks(range(1, 1 + len(groups)), list(groups), fontsize=7, rotation=20)
+            _named(panel, name, metric)
+    return figure
+
+
+def _maps(done: pandas.DataFrame, a: str, b: str, metrics: Sequence[str]) -> Figure:
+    """Each metric over two axes of numbers: a map of medians where they form a grid, else points."""
+    figure, panels = _panels(1, len(metrics))
+    for panel, metric in zip(panels[0], metrics, strict=True):
+        grid = done.pivot_table(index=b, columns=a, values=metric, aggfunc="median")
+        if grid.notna().to_numpy().all():
+            shown = panel.pcolormesh(grid.columns, grid.index, grid.to_numpy(), shading="nearest")
+        else:
+            shown = panel.scatter(done[a], done[b], c=done[metric])
+        panel.set(xlabel=a, ylabel=b, title=f"{metric} [{UNITS.get(metric, '')}]")
+        figure.colorbar(shown, ax=panel)
+    return figure
+
+
+def _differences(found: pandas.DataFrame, axis: str, metrics: Sequence[str]) -> Figure:
+    """Mean paired differences with their intervals, a panel for each metric."""
+    figure, panels = _panels(1, len(metrics))
+    for panel, metric in zip(panels[0], metrics, strict=True):
+        part = found.query("metric == @metric")
+        places = np.arange(len(part))
+        panel.errorbar(part["difference"], places, xerr=part["half"], fmt="o", capsize=3)
+        panel.axvline(0.0, color="k", lw=0.8)
+        panel.set_yticks(places, list(part["value"]), fontsize=7)
+        panel.set(title=f"{axis}: less {part['against'].iloc[0]}", ylim=(-0.5, len(part) - 0.5))
+        panel.set_xlabel(f"difference of {metric} [{UNITS.get(metric, '')}]")
+        panel.grid(alpha=0.3)
+    return figure

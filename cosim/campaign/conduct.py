@@ -1,0 +1,226 @@
+"""A campaign from its file to its table."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from filelock import FileLock, Timeout
+
+from ..errors import InputError
+from ..files import write_json
+from ..process.scratch import sweep
+from .campaign_file import LoadedCampaign
+from .case_scenarios import CaseScenarios, Job
+from .comparison import StopRule
+from .design import Case, cases
+from .run_table import Journal, keep_log, table, write_table
+from .single_run import Place, Row, ThisProcess
+from .travelling_files import Files
+
+if TYPE_CHECKING:
+    import pandas
+
+NEEDED = ("pandas", "pyarrow", "scipy", "distributed")
+SUMMARY = "campaign.json"
+LOCK = ".campaign.lock"
+# Receives the number of runs that have ended, failed ones among them, and of all runs.
+Progress = Callable[[int, int, int], None]
+
+
+def run_campaign(
+    campaign: str | Path | dict[str, Any],
+    out: str | Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    keep_logs: bool = False,
+    stop_when: str | None = None,
+    show: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda ended, failed, of: None,
+) -> pandas.DataFrame:
+    """Run a scenario many times, and give one row for each run.
+
+    Runs that have finished in the same folder before are not run again. A program that calls this with
+    workers needs ``if __name__ == "__main__":`` around it, as each worker imports the program.
+
+    Args:
+        campaign: path of a campaign file, or its content.
+        out: result folder; default ``results/<name of the file>`` in the working directory.
+        workers: processes on this computer; None is one for each core, 0 runs in this process.
+        scheduler: address of a Dask scheduler whose workers run, in place of processes here.
+        keep_logs: whether to keep the log of each run, in ``logs/<first 16 digits of its hash>``.
+        stop_when: end as soon as a difference is known: ``"axis metric width"``, see
+            :class:`cosim.campaign.comparison.StopRule`.
+        show: receives notes, a line each.
+        progress: receives how many runs have ended, how many of them failed, and how many there are.
+
+    Returns:
+        The table: axes, metrics, ``status``, ``message``, ``wall_s`` [s], ``hash``. It is in
+        ``runs.parquet`` of the folder, too, and what ran in ``campaign.json``.
+
+    Raises:
+        InputError: the campaign cannot be run; nothing has run.
+        SimulationError: the workers were lost; what has finished is kept.
+        KeyboardInterrupt: what has finished is kept.
+    """
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise InputError(f"a campaign needs {', '.join(missing)}: pip install 'cybership[campaign]'")
+    loaded = LoadedCampaign(campaign)
+    folder = Path(os.path.abspath(result_folder(campaign, out)))
+    if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
+        raise InputError(f"'{campaign}' would be overwritten by the results; give another --out")
+    sweep()
+    files = Files()
+    try:
+        scenarios = CaseScenarios(loaded, files)
+        every = cases(loaded.campaign)
+        rule = None if stop_when is None else StopRule(stop_when, every, loaded.campaign.seed)
+        for note in scenarios.check(every):
+            show(f"note: {note}")
+        with _only_one(folder), closing(Journal(folder)) as journal:
+            work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder, keep_logs)
+            told = {
+                "campaign": loaded.campaign.model_dump(mode="json", exclude_unset=True),
+                "scenario": loaded.base.model_dump(mode="json", by_alias=True, exclude_unset=True),
+                "fmus": files.origins,
+                "place": scheduler or ("this process" if workers == 0 else "processes on this computer"),
+                "versions": _versions(),
+            }
+            return work.run(partial(_place, files, keep_logs, scheduler, workers), told, progress)
+    finally:
+        files.close()
+
+
+def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None) -> Path:
+    """Where the results go if ``out`` does not say: ``results/<name of the file>``."""
+    name = "campaign" if isinstance(campaign, dict) else Path(campaign).stem.removesuffix(".campaign")
+    return Path(out) if out is not None else Path("results") / name
+
+
+def _place(files: Files, keep_logs: bool, scheduler: str | None, workers: int | None) -> Place:
+    if workers == 0 and scheduler is None:
+        return ThisProcess(files, keep_logs)
+    from .dispatch import DaskWorkers  # Dask takes a second to import
+
+    return DaskWorkers(files, keep_logs, scheduler, workers)
+
+
+@dataclass
+class _Work:
+    """The runs of one campaign that has been checked.
+
+    Attributes:
+        cases: in the order in which they are made.
+        known: those that were asked for so far, with their hashes.
+    """
+
+    scenarios: CaseScenarios
+    journal: Journal
+    cases: Sequence[Case]
+    rule: StopRule | None
+    folder: Path
+    keep_logs: bool
+    known: dict[int, tuple[Case, str]] = field(default_factory=dict)
+
+    def run(
+        self, place: Callable[[], Place], told: dict[str, Any], progress: Progress
+    ) -> pandas.DataFrame:
+        """Make the runs that are missing, and write the table however that ends."""
+        started, status = time.time(), "failed"
+        jobs = self._missing()
+        first = next(jobs, None)
+        progress(*self._counts())
+        try:
+            if first is not None:
+                with closing(place()) as there, closing(there.rows(chain([first], jobs))) as rows:
+                    for job, row in rows:
+                        if row.log:
+                            keep_log(self.folder, job.hash, row.log)
+                        self.journal.add(job.hash, row)
+                        progress(*self._counts())
+                        if self._settled():
+                            break
+            status = "done"
+        except KeyboardInterrupt:
+            status = "interrupted"
+            raise
+        except OSError as error:
+            raise InputError(f"cannot write to '{self.folder}': {error.strerror or error}") from None
+        finally:
+            made = table(self._counted(), self.journal.rows)
+            write_table(self.folder, made)
+            told |= {
+                "status": status,
+                "runs": len(self.cases),
+                "done": int((made["status"] == "done").sum()),
+                "failed": int((made["status"] == "failed").sum()),
+                "stopped": self.rule.verdict(self._row) if self.rule else None,
+                "wall_s": time.time() - started,
+            }
+            write_json(self.folder / SUMMARY, told)
+        return made
+
+    def _missing(self) -> Iterator[Job]:
+        """The runs that have not finished yet, each once."""
+        asked: set[str] = set()
+        for case in self.cases:
+            if self._settled():
+                return
+            job = self.scenarios.job(case)
+            self.known[case.number] = case, job.hash
+            if job.hash not in self.journal.rows and job.hash not in asked:
+                asked.add(job.hash)
+                yield job
+
+    def _row(self, number: int) -> Row | None:
+        known = self.known.get(number)
+        return None if known is None else self.journal.rows.get(known[1])
+
+    def _settled(self) -> bool:
+        return self.rule is not None and self.rule.satisfied(self._row)
+
+    def _counted(self) -> list[tuple[Case, str]]:
+        """The runs of the table: all, or those up to where the difference was known."""
+        numbers = self.rule.counted(self._row) if self.rule else None
+        return [pair for n, pair in self.known.items() if numbers is None or n in numbers]
+
+    def _counts(self) -> tuple[int, int, int]:
+        """How many runs have ended, how many of them failed, and how many there are."""
+        ended = [row for number in self.known if (row := self._row(number)) is not None]
+        return len(ended), sum(row.status != "done" for row in ended), len(self.cases)
+
+
+class _only_one:  # noqa: N801 - used as a function
+    """A folder in which no other campaign runs."""
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = FileLock(folder / LOCK, timeout=0)
+            self._lock.acquire()
+        except Timeout:
+            raise InputError(f"another campaign runs in '{folder}'") from None
+        except OSError as error:
+            raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+
+    def __enter__(self) -> None:
+        """Held since it was made."""
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+def _versions() -> dict[str, str]:
+    names = ("cybership", "fmpy", "numpy", "scipy", "pandas", "distributed")
+    return {"python": platform.python_version()} | {n: importlib.metadata.version(n) for n in names}

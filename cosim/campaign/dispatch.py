@@ -1,0 +1,257 @@
+"""The runs of a campaign on the workers of a Dask scheduler, on this computer or elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import os
+import statistics
+import threading
+import time
+from collections import deque
+from collections.abc import Generator, Iterable
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+from distributed import (
+    Client,
+    Future,
+    KilledWorker,
+    LocalCluster,
+    Worker,
+    WorkerPlugin,
+    as_completed,
+    get_worker,
+)
+
+from ..errors import InputError, SimulationError
+from ..interrupts import UninterruptedProcesses
+from .case_scenarios import Job
+from .single_run import Row, Workplace
+from .travelling_files import Files, put
+
+# Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
+# percent of it; chosen: little is lost with a worker.
+TASK_TIME = 1.0
+# Runs in one task; chosen: the request stays small.
+MOST_IN_TASK = 64
+# Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
+AHEAD = 2
+# Wall time that a worker waits for a file [s], of which it gets all when it starts; between two looks.
+PATIENCE, LOOK = 60.0, 0.05
+# Wall time until a scheduler has to answer [s]; chosen.
+ANSWER = 10.0
+# How often the workers of a task may die here before it is suspected; chosen: once by chance.
+DEATHS = 1
+FOLDER = "cybership"  # below a worker's own folder
+
+
+class Request(NamedTuple):
+    """What a task of Dask gets.
+
+    Attributes:
+        contents: scenarios with files named by their contents.
+        files: those names.
+        resettable: SHA-256 of the FMUs that may be reset.
+        keep_log: whether the logs come back.
+        version: of the package, without which equal numbers are not certain.
+    """
+
+    contents: list[dict[str, Any]]
+    files: tuple[str, ...]
+    resettable: frozenset[str]
+    keep_log: bool
+    version: str
+
+
+class OneFile(WorkerPlugin):
+    """A file on every worker, also on those that start later.
+
+    Args:
+        file: its name by content.
+        content: of the file.
+    """
+
+    def __init__(self, file: str, content: bytes) -> None:
+        self.name = f"cybership-{file}"
+        self._file, self._content = file, content
+
+    def setup(self, worker: Worker) -> None:
+        put(_folder(worker), self._file, self._content)
+
+
+def _folder(worker: Worker) -> Path:
+    return Path(worker.local_directory) / FOLDER
+
+
+# The workplace of this process, if it is that of a worker.
+_workplaces: dict[Path, Workplace] = {}
+_making = threading.Lock()
+
+
+def _run(request: Request) -> list[Row]:
+    """A task on a worker."""
+    if request.version != _version():
+        raise InputError(f"a worker has cybership {_version()}, and here it is {request.version}")
+    folder = _folder(get_worker())
+    with _making:
+        work = _workplaces.setdefault(folder, Workplace(folder))
+    work.pool.resettable |= request.resettable
+    until = time.monotonic() + PATIENCE
+    while missing := [name for name in request.files if not (folder / name).is_file()]:
+        if time.monotonic() > until:
+            raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
+        time.sleep(LOOK)
+    return [work.run(content, request.keep_log) for content in request.contents]
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("cybership")
+
+
+def _rows_of(future: Future) -> list[Row] | None:
+    """What a task has made; None if its workers died.
+
+    Raises:
+        InputError: it cannot be run.
+        SimulationError: what ran it is gone.
+    """
+    try:
+        return future.result()
+    except KilledWorker:
+        return None
+    except InputError:
+        raise
+    except Exception as error:
+        raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+
+
+class DaskWorkers:
+    """Runs on the workers of a Dask scheduler.
+
+    Args:
+        files: what the runs need; each is sent once to each worker.
+        keep_log: whether the logs come back.
+        address: of a scheduler; None starts one with workers on this computer.
+        workers: how many, without an address; None is one for each core.
+
+    Raises:
+        InputError: no scheduler answers at the address.
+    """
+
+    def __init__(self, files: Files, keep_log: bool, address: str | None, workers: int | None) -> None:
+        self._files, self._keep_log, self._address = files, keep_log, address
+        self._cluster: LocalCluster | None = None
+        self._scratch = TemporaryDirectory(prefix="campaign_")
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        try:
+            if address is None:
+                # A Ctrl-C is for this process alone; the workers end with it.
+                with UninterruptedProcesses():
+                    self._cluster = LocalCluster(
+                        n_workers=workers or os.cpu_count() or 1,
+                        threads_per_worker=1,  # FMUs of one process cannot run side by side
+                        processes=True,
+                        host="127.0.0.1",
+                        dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                        memory_limit=0,  # what FMUs allocate is not Dask's to manage
+                        local_directory=self._scratch.name,
+                        silence_logs=logging.CRITICAL,
+                        scheduler_kwargs={"allowed_failures": DEATHS},
+                    )
+                    self._client = Client(self._cluster, set_as_default=False)
+            else:
+                self._client = Client(address, timeout=ANSWER, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            self._scratch.cleanup()
+            where = "with processes on this computer" if address is None else f"at '{address}'"
+            raise InputError(f"no Dask scheduler answers {where}: {error}") from None
+        except BaseException:
+            self._close_cluster()
+            raise
+        self._walls: deque[float] = deque(maxlen=20)
+
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+        waiting = iter(jobs)
+        # Dask counts a worker's death against every task that it had. Those that it gives up go again at
+        # the end, each alone, to find the one that ends its process.
+        suspects: deque[Job] = deque()
+        running: dict[Any, tuple[Future, list[Job], bool]] = {}
+        ended = as_completed(loop=self._client.loop)
+
+        def start(batch: list[Job], alone: bool) -> None:
+            future = self._submit(batch)
+            running[future.key] = future, batch, alone
+            ended.add(future)
+
+        def fill() -> None:
+            while len(running) < AHEAD * max(1, self._threads()):
+                if not (batch := list(islice(waiting, self._in_task()))):
+                    break
+                start(batch, False)
+            if suspects and not running:
+                start([suspects.popleft()], True)
+
+        try:
+            fill()
+            while running:
+                future = next(ended)
+                _, batch, alone = running.pop(future.key)
+                found = _rows_of(future)
+                if found is None and not alone:
+                    suspects.extend(batch)
+                    found = []
+                elif found is None:
+                    found = [Row("lost", "it ended every process that ran it", 0.0, {}, {})]
+                self._walls.extend(row.wall_s for row in found)
+                yield from zip(batch, found, strict=False)
+                fill()
+        finally:
+            self._client.cancel([future for future, *_ in running.values()])
+
+    def _threads(self) -> int:
+        """Threads of all workers."""
+        threads: Any = self._client.nthreads()
+        return sum(threads.values())
+
+    def _in_task(self) -> int:
+        """How many runs make a task of about ``TASK_TIME``."""
+        if not self._walls:
+            return 1
+        return max(1, min(MOST_IN_TASK, int(TASK_TIME / max(statistics.median(self._walls), 1e-3))))
+
+    def _submit(self, batch: list[Job]) -> Future:
+        names = dict.fromkeys(name for job in batch for name in job.files)
+        for name in names:
+            self._send(name)
+        request = Request(
+            [job.content for job in batch],
+            tuple(names),
+            frozenset(self._files.resettable),
+            self._keep_log,
+            _version(),
+        )
+        return self._client.submit(_run, request, pure=False)
+
+    def _send(self, name: str) -> None:
+        """Have a file on all workers, unless the scheduler has sent it before."""
+        if self._client.get_metadata(["cybership", name], False):
+            return
+        file = OneFile(name, self._files.paths[name].read_bytes())
+        # A worker that dies meanwhile is no reason to end: the scheduler keeps what later ones get.
+        with suppress(OSError):
+            self._client.register_plugin(file)
+        self._client.set_metadata(["cybership", name], True)
+
+    def close(self) -> None:
+        self._client.close()
+        self._close_cluster()
+
+    def _close_cluster(self) -> None:
+        if self._cluster is not None:
+            self._cluster.close()
+        self._scratch.cleanup()

@@ -1,0 +1,138 @@
+"""The table of a campaign: a journal that loses nothing, and the Parquet file made of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..files import atomic_write, write_all
+from ..results.performance import METRICS
+from .design import Case
+from .single_run import Row
+
+if TYPE_CHECKING:
+    import pandas
+
+JOURNAL = "runs.jsonl"
+TABLE = "runs.parquet"
+LOGS = "logs"
+# Digits of a hash that name the folder of a log; chosen: no two of a million runs share them.
+DIGITS = 16
+
+
+class Journal:
+    """All runs that were ever finished in a folder, one line each, written as each ends.
+
+    A process that is killed leaves at worst the beginning of a line, which counts for nothing.
+
+    Args:
+        folder: of the campaign.
+
+    Attributes:
+        rows: hash -> what is kept of the run.
+
+    Raises:
+        InputError: it cannot be read or written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.rows: dict[str, Row] = {}
+        path = folder / JOURNAL
+        try:
+            old = path.read_bytes() if path.exists() else b""
+            for line in old.splitlines():
+                self._remember(line)
+            self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - closed by close()
+            if old and not old.endswith(b"\n"):
+                write_all(self._file, b"\n")
+        except OSError as error:
+            raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+
+    def _remember(self, line: bytes) -> None:
+        try:
+            told = json.loads(line)
+            row = Row(told["status"], told["message"], told["wall_s"], told["metrics"], {})
+            self.rows[told["hash"]] = row
+        except (ValueError, KeyError, TypeError):
+            return
+
+    def add(self, hash_: str, row: Row) -> None:
+        """A run has ended; one that was lost, which may go well another time, is not written down.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        self.rows[hash_] = row._replace(log={})
+        if row.status != "lost":
+            told = {"hash": hash_, **row._asdict()}
+            del told["log"]
+            write_all(self._file, (json.dumps(told) + "\n").encode())
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def keep_log(folder: Path, hash_: str, log: Mapping[str, bytes]) -> None:
+    """Write the files of a run's log.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    place = log_folder(folder, hash_)
+    place.mkdir(parents=True, exist_ok=True)
+    for name, content in log.items():
+        with atomic_write(place / name) as scratch:
+            scratch.write_bytes(content)
+
+
+def log_folder(folder: Path, hash_: str) -> Path:
+    """Where the log of a run is kept."""
+    return folder / LOGS / hash_[:DIGITS]
+
+
+def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, Row]) -> pandas.DataFrame:
+    """One row for each run that has ended, in the order of the design.
+
+    Args:
+        cases: runs with their hashes.
+        rows: what is kept of each, by hash.
+
+    Returns:
+        Columns: the axes, the metrics (NaN where there are none), status, message, wall_s, hash.
+    """
+    import pandas
+
+    ended = sorted(((case, h) for case, h in cases if h in rows), key=lambda pair: pair[0].number)
+    columns: dict[str, list[Any]] = {}
+    for name in ended[0][0].shown if ended else ():
+        columns[name] = _plain([case.shown[name] for case, _ in ended])
+    for metric in METRICS:
+        columns[metric.name] = [rows[h].metrics.get(metric.name, math.nan) for _, h in ended]
+    columns["status"] = ["done" if rows[h].status == "done" else "failed" for _, h in ended]
+    columns["message"] = [rows[h].message for _, h in ended]
+    columns["wall_s"] = [rows[h].wall_s for _, h in ended]
+    columns["hash"] = [h for _, h in ended]
+    return pandas.DataFrame(columns)
+
+
+def _plain(values: list[Any]) -> list[Any]:
+    """The values of an axis as one type of a table: numbers, or text."""
+    if all(isinstance(v, bool) for v in values) or all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) for v in values
+    ):
+        return values
+    return [v if isinstance(v, str) else json.dumps(v) for v in values]
+
+
+def write_table(folder: Path, made: pandas.DataFrame) -> None:
+    """Write ``runs.parquet``.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    with atomic_write(folder / TABLE) as scratch:
+        made.to_parquet(scratch, index=False)

@@ -1,0 +1,102 @@
+"""Files that travel to workers by the hash of their content: FMUs, and tables of parameters."""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path, PurePath
+
+from ..errors import InputError
+from ..files import atomic_write
+from ..fmu.fmu_model import Model
+from ..scenario.schema import Scenario
+from ..system.own_fmus import read_models
+
+
+class Files:
+    """The FMUs and tables of a campaign, whose scenarios share a folder; each is read once.
+
+    Attributes:
+        paths: name by content, ``<sha256>.fmu`` or ``<sha256>.csv``, -> the file.
+        resettable: SHA-256 of the FMUs that may be reset for another run: those that the project has
+            built itself, whose instances hold all that they know.
+        origins: SHA-256 -> how the scenario names it.
+    """
+
+    def __init__(self) -> None:
+        self.paths: dict[str, Path] = {}
+        self.resettable: set[str] = set()
+        self.origins: dict[str, str] = {}
+        self._models: dict[str, Model] = {}
+        self._tables: dict[Path, str] = {}
+
+    def read(self, scenarios: Sequence[Scenario]) -> list[str]:
+        """Read the FMUs of scenarios of one folder that have not been read yet.
+
+        Returns:
+            Oddities that are no reason to refuse.
+
+        Raises:
+            InputError: no such FMU, or one that cannot be read.
+        """
+        notes: list[str] = []
+        entries = {e.path: e for s in scenarios for e in s.fmus.values() if e.path not in self._models}
+        if not entries:
+            return notes
+        folder = scenarios[0].folder
+        found = read_models(scenarios[0].model_copy(update={"fmus": entries}), notes)
+        for path, model in found.items():
+            self._models[path] = model
+            self.paths[f"{model.sha256}.fmu"] = model.path
+            self.origins[model.sha256] = path
+            if PurePath(path).name == path and model.path.parent != folder:
+                self.resettable.add(model.sha256)
+        return notes
+
+    def models(self, scenario: Scenario) -> dict[str, Model]:
+        """The FMU of each instance; :meth:`read` has read them."""
+        return {name: self._models[entry.path] for name, entry in scenario.fmus.items()}
+
+    def fmu(self, path: str) -> str:
+        """The name by content of an FMU that :meth:`read` has read."""
+        return f"{self._models[path].sha256}.fmu"
+
+    def table(self, folder: Path, path: str) -> str:
+        """The name by content of a table.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        file = folder / path
+        if file not in self._tables:
+            try:
+                name = f"{hashlib.sha256(file.read_bytes()).hexdigest()}.csv"
+            except OSError as error:
+                raise InputError(f"'{file}' cannot be read: {error.strerror}") from None
+            self._tables[file] = name
+            self.paths[name] = file
+        return self._tables[file]
+
+    def close(self) -> None:
+        """Remove what was unpacked."""
+        for model in self._models.values():
+            model.close()
+
+
+def put(folder: Path, name: str, content: bytes) -> None:
+    """Put a file into a folder of files named by their contents, unless it is there.
+
+    Raises:
+        InputError: its content is not what its name says.
+    """
+    if (folder / name).is_file():
+        return
+    if hashlib.sha256(content).hexdigest() != PurePath(name).stem:
+        raise InputError(f"'{name}' was changed on its way, or while the campaign ran")
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_write(folder / name) as scratch:
+        scratch.write_bytes(content)
+
+
+def copy_all(folder: Path, paths: Iterable[tuple[str, Path]]) -> None:
+    """Put files of this computer into such a folder."""
+    for name, path in paths:
+        put(folder, name, path.read_bytes())

@@ -1,0 +1,97 @@
+"""Units that a run cannot be in, whatever the ship."""
+
+import json
+
+import numpy as np
+
+from cosim import InputError
+
+from .columns import UNITS
+
+GO_ON = "--anyway goes on all the same"
+# s between two samples of a measurement, by which a unit of time is guessed (chosen)
+USUAL = 1e-3, 1.0
+TURN = 6.3  # rad, just above a turn; a heading that stays below is in radians, and may wrap
+RAREST = 2.0  # s between two samples; a model ship's own time constants are shorter (chosen)
+OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
+LONGEST = 1e9  # s, of a run; thirty years are a mistake in a time stamp
+FARTHEST = 1e9  # m, rad; beyond is no place on earth
+# Beyond these no ship moves, so that the unit must be another one (chosen).
+FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
+
+
+def refuse_time(row: float, seconds: float, where: str) -> None:
+    """Refuse a time in another unit than said.
+
+    Args:
+        row: median time between two rows [s].
+        seconds: length of the run [s].
+        where: what messages call the run.
+
+    Raises:
+        InputError: rows are too rare or too frequent, or the run is too long.
+    """
+    if row > RAREST or row < OFTENEST:
+        much = "rare" if row > RAREST else "frequent"
+        raise InputError(
+            f"{where}: a sample each {row:.4g} s is too {much}; is the time in another unit?"
+            f"{_unit_of_time(row)}"
+        )
+    if seconds > LONGEST:
+        raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
+
+
+def _refuse_nowhere(pose: np.ndarray, where: str) -> None:
+    """Refuse a pose that is nowhere."""
+    far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
+    if far > FARTHEST:
+        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
+
+
+def refuse_units(time: np.ndarray, pose: np.ndarray, where: str, anyway: bool) -> None:
+    """Refuse units that no ship's motion can be in.
+
+    Args:
+        time: (n,) [s].
+        pose: (n, 3), as it was read.
+        where: what messages call the run.
+        anyway: whether every speed is believed.
+
+    Raises:
+        InputError: it goes or turns too fast, or is nowhere.
+    """
+    _refuse_nowhere(pose, where)
+    if anyway:
+        return
+    second = np.searchsorted(time, time + 1.0)
+    second = second[second < time.size]
+    dt = time[second] - time[: second.size]
+    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
+    speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
+    if speed > FASTEST:
+        raise InputError(
+            f"{where} goes {speed:.3g} m/s: is its position in mm? {_say('x', 'mm')}; {GO_ON}"
+        )
+    psi = pose[:, 2]
+    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
+        return
+    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
+    turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
+    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
+        raise InputError(
+            f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg? "
+            f"{_say('psi', 'deg')}; {GO_ON}"
+        )
+
+
+def _say(signal: str, unit: str) -> str:
+    """The line that tells a unit."""
+    columns = {s: {"name": s, "unit": unit} for s in (("x", "y") if signal == "x" else (signal,))}
+    return f"Then put {json.dumps({'columns': columns})} into the .json file beside it"
+
+
+def _unit_of_time(row: float) -> str:
+    """A sentence with the unit in which a row each so many seconds is one of a usual measurement."""
+    units = ((unit, row * size) for unit, size in UNITS["time"].items() if unit != "s")
+    likely = [unit for unit, period in units if USUAL[0] <= period < USUAL[1]]
+    return f" {_say('time', likely[0])}" if likely else ""

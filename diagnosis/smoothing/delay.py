@@ -1,0 +1,169 @@
+"""How late commands act, as far as a measured pose shows it, and whether that is sure.
+
+The likeliest delay is that of the largest likelihood. Alone it proves nothing: the response of
+:mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
+makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
+damping would make of commands that act at once: motions by the commands behind lags of LAGS seconds. A
+slow command cannot tell those from a delay, a jump can.
+
+The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
+Student's test over the blocks, which needs no assumption on how residuals are correlated within one.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError
+from scipy.stats import t as student
+
+from .command_motion import Commands
+from .penalised import Fit, Problem
+from .spline import POINTS
+
+COARSE = 0.2  # s, between the delays that are tried first
+LONGEST = 1.0  # s, of these; a ship of this size has 0.4 s (docs/studies/measured_ship)
+FINE = 0.01  # s, to which a delay is found, or a sampling period if that is longer
+NOTICED = 0.1  # s; a shorter delay is as good as none, and not reported (chosen)
+RANK = 1e-9  # of the largest singular value; below, commands do not differ and share their effect evenly
+# s, lags of motions that are no delay's. Chosen: a ship's own time constants, by factors of four; no
+# shorter one, as a thruster's lag of half a second is a delay for what follows.
+LAGS = (1.0, 4.0, 16.0)
+LATENESS_BLOCK = (
+    5.0  # s; chosen: residuals of a spline are correlated over less than its time constant, a second
+)
+CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
+
+
+class Regression:
+    """Generalised least squares of a run's pose on its commands, beside a spline.
+
+    Args:
+        problem: the pose.
+        fit: a smoothing spline of it.
+        commands: commands and headings.
+    """
+
+    def __init__(self, problem: Problem, fit: Fit, commands: Commands) -> None:
+        self.problem, self.fit, self.commands = problem, fit, commands
+        pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
+        self.pose = np.vstack(pose[:2]), pose[2]
+
+    def gains(self, delay: float) -> np.ndarray:
+        """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
+        motions = self.motions(self.commands.delayed(delay))
+        flat, turn = (
+            least_squares(a, z[:, 0], size_of(a)) for a, z in zip(motions, self.pose, strict=True)
+        )
+        return np.vstack([flat.reshape(2, 3), turn])
+
+    def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
+        commands, rows = self.commands, self.problem.rows
+        ahead = commands.sampled(commands.motion(commands.rotation[:, None] * tau)[0], rows)
+        yaw = commands.sampled(commands.motion(tau)[0], rows)
+        # A force to starboard moves the ship as one ahead does, a right angle further.
+        north, east = np.real(ahead), np.imag(ahead)
+        plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}
+        found = np.vstack([self._residual(c, x) for c, x in plane.items()]), self._residual(2, yaw)
+        if not all(np.isfinite(part).all() for part in found):  # LAPACK may not end
+            raise LinAlgError("the response to its commands is not finite")
+        return found
+
+    def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
+        """r(x) of signals (n, k) in a channel, in units of the noise."""
+        system = self.fit.systems[channel]
+        return np.vstack(system.residual(x, system.solve(x))) / self.problem.sigma[channel]
+
+    @property
+    def block(self) -> np.ndarray:
+        """Number of the block of LATENESS_BLOCK seconds of each row of r(x)."""
+        grid, run = self.problem.grid, self.commands.track.run
+        stretches = zip(grid.start, grid.intervals, strict=True)
+        middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
+        time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
+        return np.unique(np.floor(np.concatenate(time) / LATENESS_BLOCK), return_inverse=True)[1]
+
+
+def size_of(a: np.ndarray) -> np.ndarray:
+    """Norms (k,) of columns, none of them zero."""
+    return np.sqrt(np.maximum((a * a).sum(axis=0), 1e-300))
+
+
+def least_squares(a: np.ndarray, z: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """x of least |z - a x|, for columns of which a part below RANK of their size counts as zero."""
+    scaled = a / size
+    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=RANK)[0] / size
+
+
+class Lateness:
+    """The likelihood of delays, beside motions that follow the commands without one.
+
+    Args:
+        regression: of the run.
+    """
+
+    def __init__(self, regression: Regression) -> None:
+        self._regression, self._block = regression, regression.block
+        tau = regression.commands.delayed(0.0)
+        lagged = [regression.motions(regression.commands.lagging(tau, lag)) for lag in LAGS]
+        self._aside = [orthonormal(np.hstack(part)) for part in zip(*lagged, strict=True)]
+        self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
+
+    def left(self, delay: float) -> np.ndarray:
+        """(blocks,), what a delay [s] leaves of -2 log L in each block."""
+        tau = self._regression.commands.delayed(delay)
+        total = np.zeros(self._block.max() + 1)
+        for q, z, a in zip(self._aside, self._pose, self._regression.motions(tau), strict=True):
+            own = a - q @ (q.T @ a)
+            off = z[:, 0] - own @ least_squares(own, z[:, 0], size_of(a))
+            total += np.bincount(np.tile(self._block, off.size // self._block.size), off**2)
+        return total
+
+
+def orthonormal(a: np.ndarray) -> np.ndarray:
+    """An orthonormal basis of the columns, without directions below RANK."""
+    scaled = a / size_of(a)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    kept = values > RANK * values[-1]
+    return scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def likeliest_delay(regression: Regression) -> tuple[float, bool]:
+    """From a command to its effect [s], and whether the blocks of the run agree that there is a delay.
+
+    The search is over whole sampling periods: coarse at first, then downhill with halved steps. A delay
+    that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
+    logarithm of their number) is zero.
+    """
+    period, lateness = regression.commands.track.period, Lateness(regression)
+
+    @cache
+    def blocks(periods: int) -> Any:
+        return lateness.left(periods * period)
+
+    def left(periods: int) -> float:
+        return float(blocks(periods).sum())
+
+    tried = {round(k * COARSE / period) for k in range(round(LONGEST / COARSE) + 1)}
+    best = min(sorted(tried), key=left)
+    step, finest = COARSE / period, max(1, round(FINE / period))
+    while step > finest:
+        step = max(finest, np.ceil(step / 2.0))
+        near = {max(best - int(step), 0), best + int(step)}
+        tried |= near
+        best = min((best, *sorted(near)), key=left)
+    if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
+        return 0.0, False
+    prompt = min((k for k in tried if k * period < NOTICED), key=left)
+    sure = best != prompt and surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried))
+    return best * period, sure
+
+
+def surely_positive(values: np.ndarray, chance: float) -> bool:
+    """Whether the mean of independent values (k,) is above zero, by Student's one-sided test."""
+    k = values.size
+    if k < 2:
+        return False
+    deviation = float(values.std(ddof=1)) / k**0.5
+    return float(values.mean()) > deviation * float(student.isf(chance, k - 1))

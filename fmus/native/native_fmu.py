@@ -1,0 +1,79 @@
+"""Packs a component as an FMU whose libraries are its own machine code: no Python at run time.
+
+Variables, value references, units, start values and dependencies are those of the Python FMU. The same
+source gives the same bytes, as far as the compiler does.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import uuid
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ..declare import Component
+from ..fmi.model_description import model_description
+from .compilers import TARGETS, compiled
+from .model_source import FACE, fmu_source, model_source
+from .program import program
+
+# Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+FACE_FILE = Path(__file__).with_name(FACE)
+
+
+def native_fmu(
+    component: Component, targets: Sequence[str], work: Path, python: Path | None = None
+) -> Path:
+    """Build one FMU in a scratch folder.
+
+    Args:
+        component: what it computes.
+        targets: platforms to compile for, of :data:`~fmus.native.compilers.TARGETS`.
+        work: the scratch folder.
+        python: the same component's Python FMU, whose body then serves all other platforms.
+
+    Returns:
+        Path of the FMU.
+
+    Raises:
+        CompilerError: no compiler for a platform, or it fails.
+        TraceError: the component does what cannot be compiled.
+    """
+    recorded = program(component)
+    texts = model_source(recorded)
+    digest = hashlib.sha256(FACE_FILE.read_bytes() + b"\0".join(t.encode() for t in texts.values()))
+    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, digest.hexdigest())}}}"
+    for name, text in fmu_source(recorded, guid).items():
+        (work / name).write_text(text, encoding="utf-8")
+    version = importlib.metadata.version("cybership")
+    root = model_description(component, guid, version, python is not None, "cybership")
+    ElementTree.indent(root)
+    files = {"modelDescription.xml": ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)}
+    for target in targets:
+        inside = f"binaries/{target}/{component.name}{TARGETS[target].suffix}"
+        files[inside] = compiled(FACE_FILE, target, work)
+    if python is not None:
+        files = _python_body(python, targets) | files
+    fmu = work / f"{component.name}.fmu"
+    with zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(files):
+            info = zipfile.ZipInfo(name, ZIP_DATE)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, files[name])
+    return fmu
+
+
+def _python_body(python: Path, targets: Sequence[str]) -> dict[str, bytes]:
+    """What a Python FMU needs on platforms that are not among the targets."""
+    native = tuple(f"binaries/{target}/" for target in targets)
+    with zipfile.ZipFile(python) as archive:
+        return {
+            name: archive.read(name)
+            for name in archive.namelist()
+            if not name.endswith("/") and not name.startswith(native)
+        }

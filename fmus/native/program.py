@@ -1,0 +1,120 @@
+"""A component's functions as recordings: the initial state, what follows from parameters, a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..declare import Component, flatten, packer, rebuild, width
+from ..fmi.trace import Symbol, TraceError
+from .tape import Kernels, Recording, Tape, Value, is_condition, like
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """What a component computes.
+
+    Attributes:
+        component: the declaration.
+        init: of ``params`` and ``inputs``: the state.
+        prepare: of ``params``: what a step needs of them.
+        step: of ``params``, ``prepared``, ``inputs``, ``state`` and ``h``: state and outputs.
+        kernels: that these call, each after those that it calls itself.
+        states: how many scalars the state has.
+    """
+
+    component: Component
+    init: Recording
+    prepare: Recording
+    step: Recording
+    kernels: list[Recording]
+    states: int
+
+
+def program(component: Component) -> Program:
+    """Record a component.
+
+    Raises:
+        TraceError: it does with a value what can be done with a number only.
+    """
+    kernels = Kernels()
+    tape = Tape(kernels)
+    initial = component.init(_group(tape, component.inputs, "inputs"), _params(tape, component))
+    init = tape.recording(flatten(initial))
+
+    tape = Tape(kernels)
+    prepared = component.prepared(_params(tape, component))
+    kept = _Kept()
+    kept.gather(prepared)
+    prepare = tape.recording(list(kept.values.values()))
+
+    tape = Tape(kernels)
+    states = len(init.results)
+    state, outputs = (component.prepared_step or component.step)(
+        rebuild(initial, [tape.variable(f"state[{k}]") for k in range(states)]),
+        _group(tape, component.inputs, "inputs"),
+        kept.seen_by(tape, prepared),
+        tape.variable("h"),
+    )
+    after, given = flatten(state), flatten(outputs)
+    if len(after) != states or len(given) != width(component.outputs):
+        raise TraceError(f"{component.name}: a step does not give as many numbers as are declared")
+    return Program(component, init, prepare, tape.recording(after + given), kernels.recordings, states)
+
+
+def _group(tape: Tape, cls: type[Any], name: str) -> Any:
+    """A declared group of variables."""
+    return packer(cls)([tape.variable(f"{name}[{k}]") for k in range(width(cls))])
+
+
+def _params(tape: Tape, component: Component) -> Any:
+    return _group(tape, component.params, "params")
+
+
+class _Kept:
+    """The values that ``prepare`` computes, each once; it gives them in any tuples, lists and dicts."""
+
+    def __init__(self) -> None:
+        self.values: dict[int, Value] = {}
+
+    def gather(self, prepared: Any) -> None:
+        """Collect the values to keep between steps; a parameter is at hand anyway."""
+
+        def keep(x: Value) -> Any:
+            if x.operation != "variable":
+                self.values.setdefault(id(x), x)
+            return x
+
+        _mapped(prepared, keep)
+
+    def seen_by(self, tape: Tape, prepared: Any) -> Any:
+        """The same, as a step finds it."""
+        places = {identity: k for k, identity in enumerate(self.values)}
+
+        def find(x: Value) -> Any:
+            if x.operation == "variable":
+                return tape.variable(x.args[0])
+            return tape.variable(f"prepared[{places[id(x)]}]", is_condition(x))
+
+        return _mapped(prepared, find)
+
+
+def _mapped(part: Any, function: Callable[[Value], Any]) -> Any:
+    """Nested tuples, lists and dicts with a function applied to every value; all else stays."""
+    if isinstance(part, Value):
+        return function(part)
+    if isinstance(part, dict):
+        return {key: _mapped(x, function) for key, x in part.items()}
+    if isinstance(part, (tuple, list)) and not _plain(part):
+        return like(part, [_mapped(x, function) for x in part])
+    return part
+
+
+def _plain(part: Any) -> bool:
+    """Whether no symbol is inside, so that the object itself can stay."""
+    if isinstance(part, dict):
+        return all(map(_plain, part.values()))
+    if isinstance(part, (tuple, list)):
+        return all(map(_plain, part))
+    return not isinstance(part, Symbol)

@@ -1,0 +1,336 @@
+"""Campaigns: designs, refusals, one row a run, nothing run twice, and the same numbers wherever they are made."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pandas
+import pytest
+from support.command import command
+from support.project import ROOT
+
+import cosim
+from cosim.campaign.__main__ import main
+from cosim.campaign.campaign_file import LoadedCampaign
+from cosim.campaign.design import cases
+from cosim.campaign.run_table import JOURNAL
+
+
+@pytest.fixture
+def base(ellipse, tmp_path):
+    """A scenario file of 1 s, for campaigns beside it."""
+    ellipse["stop"] = 1.0
+    (tmp_path / "base.json").write_text(json.dumps(ellipse))
+    return tmp_path
+
+
+def campaign(base, axes, **keys):
+    path = base / "some.campaign.json"
+    path.write_text(json.dumps({"scenario": "base.json", "axes": axes, **keys}))
+    return path
+
+
+def shown(base, axes, **keys):
+    return [case.shown for case in cases(LoadedCampaign(campaign(base, axes, **keys)).campaign)]
+
+
+def without_time(table):
+    return table.drop(columns="wall_s")
+
+
+def test_grid_and_list(base):
+    axes = {
+        "m": {"set": "vessel.m", "values": [14.0, 15.0]},
+        "seed": {"set": "seed", "values": [0, 1]},
+    }
+    assert [(c["m"], c["seed"]) for c in shown(base, axes)] == [
+        (14.0, 0),
+        (14.0, 1),
+        (15.0, 0),
+        (15.0, 1),
+    ]
+    assert [(c["m"], c["seed"]) for c in shown(base, axes, design="list")] == [(14.0, 0), (15.0, 1)]
+
+
+def test_latin_and_sobol_fill_every_stratum(base):
+    axes = {
+        "x": {"set": "vessel.x_0", "uniform": [2.0, 10.0]},
+        "y": {"set": "vessel.y_0", "normal": [1.0, 0.5]},
+        "std": {"set": ["faults.0.std", "faults.1.std"], "log_uniform": [1e-4, 1e-2]},
+        "c": {"set": "controller", "values": ["controller_bs.fmu", "controller_abs.fmu"], "cross": True},
+    }
+    for design in ({"latin": 16}, {"sobol": 16}):
+        found = shown(base, axes, design=design, seed=3)
+        assert found == shown(base, axes, design=design, seed=3)
+        assert found != shown(base, axes, design=design, seed=4)
+        assert len(found) == 32
+        first = found[::2]
+        assert sorted(int((c["x"] - 2.0) / 0.5) for c in first) == list(range(16))
+        assert all(1e-4 <= c["std"] <= 1e-2 for c in first)
+        assert sum(c["std"] < 1e-3 for c in first) == 8  # half of it below the geometric middle
+        assert sum(c["y"] < 1.0 for c in first) == 8
+        assert [c["c"] for c in found[:2]] == ["controller_bs.fmu", "controller_abs.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("axes", "keys", "message"),
+    [
+        ({"m": {"set": "vesel.m", "values": [1]}}, {}, "no instance 'vesel'; did you mean 'vessel'?"),
+        ({"m": {"set": "vessel.mm", "values": [1]}}, {}, "vessel.mm does not exist; did you mean 'm'?"),
+        ({"m": {"set": "faults.9.std", "values": [1]}}, {}, "there is no entry '9' in the list"),
+        ({"m": {"set": "faults.0.sdt", "values": [1]}}, {}, "unknown key; did you mean 'std'?"),
+        ({"m": {"set": "vessel.m", "value": [1]}}, {}, "unknown key; did you mean 'values'?"),
+        ({"m": {"set": "vessel.m", "uniform": [1, 2]}}, {}, "uniform cannot be in a grid"),
+        (
+            {"m": {"set": "vessel.m", "uniform": [2, 1]}},
+            {"design": {"latin": 4}},
+            "the lowest comes first",
+        ),
+        (
+            {"m": {"set": "vessel.m", "normal": [2, -1]}},
+            {"design": {"latin": 4}},
+            "has to be above zero",
+        ),
+        ({"m": {"set": "vessel.m", "log_uniform": [0, 1]}}, {"design": {"latin": 4}}, "above zero"),
+        ({"m": {"set": "vessel.m", "values": [14, "x"]}}, {}, "needs a value of type Real"),
+        ({"m": {"set": "controller", "values": ["./no.fmu"]}}, {}, "no such FMU"),
+        ({"W": {"set": "vessel.m", "values": [14]}}, {}, "'W' cannot be an axis"),
+        ({"m": {"set": "vessel.m", "values": [14]}}, {"design": "gird"}, '"grid", "list"'),
+        (
+            {"m": {"set": "vessel.m", "values": [14]}},
+            {"scenario": "bas.json"},
+            "did you mean 'base.json'?",
+        ),
+        (
+            {"m": {"set": "seed", "values": [14]}, "n": {"set": "seed", "values": [1]}},
+            {},
+            "set the same",
+        ),
+        (
+            {"m": {"set": "vessel.m", "values": [14]}, "s": {"set": "seed", "values": [1, 2]}},
+            {"design": "list"},
+            "as many values in each axis",
+        ),
+    ],
+)
+def test_mistakes_are_told_before_anything_runs(base, axes, keys, message):
+    done = command(main, campaign(base, axes, **keys), "--workers", 0, "--out", base / "out")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (base / "out").exists()
+
+
+def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
+    path = campaign(
+        base,
+        {
+            "controller": {
+                "set": "controller",
+                "values": ["controller_cl_win_eps.fmu", "controller_bs.fmu"],
+            },
+            "k": {"set": "vessel.m", "values": [14.0, 18.0]},
+        },
+    )
+    done = command(main, path, "--workers", 0, "--out", base / "out", "--keep-logs")
+    assert done.returncode == 0, done.stderr
+    table = pandas.read_parquet(base / "out" / "runs.parquet")
+    assert list(table.columns[:2]) == ["controller", "k"]
+    assert list(table["status"]) == ["done"] * 4
+    for row in table.to_dict("records"):
+        content = json.loads((base / "base.json").read_text())
+        content["fmus"]["controller"]["path"] = row["controller"]
+        content["fmus"]["vessel"]["parameters"]["m"] = row["k"]
+        fresh = cosim.simulate(cosim.load_scenario(content), base / "fresh")
+        assert {name: row[name] for name in fresh.metrics} == fresh.metrics
+        log = base / "out" / "logs" / row["hash"][:16] / "log.csv"
+        assert log.read_bytes() == (base / "fresh" / "log.csv").read_bytes()
+    told = json.loads((base / "out" / "campaign.json").read_text())
+    assert (told["status"], told["runs"], told["done"]) == ("done", 4, 4)
+    assert told["versions"]["cybership"]
+
+
+def test_finished_runs_are_not_made_again(base, monkeypatch):
+    axes = {"m": {"set": "vessel.m", "values": [14.0, 15.0]}}
+    first = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
+    journal = base / "out" / JOURNAL
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(lines[0] + lines[1][:40])  # killed while it wrote the second row
+    axes["m"]["values"].append(16.0)
+    made = []
+    original = cosim.campaign.single_run.Workplace.run
+    monkeypatch.setattr(
+        "cosim.campaign.single_run.Workplace.run",
+        lambda self, content, keep: made.append(content) or original(self, content, keep),
+    )
+    second = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
+    assert [c["fmus"]["vessel"]["parameters"]["m"] for c in made] == [15.0, 16.0]
+    assert without_time(second)[:2].equals(without_time(first))
+    third = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
+    assert len(made) == 2
+    assert third.equals(second)
+
+
+def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
+    original, made = cosim.campaign.single_run.Workplace.run, []
+
+    def run(self, content, keep):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(content)
+        return original(self, content, keep)
+
+    monkeypatch.setattr("cosim.campaign.single_run.Workplace.run", run)
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0, 15.0, 16.0]}})
+    with pytest.raises(KeyboardInterrupt):
+        main([str(path), "--workers", "0", "--out", str(base / "out")])
+    assert len(pandas.read_parquet(base / "out" / "runs.parquet")) == 2
+    assert json.loads((base / "out" / "campaign.json").read_text())["status"] == "interrupted"
+
+
+def test_a_failed_run_is_a_row_with_its_message(base, chain, plain_fmu):
+    step = "self.y += h\nif self.k > 2.5 and t > 0.4: raise ValueError('too much')\nreturn True"
+    init = (
+        "self.y = 0.0\nself.k = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))\n"
+        "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
+        " variability=Fmi2Variability.tunable))"
+    )
+    chain["fmus"]["ramp"]["path"] = str(plain_fmu("Breaks", init, step))
+    (base / "base.json").write_text(json.dumps(chain))
+    path = campaign(base, {"k": {"set": "ramp.k", "values": [1.0, 3.0, 2.0]}})
+    done = command(main, path, "--workers", 0, "--out", base / "out")
+    assert done.returncode == 0
+    assert "1 of 3 runs failed: ramp" in done.stderr
+    table = pandas.read_parquet(base / "out" / "runs.parquet")
+    assert list(table["status"]) == ["done", "failed", "done"]
+    assert table["message"][1].startswith("ramp: the step from t = 0.5 s returned")
+    assert table["message"][0].startswith("no metrics")
+
+
+def test_an_unknown_fmu_is_instantiated_anew(base, chain, plain_fmu):
+    """One that counts its runs in its class would count them in the next run, if it were only reset."""
+    init = (
+        "self.y = 0.0\ntype(self).runs = getattr(type(self), 'runs', 0) + 1\n"
+        "self.n = float(type(self).runs)\n"
+        "self.register_variable(Real('y', causality=Fmi2Causality.output))"
+    )
+    chain["fmus"]["ramp"]["path"] = str(
+        plain_fmu("Counts", init, "self.y = self.n * (t + h)\nreturn True")
+    )
+    (base / "base.json").write_text(json.dumps(chain))
+    path = campaign(base, {"k": {"set": "gain.k", "values": [1.0, 1.5]}})
+    made = cosim.run_campaign(path, base / "out", workers=0, keep_logs=True)
+    logs = [cosim.read_log(base / "out" / "logs" / h[:16])["ramp.y"][-1] for h in made["hash"]]
+    assert logs[0] == logs[1]
+
+
+def test_equal_runs_are_made_once_and_labels_are_shown(base):
+    axes = {"m": {"set": "vessel.m", "values": [14.0, 14.0], "labels": ["a", "b"]}}
+    made = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
+    assert list(made["m"]) == ["a", "b"]
+    assert len((base / "out" / JOURNAL).read_bytes().splitlines()) == 1
+
+
+def test_the_campaign_file_is_not_overwritten(base):
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0]}}).rename(base / "campaign.json")
+    done = command(main, path, "--workers", 0, "--out", base)
+    assert done.returncode == 2
+    assert "would be overwritten" in done.stderr
+
+
+def test_the_missing_extra_is_named(base, monkeypatch):
+    monkeypatch.setattr("cosim.campaign.conduct.find_spec", lambda name: None)
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0]}})
+    done = command(main, path)
+    assert done.returncode == 2
+    assert "pip install 'cybership[campaign]'" in done.stderr
+
+
+def test_the_shipped_campaign_is_valid():
+    loaded = LoadedCampaign(ROOT / "scenarios" / "campaigns" / "gains.campaign.json")
+    assert len(cases(loaded.campaign)) == 8
+
+
+def dask(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *map(str, arguments)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+@pytest.fixture
+def scheduler(tmp_path):
+    """A scheduler with two workers, each a process: address and the processes of the workers."""
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    started = [
+        dask("scheduler", "--host", "127.0.0.1", "--port", 0, "--no-dashboard", "--scheduler-file", file)
+    ]
+    try:
+        for k in range(2):
+            folder = tmp_path / f"worker_{k}"
+            common = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", folder)
+            started.append(dask("worker", "--scheduler-file", file, "--host", "127.0.0.1", *common))
+        until = time.monotonic() + 60.0
+        while not file.exists():
+            assert time.monotonic() < until
+            time.sleep(0.1)
+        yield json.loads(file.read_text())["address"], started[1:]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+def test_a_killed_worker_changes_nothing(base, scheduler):
+    address, workers = scheduler
+    path = campaign(
+        base,
+        {
+            "c": {"set": "controller", "values": ["controller_bs.fmu", "controller_abs.fmu"]},
+            "seed": {"set": "seed", "values": list(range(10))},
+        },
+    )
+    killed = []
+
+    def progress(ended, failed, of):
+        if ended >= 4 and not killed:
+            killed.append(ended)
+            os.kill(workers[0].pid, signal.SIGKILL)
+
+    spread = cosim.run_campaign(path, base / "spread", scheduler=address, progress=progress)
+    assert killed[0] < 20
+    assert workers[0].wait() == -signal.SIGKILL
+    here = cosim.run_campaign(path, base / "here", workers=0)
+    assert set(here["status"]) == {"done"}
+    assert without_time(spread).equals(without_time(here))
+
+
+@pytest.mark.slow
+def test_processes_of_this_computer_give_the_same(base):
+    path = campaign(base, {"seed": {"set": "seed", "values": [0, 1, 2]}})
+    spread = cosim.run_campaign(path, base / "spread", workers=2)
+    here = cosim.run_campaign(path, base / "here", workers=0)
+    assert without_time(spread).equals(without_time(here))
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_its_process_is_a_failed_row_and_no_other(base, chain, plain_fmu):
+    init = (
+        "self.y = 0.0\nself.k = 1.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))\n"
+        "self.register_variable(Real('k', start=1.0, causality=Fmi2Causality.parameter,"
+        " variability=Fmi2Variability.tunable))"
+    )
+    step = "self.y += h\nif self.k > 2.5: os._exit(0)\nreturn True"
+    chain["fmus"]["ramp"]["path"] = str(plain_fmu("Dies", init, step))
+    (base / "base.json").write_text(json.dumps(chain))
+    path = campaign(base, {"k": {"set": "ramp.k", "values": [3.0, 1.0, 2.0, 1.5, 1.6, 1.7]}})
+    made = cosim.run_campaign(path, base / "out", workers=1)
+    assert list(made["status"]) == ["failed", *["done"] * 5]
+    assert made["message"][0].startswith("it ended every process")
+    assert len((base / "out" / JOURNAL).read_bytes().splitlines()) == 5  # it is tried again

@@ -1,0 +1,136 @@
+"""Comparisons within a campaign: paired intervals, the Pareto set, and the rule that stops."""
+
+import math
+
+import numpy as np
+import pandas
+import pytest
+
+from cosim import InputError
+from cosim.campaign import differences, pareto
+from cosim.campaign.comparison import FEWEST_PAIRS, StopRule, interval
+from cosim.campaign.design import Case
+from cosim.campaign.single_run import Row
+
+
+def grid(controllers, seeds):
+    pairs = [(c, s) for c in controllers for s in seeds]
+    values = [{"c": c, "seed": s} for c, s in pairs]
+    return [Case(k, v, v) for k, v in enumerate(values)]
+
+
+def outcome(cases, value):
+    """Number -> row, where ``value(case)`` is the metric W."""
+    return {case.number: Row("done", "", 0.0, {"W": value(case)}, {}) for case in cases}
+
+
+def test_interval_is_that_of_student():
+    scipy_stats = pytest.importorskip("scipy.stats")
+    x = np.array([1.0, 2.0, 4.0, 8.0])
+    low, high = scipy_stats.t.interval(0.95, 3, x.mean(), scipy_stats.sem(x))
+    assert interval(x.tolist()) == pytest.approx(((low + high) / 2, (high - low) / 2))
+    assert interval([1.0]).half == math.inf
+
+
+def test_rule_stops_when_the_interval_of_the_pairs_is_narrow_enough():
+    cases = grid("ab", range(300))
+    rng = np.random.default_rng(1)
+    common, own = rng.normal(50.0, 10.0, 300), rng.normal(0.0, 1.0, 300)
+    rows = outcome(
+        cases,
+        lambda c: common[c.values["seed"]] + (c.values["c"] == "b") * (3.0 + own[c.values["seed"]]),
+    )
+    rule = StopRule("c W 0.4", cases, 7)
+    assert [c.values["c"] for c in rule.ordered[:4]] == ["a", "b", "a", "b"]
+    assert sorted(c.number for c in rule.ordered) == list(range(600))
+    ended = {}
+    for case in rule.ordered:
+        ended[case.number] = rows[case.number]
+        if rule.satisfied(ended.get):
+            break
+    told = rule.verdict(ended.get)
+    # 1.96² · 1² / 0.4² = 24; unpaired it would take 10² times as many.
+    assert 15 <= told["pairs"] <= 40
+    _, low, high = told["difference"]["b"]
+    assert high - low <= 0.8
+    assert low < 3.0 < high
+    counted = rule.counted(ended.get)
+    assert len(counted) == 2 * told["pairs"]
+    # It is decided by the order of the pairs, not by which of them ended first.
+    assert StopRule("c W 0.4", cases, 7).counted(rows.get) == counted
+
+
+def test_interval_of_the_rule_holds_the_difference_as_often_as_it_says():
+    """Normal differences, 1.5 and 2.5 times as spread as the width: the level within 2 %."""
+    seeds = range(60)
+    cases = grid("ab", seeds)
+    for spread in (1.5, 2.5):
+        rng = np.random.default_rng(int(10 * spread))
+        inside = []
+        for _ in range(150):
+            drawn = rng.normal(0.0, spread, len(seeds))
+            rows = outcome(cases, lambda c, d=drawn: d[c.values["seed"]] * (c.values["c"] == "b"))
+            told = StopRule("c W 1.0", cases, 0).verdict(rows.get)
+            assert told["known"]
+            _, low, high = told["difference"]["b"]
+            inside.append(low <= 0.0 <= high)
+        assert np.mean(inside) > 0.93 - 2.0 * math.sqrt(0.05 * 0.95 / 150)
+
+
+def test_shares_are_of_the_ratio_and_failed_pairs_are_left_out():
+    cases = grid("ab", range(12))
+    rows = outcome(cases, lambda c: 2.0 * (1.1 if c.values["c"] == "b" else 1.0))
+    rows[3] = Row("failed", "broke", 0.0, {}, {})
+    told = StopRule("c W 1%", cases, 0).verdict(rows.get)
+    assert told["ratio_less_one"]["b"] == pytest.approx([0.1] * 3)
+    assert FEWEST_PAIRS <= told["pairs"] <= 11
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("c W", "is no rule"),
+        ("d W 1", "no axis 'd'"),
+        ("c w 1", "no metric 'w'"),
+        ("c W x", "is no width"),
+        ("c W -1%", "is no width"),
+    ],
+)
+def test_a_rule_that_is_none_is_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        StopRule(text, grid("ab", [0, 1]), 0)
+
+
+def test_a_rule_needs_partners():
+    with pytest.raises(InputError, match="nothing to compare"):
+        StopRule("c W 1", grid("ab", [0, 1])[:3], 0)
+
+
+@pytest.fixture
+def table():
+    rows = [
+        ("a", 0, 1.0, 4.0),
+        ("a", 1, 2.0, 4.0),
+        ("b", 0, 1.5, 3.0),
+        ("b", 1, 2.5, 3.0),
+        ("c", 0, 3.0, 5.0),
+    ]
+    made = pandas.DataFrame(rows, columns=["c", "seed", "e_pos_rms", "W"])
+    return made.assign(status="done", message="", wall_s=1.0, hash="x")
+
+
+def test_differences_are_those_of_the_same_seeds(table):
+    found = differences(table, ["c", "seed"], "c", ["e_pos_rms"]).set_index("value")
+    assert found.loc["b", "difference"] == 0.5
+    assert found.loc["b", "half"] == 0.0
+    assert found.loc["b", "pairs"] == 2
+    assert found.loc["b", "percent"] == pytest.approx(100.0 * (math.sqrt(1.5 * 1.25) - 1.0))
+    assert found.loc["c", "pairs"] == 1
+
+
+def test_pareto_set_is_what_nothing_beats(table):
+    found = pareto(table, ["c", "seed"], ["e_pos_rms", "W"], ["seed"])
+    assert list(found["c"]) == ["a", "b"]
+    assert list(found["e_pos_rms"]) == [1.5, 2.0]
+    table.loc[0, "status"] = "failed"
+    assert list(pareto(table, ["c", "seed"], ["e_pos_rms", "W"], ["seed"])["c"]) == ["b"]

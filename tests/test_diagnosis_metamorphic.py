@@ -1,0 +1,106 @@
+"""What is done to a file, and tells nothing of the ship, does not decide what is found in it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.cases import in_part
+from support.measured import commands, jumps, sail, slow_swings, smoothed
+
+from diagnosis import Model, Windows
+
+SECONDS, H, LATE = 64.0, 0.01, 0.3
+# Commands, delay of the thrusters [s], noise.
+KINDS = {
+    "swings": (commands, 0.0, 1.0),
+    "slow": (slow_swings, 0.0, 1.0),
+    "jumps": (jumps, 0.0, 1.0),
+    "quiet": (jumps, 0.0, 0.1),
+    "late": (jumps, LATE, 1.0),
+}
+HIDDEN = (
+    {"vessel": {"delta_X_u": -1.0}},
+    {"vessel": {"delta_N_r": -0.5}},
+    {"thrusters": {"loss_surge": 0.2}},
+)
+
+
+def thinned(run, k):
+    return run.rows(np.arange(0, run.time.size, k))
+
+
+def frozen(run):
+    """Four short freezes."""
+    pose = run.pose.copy()
+    for at in (0.17, 0.36, 0.58, 0.83):
+        row = round(at * run.time.size)
+        pose[row : row + round(0.4 / (run.time[1] - run.time[0]))] = pose[row - 1]
+    return replace(run, pose=pose)
+
+
+def turned(run):
+    """The heading continuous, and a turn more."""
+    psi = np.unwrap(run.pose[:, 2]) + 2.0 * np.pi
+    return replace(run, pose=np.column_stack([run.pose[:, :2], psi]))
+
+
+def gappy(run):
+    """2 % of the rows dropped, none with which a window begins."""
+    rng = np.random.default_rng(0)
+    first = np.isclose(np.remainder(run.time + 1e-6, 8.0), 0.0, atol=1e-4)
+    return run.rows(np.flatnonzero((rng.random(run.time.size) > 0.02) | first))
+
+
+def stamped(run):
+    """Unix time."""
+    return replace(run, time=run.time + 1.7e9 + 0.123)
+
+
+CHANGES = {
+    "freezes": frozen,
+    "wrap": turned,
+    "drops": gappy,
+    "unix": stamped,
+    "100 Hz": None,
+    "10 Hz": lambda run: thinned(run, 5),
+}
+LOSING = ("drops", "10 Hz", "100 Hz")  # of which commands are lost or won
+
+
+def measured(kind, change=None):
+    """The smoothed run of a kind at 50 Hz, changed."""
+    given, delay, noise = KINDS[kind]
+    thrusters = {"delay": delay} if delay else {}
+    run, _ = sail(SECONDS, H, thrusters=thrusters, noise=noise, given=given)
+    if change == "100 Hz":
+        return smoothed(run)
+    run = thinned(run, 2)
+    return smoothed(CHANGES[change](run) if change else run)
+
+
+def errors(run, kind):
+    """Window errors of position [m] and heading [rad], of the true model and of others."""
+    truth = {"delay": KINDS[kind][1]}
+    windows, found = Windows([run]), []
+    for other in ({}, *HIDDEN):
+        thrusters = truth | other.get("thrusters", {})
+        found.append(windows.errors(Model(other.get("vessel", {}), thrusters)).over_all())
+    return np.array(found, float)
+
+
+CASES = [(kind, change) for kind in KINDS for change in CHANGES]
+QUICK = [("jumps", "unix"), ("jumps", "freezes"), ("slow", "drops")]
+
+
+@pytest.mark.parametrize(("kind", "change"), in_part(CASES, keep=QUICK))
+def test_preprocessing_does_not_decide_the_result(kind, change):
+    whole, other = measured(kind), measured(kind, change)
+    before, after = errors(whole, kind), errors(other, kind)
+    lost = np.abs(after[0] - before[0])
+    assert (np.abs(after - before) <= 0.2 * before + lost).all()
+    if change not in LOSING:
+        assert (after[0] <= 1.2 * before[0]).all(), "the true model"
+    told = [note for note in other.notes if note.startswith("commands act")]
+    assert bool(told) <= bool(KINDS[kind][1]), "no delay is told where there is none"
+    if told:
+        assert other.delay == pytest.approx(LATE, abs=0.05)

@@ -1,0 +1,89 @@
+"""What a regression is not linear in: outages by segmentation, shapes of effects from many starts, curves."""
+
+import numpy as np
+import pytest
+from support.measured import sail, smoothed
+
+from diagnosis import Model
+from diagnosis.identification.candidates import candidate, covered, model_error
+from diagnosis.identification.multistart import Landscape, best_values
+from diagnosis.identification.segmentation import programmed
+from diagnosis.model import integrals, read_model, write_model
+from fmus.declare import Range, Variable
+from fmus.effects import STANDARD, effect
+
+SPANS = [(8.0, 14.0), (25.3, 28.0), (40.0, 52.0)]
+
+
+def times(device, spans):
+    """Intervals as parameters of an outage."""
+    pairs = [(f"{device}_outage_{end}_{k}", t) for k, s in enumerate(spans, 1)
+             for end, t in zip(("start", "end"), s, strict=True)]  # fmt: skip
+    return dict(pairs)
+
+
+@pytest.mark.parametrize("device", ["bow", pytest.param("vsp", marks=pytest.mark.slow)])
+def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tmp_path):
+    hidden = times(device, SPANS)
+    w = integrals(smoothed(sail(64.0, thrusters=hidden)[0]))
+    model = Model()
+    base = model_error([w], model)
+    (shape,) = candidate([w], model, base, STANDARD[f"{device}_outage"]).shapes
+    found = shape.given
+    assert set(found) == set(hidden)
+    assert [*found.values()] == pytest.approx([*hidden.values()], abs=0.3)
+    assert np.sqrt(np.mean((base - shape.offset) ** 2)) < 0.1 * np.sqrt(np.mean(base**2))
+    write_model(tmp_path / "model.ssv", model.plus(found))
+    assert read_model(tmp_path / "model.ssv").thrusters == pytest.approx(found)
+
+
+def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure():
+    for hidden in ({}, {"bow_failure_time": 30.0}):
+        w = integrals(smoothed(sail(64.0, thrusters=hidden)[0]))
+        model = Model()
+        base = model_error([w], model)
+        assert not candidate([w], model, base, STANDARD["bow_outage"]).shapes
+
+
+def test_dynamic_programming_gives_the_least_sum():
+    """Against all ways to place up to one interval, and up to what is charged for more."""
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        gain = rng.normal(0.0, 3.0, 12)
+        ways = [
+            (sum(gain[a:b]) - 2.0 * (1 + (b < 12)), [(a, b)])
+            for a in range(12)
+            for b in range(a + 1, 13)
+        ]
+        best = max([(0.0, []), *ways], key=lambda way: way[0])
+        assert programmed(gain, 2.0, 1) == best[1]
+    assert programmed(np.array([9.0, -9.0, 9.0, -9.0]), 2.0, 8) == [(0, 1), (2, 3)]
+
+
+def test_the_shape_of_an_effect_is_found_far_from_its_start():
+    """A force towards a point of the plane beyond a slack, of which only starts are declared."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(-4.0, 4.0, (2, 200))
+
+    def pull(k, to_x, to_y, slack):
+        d = np.hypot(to_x - x, to_y - y)
+        size = k * np.maximum(0.0, d - slack) / d
+        return np.concatenate([size * (to_x - x), size * (to_y - y)])
+
+    starts = {"k": 0.0, "to_x": 1.0, "to_y": 1.0, "slack": 0.5}
+    least = {"slack": 0.0}
+    declared = tuple(Variable(n, "m", n, s, Range(min=least.get(n)), False) for n, s in starts.items())
+    tether = effect("t", "force", "XY", parameters=declared, description="tether")(pull)
+    truth = {"k": 0.2, "to_x": -3.0, "to_y": 5.0, "slack": 2.0}
+    of = Landscape(tether, lambda v: pull(**{**starts, **v}), pull(**truth), 8.0, starts)
+    values, fitted = best_values(of, lambda shape: ())
+    assert fitted == ["k"]
+    assert values[0] == pytest.approx({n: v for n, v in truth.items() if n != "k"}, abs=1e-3)
+
+
+def test_a_curve_is_fitted_where_the_data_reach_it():
+    columns = np.zeros((50, 3, 21))
+    columns[:, 0, 6] = 1.0
+    columns[:, 0, 8] = 0.5
+    columns[0, 0, 15] = 0.01
+    assert np.flatnonzero(covered(columns)).tolist() == [6, 7, 8]

@@ -1,0 +1,167 @@
+"""Mistakes in a file are told by the data, with the line that mends them; right files are never refused."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.cases import in_part
+from support.command import command
+from support.measured import DATA, needs_data, sail, smoothed
+
+from diagnosis import InputError, Model, Run, compare, integrals, read
+from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
+
+COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+
+
+@cache
+def base():
+    """The run that is varied."""
+    return sail(60.0, 0.05)[0]
+
+
+def edited(pose=None, commands=None):
+    """The run with its pose and commands as these functions of them make them."""
+    run = base()
+    return replace(
+        run,
+        pose=pose(run.pose.copy()) if pose else run.pose,
+        tau_cmd=commands(run.tau_cmd) if commands else run.tau_cmd,
+    )
+
+
+def flipped(*signs):
+    return lambda values: values * np.array(signs)
+
+
+MISTAKES = [
+    ("heading is mirrored", {"psi": {"name": "psi", "flip": True}}, {"pose": flipped(1, 1, -1)}),
+    ("y points west", {"y": {"name": "y", "flip": True}}, {"pose": flipped(1, -1, 1)}),
+    ("x points south", {"x": {"name": "x", "flip": True}}, {"pose": flipped(-1, 1, 1)}),
+    (
+        "x and y are swapped",
+        {"x": {"name": "y"}, "y": {"name": "x"}},
+        {"pose": lambda p: p[:, [1, 0, 2]]},
+    ),
+    (
+        "position is in cm",
+        {"x": {"name": "x", "unit": "cm"}, "y": {"name": "y", "unit": "cm"}},
+        {"pose": flipped(100, 100, 1)},
+    ),
+    (
+        "commands have the wrong sign",
+        {name: {"name": name, "flip": True} for name in COLUMNS[4:]},
+        {"commands": flipped(-1, -1, -1)},
+    ),
+    (
+        "tau_Y has the wrong sign",
+        {"tau_Y": {"name": "tau_Y", "flip": True}},
+        {"commands": flipped(1, -1, 1)},
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[4]])
+)
+def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_path):
+    w = integrals(smoothed(edited(**edits)))
+    with pytest.raises(InputError) as error:
+        refuse_implausible([w], [tmp_path / "a.csv"], Model())
+    text = str(error.value)
+    assert mistake in text
+    assert f"put {json.dumps({'columns': line})} into" in text
+    assert "\n" not in text
+
+
+HARMLESS = [
+    ({}, {}),
+    ({"heading_offset": 0.3}, {}),
+    ({"heading_offset": 1.2}, {}),
+    ({}, {"loss_surge": 1.0}),
+    ({}, {"loss_sway": 1.0}),
+    ({}, {"loss_yaw": 1.0}),
+    ({}, {"loss_vsp": 0.9}),
+    ({}, {"bow_failure_time": 5.0}),
+    ({}, {"delay": 1.0}),
+    ({"V_n": 0.1, "V_e": -0.08}, {}),
+    ({"F_n": 0.3, "F_e": -0.2}, {}),
+    ({"mass": 8.0}, {}),
+]
+
+
+@pytest.mark.parametrize(("ship", "thrusters"), in_part(HARMLESS, keep=[HARMLESS[k] for k in (1, 3)]))
+def test_no_effect_is_a_mistake(ship, thrusters):
+    run = sail(60.0, 0.05, ship=ship, thrusters=thrusters)[0]
+    assert same_columns(run) is None
+    assert likeliest_mistake(integrals(smoothed(run)), Model()) is None
+
+
+def test_late_clock_is_no_mistake():
+    late = replace(base(), pose=np.vstack([np.repeat(base().pose[:1], 10, axis=0), base().pose[:-10]]))
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(late.pose.shape)
+    assert likeliest_mistake(integrals(smoothed(replace(late, pose=late.pose + noise))), Model()) is None
+
+
+def test_ship_of_another_size_is_no_mistake():
+    """By Froude's law 270 times as long; even with the model of the small ship."""
+    scale, run = 270.0, base()
+    large = replace(
+        run,
+        time=run.time * scale**0.5,
+        pose=run.pose * [scale, scale, 1.0],
+        tau_cmd=run.tau_cmd * [scale**3, scale**3, scale**4],
+    )
+    assert likeliest_mistake(integrals(smoothed(large)), Model()) is None
+
+
+@pytest.mark.parametrize(
+    ("edits", "pair"),
+    [
+        ({"pose": lambda p: p[:, [0, 0, 2]]}, ("x", "y")),
+        ({"pose": lambda p: p[:, [2, 1, 2]]}, ("x", "psi")),
+        ({"commands": lambda t: t[:, [0, 1, 1]]}, ("tau_Y", "tau_N")),
+        ({"commands": lambda t: 0.0 * t}, None),
+    ],
+)
+def test_column_that_is_used_twice_is_found(edits, pair):
+    assert same_columns(edited(**edits)) == pair
+
+
+@pytest.mark.slow
+def test_command_refuses_goes_on_anyway_and_takes_the_line(tmp_path):
+    run = edited(pose=flipped(1, 1, -1))
+    table = pd.DataFrame(np.column_stack([run.time, run.pose, run.tau_cmd]), columns=COLUMNS)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    out = tmp_path / "out"
+    refused = command(compare.main, tmp_path / "a.csv", "--out", out)
+    assert refused.returncode == 2
+    assert "heading is mirrored" in refused.stderr
+    assert not out.exists()
+    assert command(compare.main, tmp_path / "a.csv", "--anyway", "--out", out).returncode == 0
+    (tmp_path / "a.csv.json").write_text('{"columns": {"psi": {"name": "psi", "flip": true}}}')
+    assert command(compare.main, tmp_path / "a.csv", "--out", out).returncode == 0
+
+
+@pytest.mark.slow
+@needs_data
+@pytest.mark.parametrize("name", ["dptest1", "random_run1"])
+def test_real_run_is_no_mistake(name):
+    run = read(DATA / "cse1" / f"{name}.mat")
+    assert same_columns(run) is None
+    assert likeliest_mistake(integrals(smoothed(run)), Model()) is None
+
+
+@pytest.mark.slow
+@needs_data
+def test_tanker_with_a_rudder_is_no_mistake():
+    """KVLCC2, its rudder read as a command of yaw, with the model of quite another ship."""
+    data = pd.read_csv(DATA / "kvlcc2_hsva" / "z_05_01.csv")
+    pose = np.column_stack([data.x, data.y, np.radians(data.psi_deg)])
+    for sign in (1.0, -1.0):
+        rudder = np.column_stack([0.0 * data.t, 0.0 * data.t, sign * data.rudder_deg])
+        w = integrals(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
+        assert likeliest_mistake(w, Model()) is None

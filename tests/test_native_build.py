@@ -1,0 +1,111 @@
+"""Building native FMUs: learned values, users' effects, the cache, and what is refused."""
+
+import math
+
+import pytest
+from support import ccode
+from support.command import command
+
+from fmus.build import build, platforms
+from fmus.build.__main__ import main
+from fmus.build.platforms import native_targets
+from fmus.effects import STANDARD
+from fmus.native import compilers
+
+pytestmark = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+
+
+SET = """<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+ version="1.0" name="m"><ssv:Parameters><ssv:Parameter name="vessel.delta_X_u"><ssv:Real value="-3.5"/>
+</ssv:Parameter></ssv:Parameters></ssv:ParameterSet>"""
+
+
+def test_learned_vessel_starts_with_what_was_learned(tmp_path, opened_here):
+    (tmp_path / "model.ssv").write_text(SET)
+    for options, name in (([], "python"), (["--native"], "native")):
+        arguments = [*options, "--parameters", tmp_path / "model.ssv", "--out", tmp_path / name]
+        done = command(main, *arguments)
+        assert done.stdout.split() == [str(tmp_path / name / "vessel.fmu")], done.stderr
+    rows = [
+        opened_here(tmp_path / n / "vessel.fmu").initialise(u_0=0.2).play(0)
+        for n in ("native", "python")
+    ]
+    assert rows[0] == rows[1]
+    assert opened_here(tmp_path / "native" / "vessel.fmu").get("delta_X_u") == [-3.5]
+
+
+EFFECT = '''
+from typing import Annotated
+from fmus.effects import effect
+from fmus.ops import exp
+
+@effect("X_soft", kind="force", axis="X", formula="X = k (1 - exp(-u u))", linear=False)
+def X_soft(ship, X_soft: Annotated[float, "N", "a soft force"] = 0.0):
+    """A soft force."""
+    return X_soft * (1.0 - exp(-ship.u * ship.u)), 0.0, 0.0
+'''
+
+
+def test_users_effect_is_compiled(tmp_path, opened_here):
+    (tmp_path / "soft.py").write_text(EFFECT)
+    effects = STANDARD.plus_file(tmp_path / "soft.py")
+    (path,) = build(["vessel"], tmp_path, effects=effects, native=native_targets())
+    fmu = opened_here(path).initialise(u_0=0.3, X_soft=2.0)
+    fmu.step(0.0)
+    (force, u) = fmu.get("force_X_soft", "u")
+    assert force == pytest.approx(2.0 * (1.0 - math.exp(-u * u)), rel=1e-12)
+
+
+def test_builds_are_kept_and_repeatable(native, tmp_path, monkeypatch):
+    assert build(["vessel"], native=native_targets()) == [native["vessel"]]
+    assert command(main, "--verify", native["vessel"]).returncode == 0
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    (again,) = build(["observer_mdf"], native=native_targets())
+    assert again.read_bytes() == native["observer_mdf"].read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--native", "--target", "linux"], "did you mean 'linux64'"),
+        (["--native", "--target", "python"], "no platform to compile for"),
+        (["--native", "vesel"], "did you mean 'vessel'"),
+        (["--target", "linux64"], "need --native"),
+    ],
+)
+def test_what_cannot_be_compiled_is_refused_in_one_line(arguments, message):
+    done = command(main, *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr.splitlines()[-1]
+
+
+def test_without_a_compiler_one_line_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr(compilers.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compilers.importlib.util, "find_spec", lambda name: None)
+    done = command(main, "--native", "vessel")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "cybership[native]" in done.stderr
+    assert command(main, "--native", "vessel", "--source", tmp_path).returncode == 0
+
+
+def test_compiler_that_fails_is_told(monkeypatch, tmp_path):
+    broken = compilers.Compiler((("false",),), (), "")
+    for module in (platforms, compilers):
+        monkeypatch.setattr(module, "compiler_for", lambda target: broken)
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    done = command(main, "--native", "observer_mdf")
+    assert done.returncode == 2
+    assert "compiler 'false' fails" in done.stderr
+    assert not list(tmp_path.rglob("*.fmu"))
+
+
+def test_machines_of_a_universal_library_are_found_where_its_header_says():
+    parts = [bytes.fromhex("cffaedfe") + bytes([k, 0, 0, 1, k, 0, 0, 0]) + b"code" * k for k in (7, 12)]
+    whole = compilers.universal(parts)
+    assert int.from_bytes(whole[4:8], "big") == 2
+    for k, part in enumerate(parts):
+        _, _, offset, size, _ = (
+            int.from_bytes(whole[8 + 20 * k + 4 * j :][:4], "big") for j in range(5)
+        )
+        assert whole[offset : offset + size] == part
+        assert offset % 16384 == 0
