@@ -6,73 +6,70 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import suppress
-from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
 
 from cosim import InputError, SimulationError
 from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.errors import nearest
 from studies.study_command import progress
 
-from .cell import Cell, trial
+from .answers import judge, kept_answer, path_of
+from .cells import KINDS, Cell, Key, cells
+from .confidence_fit import write_fit
 from .cost import Cost, measure
 from .draw import SINGLE
+from .problems import kept, make
+from .reliability_diagram import draw_diagram
 from .results import Results, Row
+from .scoring import row
 from .simulated_runs import NOISE, build
 from .summary import write
 
 OUT = Path("docs") / "benchmarks" / "hidden_effects"
-NONES, PAIRS = 5, 4  # cells without an effect and with two, for each of the others and a seed
-CELLS = 10  # that a process takes
+PROBLEMS = Path("results") / "hidden_effects"
+ANSWERS, DIAGRAM, FIT = "answers", "reliability.png", "calibration.json"  # in the folder of results
+SOME = 32  # cells that are simulated before the diagnosis gets them: a fleet
 QUICK = ("X_u", "N_r", "loss_yaw", "bow_failure", "current", "delay")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def cells(
-    effects: Sequence[str], noises: Sequence[str], wrong: Sequence[bool], seeds: Sequence[int]
-) -> Iterator[Cell]:
-    """The cells of a benchmark; with more effects than one also those with none and with two."""
-    ways, several = list(product(noises, wrong)), len(effects) > 1
-    for seed in seeds:
-        rng = np.random.default_rng([seed, 4])
-        drawn = [rng.choice(effects, 2, replace=False).tolist() for _ in range(PAIRS * several)]
-        pairs = dict.fromkeys(tuple(pair) for pair in drawn)
-        # The manoeuvres are those of the seed; all else is drawn anew.
-        nones = [seed + 100 * k for k in range(NONES * several)]
-        yield from (Cell((e,), *way, seed) for way in ways for e in effects)
-        yield from (Cell((), *way, each) for way in ways for each in nones)
-        yield from (Cell(pair, *way, seed) for way in ways for pair in pairs)
+def run(todo: Sequence[Cell], results: Results, problems: Path, jobs: int, peers: bool) -> None:
+    """Simulate cells, let the diagnosis answer them in other processes, and keep each as it comes.
 
-
-def run(todo: Sequence[Cell], results: Results, jobs: int, peers: bool) -> None:
-    """Run cells in processes of their own, and keep each as it comes.
-
-    Raises:
-        InputError: the FMUs cannot be built.
+    What was simulated or answered before is not done again.
     """
     for name in THREADS:
         os.environ[name] = "1"  # inherited: the processes are as many as the cores
-    with TemporaryDirectory() as folder, progress(len(todo), "cells") as advance:
-        build(Path(folder))
-        for k in range(0, len(todo), CELLS * jobs):
-            for row in results_of(todo[k : k + CELLS * jobs], Path(folder), jobs, peers):
-                results.add(row)
+    answers = results.path.parent / ANSWERS
+    answers.mkdir(parents=True, exist_ok=True)
+    with progress(len(todo), "cells") as advance:
+        for k in range(0, len(todo), SOME):
+            some = todo[k : k + SOME]
+            for _ in make(some, problems):
+                pass
+            for key in answered([c.key for c in some], problems, answers, jobs, peers):
+                results.add(scored(key, problems, answers))
                 advance()
 
 
-def results_of(some: Sequence[Cell], fmus: Path, jobs: int, peers: bool) -> Iterator[Row]:
-    """Results of some cells, as they come, by new processes.
+def scored(key: Key, problems: Path, answers: Path) -> Row:
+    """The row of a cell that was answered."""
+    return row(kept(key, problems), kept_answer(key, answers))
 
-    A Python FMU stays in its process for good: after many runs each further one would be slower.
-    """
-    # Forking a process that has loaded FMUs would copy their threads' locks.
+
+def answered(
+    keys: Sequence[Key], problems: Path, answers: Path, jobs: int, peers: bool
+) -> Iterator[Key]:
+    """Keys of cells, each when it is answered."""
+    there = [key for key in keys if path_of(key, answers).is_file()]
+    yield from there
+    # Forking a process whose libraries have threads would copy their locks.
     pool = ProcessPoolExecutor(jobs, get_context("spawn"))
     try:
-        futures: list[Future] = [pool.submit(trial, cell, fmus, peers) for cell in some]
+        left = [key for key in keys if key not in there]
+        futures: list[Future] = [pool.submit(judge, key, problems, answers, peers) for key in left]
         for future in as_completed(futures):
             yield future.result()
     finally:
@@ -98,9 +95,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{len(todo) - len(left)} of {len(todo)} cells are there already", file=sys.stderr)
         try:
             if left:
-                run(left, results, options.jobs, not options.no_peers)
+                run(left, results, options.problems, options.jobs, not options.no_peers)
         finally:
             path = write(options.out, results.rows, None)
+            draw_diagram(results.rows, options.out / DIAGRAM)
+        if options.calibrate:
+            print(write_fit(results.rows, options.out / FIT))
         if options.cost:
             path = write(options.out, results.rows, cost())
     except InputError as error:
@@ -113,15 +113,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _chosen(options: argparse.Namespace) -> tuple[Sequence[str], list[str], list[bool], range]:
-    """Effects, noises, kinds of coefficients and seeds that are chosen."""
+def _chosen(
+    options: argparse.Namespace,
+) -> tuple[Sequence[str], Sequence[str], list[str], list[bool], range]:
+    """Kinds, effects, noises, kinds of coefficients and seeds that are chosen."""
     for e in options.effects:
         if e not in SINGLE:
             raise InputError(f"no effect '{e}'{nearest(e, SINGLE)}")
     effects = options.effects or (QUICK if options.quick else SINGLE)
     noises = options.noise or (["n4"] if options.quick else list(NOISE))
     wrong = [False] * options.exact + [True] * options.wrong or [False] + [True] * (not options.quick)
-    return effects, noises, wrong, range(options.first, options.first + options.seeds)
+    usual = KINDS if len(effects) > 1 and not options.quick else KINDS[: min(2, len(effects))]
+    kinds = options.kinds or usual
+    return kinds, effects, noises, wrong, range(options.first, options.first + options.seeds)
 
 
 def _integer(low: int, high: int) -> Callable[[str], int]:
@@ -146,12 +150,20 @@ def _parser() -> argparse.ArgumentParser:
         "  python -m benchmarks.hidden_effects --quick --out /tmp/hidden\n"
         "  python -m benchmarks.hidden_effects --effects X_u 'Y_|v|v' --noise n1 n10 --exact --seeds 3\n"
         "  python -m benchmarks.hidden_effects --cost\n"
+        "  python -m benchmarks.hidden_effects --first 50 --seeds 4 --calibrate --out /tmp/calibration\n"
         "Cells that are in DIR/results.csv are not run again: after Ctrl-C, the same command goes on.\n"
         "exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "--effects", nargs="+", default=[], metavar="ID", help="what is hidden (everything)"
+    )
+    parser.add_argument(
+        "--kinds",
+        nargs="+",
+        choices=KINDS,
+        metavar="KIND",
+        help=f"of cells: {', '.join(KINDS)} (all; single only where one effect is named)",
     )
     parser.add_argument("--noise", nargs="+", choices=list(NOISE), help="levels of noise (all)")
     parser.add_argument(
@@ -166,7 +178,19 @@ def _parser() -> argparse.ArgumentParser:
         "--jobs", type=_count, default=os.cpu_count(), metavar="N", help="processes (one for each core)"
     )
     parser.add_argument("--out", type=Path, default=OUT, metavar="DIR", help=f"where results go ({OUT})")
+    parser.add_argument(
+        "--problems",
+        type=Path,
+        default=PROBLEMS,
+        metavar="DIR",
+        help=f"simulated runs, 3 MB a cell, for any version of the diagnosis ({PROBLEMS})",
+    )
     parser.add_argument("--no-peers", action="store_true", help="without PySINDy and PLS")
+    parser.add_argument(
+        "--calibrate",
+        action="store_true",
+        help=f"fit the calibration of confidences to cells set aside, seeds from 50 on: DIR/{FIT}",
+    )
     parser.add_argument("--cost", action="store_true", help="measure time and memory, too")
     parser.add_argument("--quick", action="store_true", help="few effects, n4, exact coefficients")
     return parser

@@ -5,18 +5,19 @@ give, on the axis where that is most, over the training runs. It is set by the m
 any effect: with the effect the controller follows the same path.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fmus.effects import EACH_VSP, STANDARD
 
-from .simulated_runs import FINE, STEP, STOP
+from .effect_forms import form
+from .foreign_physics import FOREIGN_PHYSICS
+from .simulated_runs import STOP
 from .truth import NAMES, Motion, Values, force, over, windows
 
 SMALLEST, LARGEST = 0.05, 0.4
-NODES = np.linspace(-1.0, 1.0, 21)
 # Ids of hidden effects whose form the diagnosis does not have, and the ids that come nearest.
 FOREIGN: dict[str, tuple[str, ...]] = {
     "drag |u|^1.5": ("X_u", "X_|u|u", "curve_X(u)"),
@@ -27,7 +28,9 @@ FOREIGN: dict[str, tuple[str, ...]] = {
 LOOKED_FOR = [e for e in STANDARD.values() if EACH_VSP not in e.needs and e.search.by != "given"]
 SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
 OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
-Scaled = Callable[[float], dict[str, float]]
+# Physics of which the diagnosis has nothing: no id is a right answer.
+UNKNOWN = [e.id for e in FOREIGN_PHYSICS]
+MOST_PLAY = 0.12  # of the full command: about the largest size, 40 % of the force on an axis
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Draw:
     @property
     def right(self) -> tuple[str, ...]:
         """The ids that are a right answer."""
-        return FOREIGN.get(self.effect, (self.effect,))
+        return () if self.effect in UNKNOWN else FOREIGN.get(self.effect, (self.effect,))
 
     @property
     def measured(self) -> dict[str, float]:
@@ -65,13 +68,15 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
         pilot: runs of a ship without it.
         less: factor on the size drawn.
     """
-    scaled = form(effect, rng, pilot)
-    size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
-    elif effect in STANDARD and STANDARD[effect].search.intervals:
+    elif effect in STANDARD and STANDARD[effect].search.intervals:  # and so are these
         values = outage(effect, rng)
+    elif effect == "backlash":  # so is its play, of which a series takes seconds
+        values = {"backlash": less * MOST_PLAY * float(rng.uniform(0.25, 1.0))}
     else:
+        scaled = form(effect, rng, pilot)
+        size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
         values = scaled(_solve(lambda s: share(pilot, effect, scaled(s)), size))
     return Draw(effect, values, share(pilot, effect, values))
 
@@ -141,106 +146,3 @@ def _solve(size: Callable[[float], float], wanted: float) -> float:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if size(middle) >= wanted else (middle, high)
     return float(high)
-
-
-def form(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    """An effect's parameters as a function of a scale: its form and sign are drawn here."""
-    one = {
-        "drag |u|^1.5": "drag_1_5",
-        "bow exp(-(u/u0)^2)": "bow_exp",
-        "deadband": "deadband",
-        "lag": "lag",
-        "bow_speed_loss": "bow_speed_loss",
-        "mass": "mass",
-        "added_mass_X": "added_mass_X",
-        "added_mass_Y": "added_mass_Y",
-        "added_mass_N": "added_mass_N",
-    }
-    if effect in one:
-        return lambda s: {one[effect]: s}
-    if effect.startswith("loss_"):
-        return lambda s: {effect: min(s, 0.9)}
-    if effect in FORMS:
-        return FORMS[effect](rng, pilot)
-    sign = float(rng.choice([-1.0, 1.0]))
-    names = STANDARD[effect].coefficients
-    if len(names) == 1:
-        return lambda s: {names[0]: sign * s}
-    if effect in REACH:
-        return _shape(effect, rng, pilot)
-    turn = rng.uniform(0.0, 2.0 * np.pi)
-    return lambda s: {names[0]: s * float(np.cos(turn)), names[1]: s * float(np.sin(turn))}
-
-
-# What a free curve is over, and whether it is over both signs.
-REACH: dict[str, tuple[Callable[[Motion], np.ndarray], bool]] = {
-    "curve_X(u)": (lambda m: m.nu[:, 0], True),
-    "curve_vsp_x(c)": (lambda m: m.commanded[:, 0], True),
-    "curve_vsp_y(c)": (lambda m: m.commanded[:, 1], True),
-    "curve_bow(|u|)": (lambda m: np.abs(m.nu[:, 0]), False),
-}
-
-
-def _shape(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    """Two bumps of opposite sign within what the runs cover: no polynomial, no dead band."""
-    over, both = REACH[effect]
-    e = STANDARD[effect]
-    reach = e.parameters[-1].start
-    covered = np.concatenate([over(m) for m in pilot])
-    nodes = reach * (NODES if both else 0.5 * (NODES + 1.0))
-    spacing = nodes[1] - nodes[0]
-    places = np.quantile(covered, [rng.uniform(0.1, 0.4), rng.uniform(0.6, 0.9)])
-    sign = float(rng.choice([-1.0, 1.0]))
-    bumps = [np.exp(-0.5 * ((nodes - place) / spacing) ** 2) for place in places]
-    values = sign * (bumps[0] - float(rng.uniform(0.5, 1.0)) * bumps[1])
-    return lambda s: {n: s * float(v) for n, v in zip(e.coefficients, values, strict=True)}
-
-
-def _delay(name: str) -> Callable[..., Scaled]:
-    return lambda rng, pilot: lambda s: {name: max(1, round(min(s, 1.0) / STEP)) * STEP}
-
-
-def _off_grid(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    part = FINE * int(rng.integers(1, round(STEP / FINE)))
-    return lambda s: {"delay": round(min(s, 1.0) / STEP) * STEP + part}
-
-
-def _thrust_curve(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    side, other = rng.uniform(0.3, 1.0), rng.uniform(-1.0, 0.3)
-    ahead, astern = (side, other) if rng.random() < 0.5 else (other, side)
-    band = float(rng.uniform(0.0, 0.2))
-    return lambda s: {
-        "thrust_curve_ahead": float(np.clip(-s * ahead, -1.0, 1.0)),
-        "thrust_curve_astern": float(np.clip(-s * astern, -1.0, 1.0)),
-        "thrust_curve_deadband": min(s * band, 0.8),
-    }
-
-
-def _saturation(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    """The VSP, the bow thruster, or both, limited to a part of their largest command."""
-    most = np.max([np.abs(m.commanded).max(axis=0) for m in pilot], axis=0)
-    full = {"saturation_vsp": 1.165 * float(max(most[:2])), "saturation_bow": 2.629 * float(most[2])}
-    names = list(full)[: rng.integers(1, 3)] if rng.random() < 0.5 else list(full)[1:]
-    return lambda s: {name: full[name] / (1.0 + s) for name in names}
-
-
-def _bias(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    tau = np.sqrt(np.mean([np.mean(m.tau**2, axis=0) for m in pilot], axis=0))
-    parts = tau * rng.uniform(0.2, 1.0, 3) * rng.choice([-1.0, 1.0], 3)
-    return lambda s: {f"body_bias_{a}": s * float(x) for a, x in zip("XYN", parts, strict=True)}
-
-
-def _waves(rng: np.random.Generator, pilot: Sequence[Motion]) -> Scaled:
-    way, peak = float(rng.uniform(-np.pi, np.pi)), float(rng.uniform(2.5, 6.0))
-    return lambda s: {"wave_force": s, "wave_direction": way, "wave_peak": peak}
-
-
-FORMS: Mapping[str, Callable[..., Scaled]] = {
-    "delay": _delay("delay"),
-    "clock_offset": _delay("clock_offset"),
-    "delay off the grid": _off_grid,
-    "thrust_curve": _thrust_curve,
-    "saturation": _saturation,
-    "body_bias": _bias,
-    "waves": _waves,
-}

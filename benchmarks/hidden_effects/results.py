@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim import InputError
 
+from .cells import kind_of
 from .simulated_runs import NOISE, POSITION
 
 BETWEEN = "; "
@@ -23,9 +24,16 @@ class Row:
         values: parameters of what was hidden.
         size: share of the force on its axis, of each effect.
         redrawn: how often the ship ran away and the effect was drawn smaller.
+        verdict: of the diagnosis.
         found: ids in order of acceptance.
+        confidences: of each; empty where the method has none.
+        true: for each whether it is a true cause, "1" or "0".
+        evidence: for each what its confidence is made of; empty where that is not told.
         reported: the first id, and those that the data do not distinguish from it.
-        confidence: of the first.
+        suspects: nominal coefficients that it says are wrong.
+        withdrawn: ids that were accepted, and made unseen data worse.
+        remainder: whether the model leaves a significant remainder, "1" or "0"; empty if not told.
+        intervals, covered: 95 % intervals of right findings, and how many hold the true value.
         alike: ids that could do the same within 5 %, by the truth; "" is no effect at all.
         separable: there are none.
         absorbed: changes of nominal coefficients alone could do the same.
@@ -33,7 +41,7 @@ class Row:
         in_set: the right effect is in the reported set.
         before_mm, after_mm: window position error of the run held out.
         truth_mm: that of the true model: no model can do better.
-        seconds: of processor time, from three measured runs to the answer.
+        seconds: of processor time, from measured runs to the answer.
         sindy, pls: the first effect of PySINDy and of PLS.
         note: why there is no result.
     """
@@ -45,9 +53,17 @@ class Row:
     values: str = ""
     size: str = ""
     redrawn: int = 0
+    verdict: str = ""
     found: list[str] = field(default_factory=list)
+    confidences: list[str] = field(default_factory=list)
+    true: list[str] = field(default_factory=list)
+    evidence: list[str] = field(default_factory=list)
     reported: list[str] = field(default_factory=list)
-    confidence: float = 0.0
+    suspects: list[str] = field(default_factory=list)
+    withdrawn: list[str] = field(default_factory=list)
+    remainder: str = ""
+    intervals: int = 0
+    covered: int = 0
     alike: list[str] = field(default_factory=list)
     separable: bool = False
     absorbed: bool = False
@@ -60,6 +76,22 @@ class Row:
     sindy: str = ""
     pls: str = ""
     note: str = ""
+
+    @property
+    def kind(self) -> str:
+        """single, none, pair or foreign."""
+        return kind_of(self.effect)
+
+    @property
+    def surest(self) -> float:
+        """The largest confidence of a finding that is no true cause; 0 without one."""
+        pairs = zip(self.confidences, self.true, strict=True)
+        return max((float(c) for c, true in pairs if true == "0"), default=0.0)
+
+    @property
+    def reached(self) -> float:
+        """The fall of the error as a share of what the true model reaches on the same run."""
+        return self.truth_mm / self.after_mm
 
     @property
     def key(self) -> tuple[str, str, str, int]:
@@ -98,7 +130,7 @@ def _value(text: str, kind: Any) -> Any:
 
 
 class Results:
-    """A CSV file that grows row by row, so that nothing that was computed is ever lost."""
+    """A CSV file that grows row by row."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

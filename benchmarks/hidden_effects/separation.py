@@ -72,10 +72,13 @@ class Rivals:
     Attributes:
         runs: true motions of the training runs, of one plant.
         nuisance: whether nominal coefficients may change.
+        known: forces that were computed, by the values of their parameters.
+        Q, R: of the changes of nominal coefficients.
     """
 
     runs: Sequence[Motion]
     nuisance: bool
+    known: dict[tuple[tuple[str, float], ...], np.ndarray] = field(init=False, default_factory=dict)
     Q: np.ndarray = field(init=False)
     R: np.ndarray = field(init=False)
 
@@ -138,7 +141,11 @@ class Rivals:
         return best
 
     def _force(self, values: Values) -> np.ndarray:
-        return flat(over(self.runs, values))
+        """What effects add, flat and weighted; kept, as it is asked for again for each hidden effect."""
+        key = tuple(sorted(values.items()))
+        if key not in self.known:
+            self.known[key] = flat(over(self.runs, values))
+        return self.known[key]
 
     def _slope(self, given: Values, step: Values, size: float) -> np.ndarray:
         """Force for one unit of a parameter, by a step of ``size``."""

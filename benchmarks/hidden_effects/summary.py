@@ -3,16 +3,14 @@
 import os
 import platform
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 
 from .cost import Cost
-from .draw import FOREIGN
-from .results import Row
+from .reliability_diagram import Bin, tables
+from .targets import Rows, fall, lines, single
 
-Rows = Sequence[Row]
 HEAD = """# Does the diagnosis find hidden effects?
 
 Written by `python -m benchmarks.hidden_effects`; every cell is in [results.csv](results.csv). A cell is
@@ -24,100 +22,14 @@ and the prior is 0.1.
 
 Two effects are *separable* where the best fit of one leaves at least 5 % of the other's true force,
 computed from the true motion without noise, with coefficients free to change by 10 % where they are
-nuisance parameters. There the right effect must come first; everywhere it must be in the reported set.
+nuisance parameters. There the right effect must come first; two must come within two steps.
+
+*Foreign physics* is in no candidate of the diagnosis: nothing that it names is a true cause.
 
 The fall of the held-out error stands beside that with the true model, and that with the
 true model from the true state at the beginning of each window. Then nothing but the noise of the
 measurement is left, and no method can do better.
 """
-
-
-def single(rows: Rows) -> Rows:
-    """Cells with one effect hidden."""
-    return [r for r in rows if " + " not in r.effect and r.effect != "none" and not r.note]
-
-
-def share(rows: Iterable[Row], good: Callable[[Row], bool]) -> str:
-    """How many rows are good, in percent."""
-    found = [good(r) for r in rows]
-    return f"{100.0 * sum(found) / len(found):.1f} % ({sum(found)}/{len(found)})" if found else "-"
-
-
-def fall(rows: Iterable[Row]) -> str:
-    """Median fall of the held-out error, that of the true model, and that of it from the true state."""
-    known = [r for r in rows if r.possible == r.possible]
-    if not known:
-        return "-"
-    falls = [(r.fall, r.possible, r.limit) for r in known]
-    mine, truth, limit = (median(column) for column in zip(*falls, strict=True))
-    return f"{mine:.1f}x of {truth:.1f}x of {limit:.1f}x ({len(known)})"
-
-
-def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
-    """Measure, target, and what was reached."""
-    one = single(rows)
-    exact = [r for r in one if r.coefficients == "exact"]
-    wrong = [r for r in one if r.coefficients == "wrong"]
-    two = [r for r in rows if " + " in r.effect and not r.note]
-    none = [r for r in rows if r.effect == "none" and not r.note]
-
-    def first(some: Rows, *noise: str) -> str:
-        return share((r for r in some if r.separable and r.noise in noise), lambda r: r.right)
-
-    every = ("n1", "n4", "n10")
-    found = [
-        ("right effect first where separable, exact, n1 and n4", ">= 97 %", first(exact, "n1", "n4")),
-        ("the same, n10", ">= 93 %", first(exact, "n10")),
-        ("right effect first where separable, coefficients wrong", ">= 92 %", first(wrong, *every)),
-        ("right effect in the reported set, everywhere", ">= 97 %", share(one, lambda r: r.in_set)),
-        (
-            "the same, or nothing where changes of nominal coefficients could do the same",
-            "",
-            share(one, lambda r: r.in_set or (r.absorbed and not r.found)),
-        ),
-        ("median size of the reported set", "<= 3", _median(len(r.reported) for r in one if r.found)),
-    ]
-    for kind in ("exact", "wrong"):
-        some = [r for r in none if r.coefficients == kind]
-        found.append((f"false finding, {kind}", "<= 3 %", share(some, lambda r: bool(r.found))))
-    for noise, target in zip(every, ("50x", "20x", "10x"), strict=True):
-        some = [r for r in exact if r.noise == noise]
-        found.append(
-            (
-                f"held-out position error falls, exact, {noise}",
-                target,
-                fall(some),
-            )
-        )
-    found.append(("the same, wrong, all noises", "5x", fall(wrong)))
-    apart = [r for r in two if r.separable]
-    found.append(
-        ("two effects, both separable, found in 2 steps", ">= 85 %", share(apart, lambda r: r.right))
-    )
-    found.append(("two effects, all", "", share(two, lambda r: r.right)))
-    both = [r for r in one if r.separable and r.sindy]
-    found.append(("right effect first where separable: PySINDy", "", share(both, by("sindy"))))
-    found.append(("the same cells: PLS", "", share(both, by("pls"))))
-    found.append(("the same cells: the diagnosis", "", share(both, lambda r: r.right)))
-    found.append(("processor time of a cell to the answer (3 runs), median", "", _seconds(rows)))
-    if cost is not None:
-        found.append(("time of 4 runs x 240 s x 50 Hz", "<= 20 s", f"{cost.seconds:.1f} s"))
-        found.append(("memory, one hour at 100 Hz", "< 1 GB", f"{cost.megabytes:.0f} MB"))
-    return found
-
-
-def by(peer: str) -> Callable[[Row], bool]:
-    """Whether a peer's first effect is the right one."""
-    return lambda r: getattr(r, peer) in FOREIGN.get(r.effect, (r.effect,))
-
-
-def _median(numbers: Iterable[float]) -> str:
-    found = list(numbers)
-    return f"{median(found):g}" if found else "-"
-
-
-def _seconds(rows: Rows) -> str:
-    return _median(round(r.seconds, 1) for r in rows if r.seconds == r.seconds) + " s"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -142,6 +54,38 @@ def by_effect(rows: Rows) -> list[list[str]]:
     return found
 
 
+def several(rows: Rows) -> list[list[str]]:
+    """Cells with two effects or with foreign physics, line by line."""
+    some = [r for r in rows if r.kind in ("pair", "foreign") and not r.note]
+    return [
+        [
+            r.effect,
+            r.coefficients,
+            r.noise,
+            "yes" if r.separable else "no",
+            "yes" if r.right else "no" if r.kind == "pair" else "-",
+            ", ".join(f"{f} {c}" for f, c in zip(r.found, r.confidences, strict=True)) or "nothing",
+            r.verdict + {"1": ", remainder", "0": ", no remainder"}.get(r.remainder, ""),
+        ]
+        for r in sorted(some, key=lambda r: (r.kind, r.effect, r.coefficients, r.noise, r.seed))
+    ]
+
+
+def reliability(panels: dict[str, list[Bin]]) -> list[list[str]]:
+    """The bins of the diagram."""
+    return [
+        [
+            kind,
+            f"{b.confidence:.3f}",
+            f"{b.right}/{b.count}",
+            f"{b.low:.2f}-{b.high:.2f}",
+            "yes" if b.calibrated else "no",
+        ]
+        for kind, some in panels.items()
+        for b in some
+    ]
+
+
 def write(folder: Path, rows: Rows, cost: Cost | None) -> Path:
     """Write the summary.
 
@@ -162,6 +106,15 @@ def write(folder: Path, rows: Rows, cost: Cost | None) -> Path:
             ("hidden", "first where separable", "in the set", "held-out error falls", "first instead"),
             by_effect(rows),
         ),
+        "## Pairs and foreign physics\n",
+        table(
+            ("hidden", "coefficients", "noise", "separable", "right", "found", "verdict"), several(rows)
+        ),
+        "## Are confidences what they say?\n",
+        "Findings of cells that no calibration was fitted on, other seeds and other effects: how "
+        "often those of a confidence are true causes, with the binomial 95 % interval. "
+        "[Diagram](reliability.png)\n",
+        table(("cells", "confidence", "right", "interval", "within"), reliability(tables(rows))),
     ]
     if failed:
         parts += ["## Without a result\n", *(f"- {r.effect}, {r.noise}: {r.note}" for r in failed)]

@@ -14,16 +14,17 @@ from scipy.signal import lfilter
 
 from fmus.declare import packer, variables
 from fmus.effects import Running
+from fmus.frames import rotate_to_body
 from fmus.hull import Inertia, mass_matrix
 from fmus.signals import Force
-from fmus.thrusters import chain
+from fmus.thrusters import chain, thrusters
 from fmus.thrusters.allocation import Allocation, allocate
-from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 from fmus.vessel import vessel
 
+from .foreign_physics import WITH_FOREIGN, backlash, bias_by_place
 from .simulated_runs import HEADING, POSITION, STEP, Voyage
 
-VESSEL = vessel.COMPONENT
+VESSEL, THRUSTERS = vessel.make(WITH_FOREIGN), thrusters.make(WITH_FOREIGN)
 WINDOW, EVERY = 3.0, 0.5  # s, width of a window and from one to the next
 THIN = 5  # samples in a step for forces on the hull, which change slowly
 MASS = np.array(mass_matrix(Inertia()))
@@ -85,6 +86,8 @@ def behind(m: Motion, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """Pose, velocity and acceleration behind what a measurement with these effects gives."""
     clock = values.get("clock_offset", 0.0)
     eta, nu, nu_dot = (ahead(m.time, x, clock) for x in (m.eta, m.nu, m.nu_dot))
+    if "distortion" in values:
+        return _undistorted(m, values)
     turn = values.get("heading_offset", 0.0)
     dx, dy = values.get("marker_offset_dx", 0.0), values.get("marker_offset_dy", 0.0)
     x, y, psi = eta.T
@@ -98,6 +101,17 @@ def behind(m: Motion, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarra
         np.column_stack([u + r * dy, v - r * dx, r]),
         np.column_stack([u_dot + r_dot * dy, v_dot - r_dot * dx, r_dot]),
     )
+
+
+def _undistorted(m: Motion, values: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for an error that depends on the place, to first order in it."""
+    e = bias_by_place
+    bias = [values.get(v.name, v.start) for v in e.parameters]
+    eta = 2.0 * m.eta - np.column_stack(e(tuple(m.eta.T), *bias))
+    slope = np.gradient(eta, m.time, axis=0)
+    u, v = rotate_to_body(eta[:, 2], slope[:, 0], slope[:, 1])
+    nu = np.column_stack([u, v, slope[:, 2]])
+    return eta, nu, np.gradient(nu, m.time, axis=0)
 
 
 def turned(angle: float, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,12 +134,23 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
     shares = m.commanded
     if delay:
         shares = np.where((m.time >= delay)[:, None], held(m.time, shares, delay), 0.0)
-    now = Running._make([m.time, *nu.T, *shares.T, 0.0])
+    if "backlash" in values:
+        shares = followed(shares, values["backlash"])
+    now = Running(m.time, *nu.T, *shares.T)
     if lag:
         step = 1.0 - np.exp(-STEP / lag)
         shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)
     tau = chain.act(tuple(shares.T), now, THRUSTERS.prepared(p))
     return np.column_stack(np.broadcast_arrays(*tau))
+
+
+def followed(commands: np.ndarray, play: float) -> np.ndarray:
+    """Commands (n, 3) after a linkage with play."""
+    given, rows = (0.0, 0.0, 0.0), []
+    for row in commands.tolist():
+        given, _ = backlash(given, tuple(row), STEP, play)
+        rows.append(given)
+    return np.array(rows)
 
 
 def held(time: np.ndarray, x: np.ndarray, delay: float) -> np.ndarray:

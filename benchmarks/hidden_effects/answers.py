@@ -1,0 +1,94 @@
+"""What the diagnosis makes of a problem, in the keys of ``diagnosis.json``; scored elsewhere."""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from cosim import InputError, atomic_write
+from diagnosis import (
+    Integrals,
+    Model,
+    clean,
+    diagnose,
+    diagnosis_content,
+    evaluate_run,
+    integrals,
+    method,
+    smooth,
+)
+from diagnosis.progress import silent
+
+from .cells import Key
+from .problems import Problem, kept, slug
+
+PEERS = ("sindy", "pls")
+NOTHING_FOUND, FAILED = "nothing", "failed"  # in place of a peer's first effect
+# Parts of diagnosis.json that no score needs, and that are long.
+LEFT_OUT = ("where", "where_after", "data", "versions", "runs", "files")
+Answer = dict[str, Any]
+
+
+def answer(problem: Problem, peers: bool) -> Answer:
+    """What the diagnosis says of the measured runs of a problem; it gets nothing else.
+
+    Returns:
+        ``diagnosis.json`` without what no score needs; besides ``evidence``, what the confidence of each
+        finding is made of (None where the method has none), ``seconds`` of processor time from measured
+        runs to the answer, ``truth_mm``, the window position error of the true model on the run
+        held out (None where the diagnosis has none of its form), and ``peers``, what others find first.
+    """
+    if problem.note:
+        return {"note": problem.note}
+    begun = time.process_time()
+    *train, last = (integrals(smooth(clean(run))) for run in problem.runs)
+    try:
+        diagnosis = diagnose(train, [last], problem.prior)
+        content = diagnosis_content(diagnosis, None, []).model_dump(mode="json")
+    except InputError as error:
+        return {"note": str(error)}
+    seconds = time.process_time() - begun
+    found = {name: value for name, value in content.items() if name not in LEFT_OUT}
+    told = [getattr(f, "evidence", None) for f in diagnosis.learned.effects]
+    found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
+    found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
+    if peers and problem.hidden:
+        found["peers"] = {peer: first_effect(peer, train) for peer in PEERS}
+    return found
+
+
+def truth(problem: Problem, held_out: Integrals) -> float | None:
+    """Window position error [mm] of the true model; None where the diagnosis has none of its form."""
+    if problem.vessel is None or problem.thrusters is None:
+        return None
+    model = Model(problem.vessel, problem.thrusters, {"clock_offset": problem.clock})
+    return 1e3 * evaluate_run(held_out, model).before.position
+
+
+def first_effect(peer: str, data: Sequence[Integrals]) -> str:
+    """Id of the first effect that another method finds."""
+    chosen = method(peer)
+    try:
+        found = chosen.fit(data, Model(), 0.0, silent, 0).effects
+    except InputError:
+        return FAILED
+    return found[0].id if found else NOTHING_FOUND
+
+
+def judge(key: Key, problems: Path, answers: Path, peers: bool) -> Key:
+    """Let the diagnosis answer a problem, and keep the answer."""
+    found = answer(kept(key, problems), peers)
+    with atomic_write(path_of(key, answers)) as part:
+        part.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    return key
+
+
+def path_of(key: Key, answers: Path) -> Path:
+    """The file of an answer."""
+    return answers / f"{slug(key)}.json"
+
+
+def kept_answer(key: Key, answers: Path) -> Answer:
+    """An answer that was given before."""
+    return json.loads(path_of(key, answers).read_text(encoding="utf-8"))

@@ -1,0 +1,99 @@
+"""The score of a cell: what the diagnosis said, held against what was hidden."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fmus.effects import STANDARD
+
+from .answers import Answer
+from .draw import Draw
+from .problems import Problem
+from .results import Row
+from .separation import COEFFICIENTS, NOTHING
+
+# Coefficients whose change is the same as an effect that does not bear their name.
+SAME_AS = {
+    "mass": {"m", "I_z"},
+    "added_mass_X": {"X_udot"},
+    "added_mass_Y": {"Y_vdot"},
+    "added_mass_N": {"N_rdot"},
+    "loss_vsp": {"plant_F_vsp"},
+    "loss_bow": {"plant_F_bow"},
+}
+SMALL = 1e-6  # of a parameter that is told in the table
+
+
+def same_coefficients(effect: str) -> set[str]:
+    """Nominal coefficients whose change is the same as an effect."""
+    named = {STANDARD[effect].gives} if effect in STANDARD else set()
+    return SAME_AS.get(effect, set()) | named & set(COEFFICIENTS)
+
+
+def row(problem: Problem, answer: Answer) -> Row:
+    """A line of the table."""
+    hidden = problem.hidden
+    made = Row(
+        *problem.key,
+        values=" ".join(f"{n}={x:.4g}" for d in hidden for n, x in d.values.items() if abs(x) > SMALL),
+        size=" ".join(f"{d.size:.3f}" for d in hidden),
+        redrawn=problem.redrawn,
+        alike=sorted({e for each in problem.alike for e in each}),
+    )
+    if "note" in answer:
+        made.note = answer["note"]
+        return made
+    _told(made, answer)
+    causes = {e for d in hidden for e in d.right}
+    made.true = ["01"[e in causes] for e in made.found]
+    made.separable = bool(hidden) and not made.alike
+    made.absorbed = any(NOTHING in each for each in problem.alike)
+    made.right = bool(hidden) and _right(made, hidden, answer["verdict"])
+    made.in_set = any(set(d.right) & set(made.reported) for d in hidden)
+    made.intervals, made.covered = _coverage(answer["effects"], hidden)
+    return made
+
+
+def _told(made: Row, answer: Answer) -> None:
+    """What the diagnosis says, in its own keys; keys that it does not have stay empty."""
+    effects = answer["effects"]
+    made.verdict = answer["verdict"]
+    made.found = [e["id"] for e in effects]
+    sure = [e["confidence"] for e in effects]
+    made.confidences = [f"{0.0 if c is None else c:.4g}" for c in sure]
+    told = answer.get("evidence", [None] * len(effects))
+    made.evidence = ["" if e is None else " ".join(f"{x:.5g}" for x in e) for e in told]
+    made.reported = [effects[0]["id"], *effects[0]["indistinguishable"]] if effects else []
+    made.suspects = [s["name"] for s in answer["suspect_coefficients"]]
+    made.withdrawn = [w["id"] for w in answer.get("withdrawn", [])]
+    remainder = answer.get("remainder")
+    made.remainder = "" if remainder is None else "01"[bool(remainder["significant"])]
+    held_out = next(e for e in answer["errors"] if e["held_out"])["window_position_rmse"]
+    made.before_mm, made.after_mm = 1e3 * held_out["before"], 1e3 * held_out["after"]
+    if answer["truth_mm"] is not None:
+        made.truth_mm = answer["truth_mm"]
+    made.seconds = answer["seconds"]
+    peers = answer.get("peers", {})
+    made.sindy, made.pls = peers.get("sindy", ""), peers.get("pls", "")
+
+
+def _right(made: Row, hidden: Sequence[Draw], verdict: str) -> bool:
+    """Whether all that was hidden was found in as many steps, or a single one as its coefficient."""
+    first = made.found[: len(hidden)]
+    if all(set(d.right) & set(first) for d in hidden):
+        return True
+    told = verdict == "coefficients" and len(hidden) == 1
+    return told and bool(same_coefficients(hidden[0].effect) & set(made.suspects))
+
+
+def _coverage(effects: Sequence[dict[str, Any]], hidden: Sequence[Draw]) -> tuple[int, int]:
+    """How many intervals right findings have of parameters that were set, and how many hold them."""
+    true = {(d.effect, name): x for d in hidden for name, x in d.values.items()}
+    inside = [
+        low <= true[e["id"], name] <= high
+        for e in effects
+        for name, c in e["coefficients"].items()
+        if (e["id"], name) in true and c["ci95"] is not None
+        for low, high in (c["ci95"],)
+        if low is not None and high is not None
+    ]
+    return len(inside), sum(inside)
