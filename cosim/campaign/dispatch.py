@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterable
 from contextlib import suppress
+from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -93,8 +94,8 @@ _making = threading.Lock()
 
 def _run(request: Request) -> list[Row]:
     """A task on a worker."""
-    if request.version != _version():
-        raise InputError(f"a worker has cybership {_version()}, and here it is {request.version}")
+    if request.version != (own := version("cybership")):
+        raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
     folder = _folder(get_worker())
     with _making:
         work = _workplaces.setdefault(folder, Workplace(folder))
@@ -105,12 +106,6 @@ def _run(request: Request) -> list[Row]:
             raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
         time.sleep(LOOK)
     return [work.run(content, request.keep_log) for content in request.contents]
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("cybership")
 
 
 def _rows_of(future: Future) -> list[Row] | None:
@@ -144,7 +139,7 @@ class DaskWorkers:
     """
 
     def __init__(self, files: Files, keep_log: bool, address: str | None, workers: int | None) -> None:
-        self._files, self._keep_log, self._address = files, keep_log, address
+        self._files, self._keep_log = files, keep_log
         self._cluster: LocalCluster | None = None
         self._scratch = TemporaryDirectory(prefix="campaign_")
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -233,7 +228,7 @@ class DaskWorkers:
             tuple(names),
             frozenset(self._files.resettable),
             self._keep_log,
-            _version(),
+            version("cybership"),
         )
         return self._client.submit(_run, request, pure=False)
 
