@@ -10,6 +10,7 @@ from support.planted import bank, dead_bow, gusts, voyages
 import diagnosis
 from diagnosis import Model, Run, integrals, omega
 from diagnosis.assessment.recurrence import recurrence
+from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import axis_remainders
 from diagnosis.identification.acceptance import worse
 from diagnosis.identification.confidence import confidence, evidence
@@ -72,6 +73,14 @@ def test_remainder_repeats_with_what_it_was_made_of(lap, space):
     assert how.best == space
     assert not how.in_part
     assert how.lasts > 2.0
+
+
+def test_error_that_is_large_in_one_part_of_the_basin_is_said_to_be_there(lap):
+    (w,) = lap
+    noise = 0.01 * np.random.default_rng(2).standard_normal((w.middle.size, 3))
+    north = w.smooth @ np.nan_to_num(w.smoothed.eta[:, 0])
+    found = find_regions(lap, [np.where(north > 1.0, 8.0, 1.0)[:, None] * noise], [0.2 * np.abs(noise)])
+    assert all("worst north of 0.9" in sentence for sentence in found.sentences)
 
 
 def test_force_that_depends_on_the_place_is_a_remainder():
