@@ -1,4 +1,4 @@
-"""Covariates of the model error: time, place, speed, yaw rate, thruster level, heading of each window."""
+"""Covariates of the model error: time, place, speed, yaw rate, thruster level and heading of windows."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
