@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError, nearest
 from ..results.performance import METRICS
 from .design import Case
-from .single_run import Row
+from .job import Row
 
 if TYPE_CHECKING:
     import pandas

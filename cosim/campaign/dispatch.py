@@ -29,8 +29,8 @@ from distributed import (
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
-from .case_scenarios import Job
-from .single_run import Row, Workplace
+from .job import Job, Row, Task
+from .single_run import Workplace
 from .travelling_files import Files, put
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
@@ -53,17 +53,15 @@ class Request(NamedTuple):
     """What a task of Dask gets.
 
     Attributes:
-        contents: scenarios with files named by their contents.
+        runs: scenarios with files named by their contents, each with what makes it.
         files: those names.
         resettable: SHA-256 of the FMUs that may be reset.
-        keep_log: whether the logs come back.
         version: of the package, without which equal numbers are not certain.
     """
 
-    contents: list[dict[str, Any]]
+    runs: list[tuple[dict[str, Any], Task]]
     files: tuple[str, ...]
     resettable: frozenset[str]
-    keep_log: bool
     version: str
 
 
@@ -105,7 +103,7 @@ def _run(request: Request) -> list[Row]:
         if time.monotonic() > until:
             raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
         time.sleep(LOOK)
-    return [work.run(content, request.keep_log) for content in request.contents]
+    return [work.run(content, task) for content, task in request.runs]
 
 
 def _rows_of(future: Future) -> list[Row] | None:
@@ -130,7 +128,6 @@ class DaskWorkers:
 
     Args:
         files: what the runs need; each is sent once to each worker.
-        keep_log: whether the logs come back.
         address: of a scheduler; None starts one with workers on this computer.
         workers: how many, without an address; None is one for each core.
 
@@ -138,8 +135,8 @@ class DaskWorkers:
         InputError: no scheduler answers at the address.
     """
 
-    def __init__(self, files: Files, keep_log: bool, address: str | None, workers: int | None) -> None:
-        self._files, self._keep_log = files, keep_log
+    def __init__(self, files: Files, address: str | None, workers: int | None) -> None:
+        self._files = files
         self._cluster: LocalCluster | None = None
         self._scratch = TemporaryDirectory(prefix="campaign_")
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -224,10 +221,9 @@ class DaskWorkers:
         for name in names:
             self._send(name)
         request = Request(
-            [job.content for job in batch],
+            [(job.content, job.task) for job in batch],
             tuple(names),
             frozenset(self._files.resettable),
-            self._keep_log,
             version("cybership"),
         )
         return self._client.submit(_run, request, pure=False)

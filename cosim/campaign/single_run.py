@@ -1,44 +1,18 @@
-"""Runs of a campaign in one process: in memory, or with a log, on FMUs that stay loaded."""
+"""Runs one after the other in one process, on FMUs that stay loaded."""
 
 import os
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from ..errors import InputError, SimulationError
-from ..master.algorithm import Master
-from ..master.loop_surroundings import interruptible, quiet_collector
-from ..master.recorder import Recorder
-from ..master.simulation import simulate
-from ..process.run_state import STATE
-from ..results import performance
 from ..scenario.load import load_scenario
-from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
-from ..system.preparation import prepare
-from .case_scenarios import Job
+from .job import Job, Row, Task
 from .travelling_files import Files, copy_all
-
-
-class Row(NamedTuple):
-    """What the table keeps of a run.
-
-    Attributes:
-        status: ``done``, ``failed``, or ``lost`` where it is not the run that failed, but what ran it.
-        message: why it failed, or why there are no metrics; else empty.
-        wall_s: how long it took [s].
-        metrics: as in metrics.json; empty if there are none.
-        log: name -> content of the files of its result folder, where those are kept.
-    """
-
-    status: str
-    message: str
-    wall_s: float
-    metrics: dict[str, float]
-    log: dict[str, bytes]
 
 
 class Workplace:
@@ -54,7 +28,7 @@ class Workplace:
         # FMUs of one process share its working directory, modules and signals.
         self._alone = threading.Lock()
 
-    def run(self, content: dict[str, Any], keep_log: bool) -> Row:
+    def run(self, content: dict[str, Any], task: Task) -> Row:
         """Run a scenario whose FMUs and tables are in the folder.
 
         Raises:
@@ -65,71 +39,19 @@ class Workplace:
             scenario = load_scenario(content)
             scenario.set_origin(self.folder)
             try:
-                row = self._logged(scenario) if keep_log else self._measured(scenario)
+                row = task(self.pool, scenario)
             except (InputError, SimulationError) as error:
-                row = Row("failed", str(error), 0.0, {}, {})
+                row = Row("failed", str(error), 0.0, {}, {}, error)
             except Exception as error:  # of this computer, as a full disk, or of this program
-                row = Row("lost", repr(error), 0.0, {}, {})
+                row = Row("lost", repr(error), 0.0, {}, {}, error)
             finally:
                 os.chdir(here)
             return row._replace(wall_s=time.perf_counter() - started)
-
-    def _measured(self, scenario: Scenario) -> Row:
-        """A run of which nothing is kept but its metrics."""
-        system = prepare(scenario, models=self.pool.models(scenario))
-        with interruptible() as interrupted, quiet_collector():
-            master = Master(system, lambda _: None, interrupted, self.pool)
-            try:
-                recorder = Recorder(system, master, None)
-                _step(master, recorder, interrupted)
-            except SimulationError:
-                _leave_if(interrupted)
-                raise
-            finally:
-                STATE.calls_nothing()
-                master.close()
-        window = scenario.metrics
-        try:
-            found = performance.compute(recorder.kept(), window.start, window.stop, scenario.roles)
-        except performance.MetricsError as error:
-            return Row("done", f"no metrics: {error}", 0.0, {}, {})
-        return Row("done", "", 0.0, found, {})
-
-    def _logged(self, scenario: Scenario) -> Row:
-        """A run with all files that ``cosim.run`` writes but pictures."""
-        notes: list[str] = []
-        with TemporaryDirectory(prefix="campaign_") as scratch:
-            result = simulate(scenario, scratch, show=notes.append, pool=self.pool)
-            if result.status == "interrupted":
-                raise KeyboardInterrupt
-            log = {file.name: file.read_bytes() for file in Path(scratch).iterdir()}
-        message = result.message
-        if result.status == "done" and not result.metrics:
-            message = next((n.removeprefix("note: ") for n in notes if "no metrics" in n), "")
-        return Row(result.status, message, 0.0, result.metrics if result.status == "done" else {}, log)
 
     def close(self) -> None:
         """Free the FMUs."""
         with self._alone:
             self.pool.close()
-
-
-def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:
-    """Run to the end, looking for an interrupt after each step."""
-    take = recorder.take
-    take(0.0)
-    for t in master.run():
-        if take(t):
-            recorder.flush()
-        if interrupted():
-            raise KeyboardInterrupt
-    recorder.flush()
-
-
-def _leave_if(interrupted: Callable[[], bool]) -> None:
-    """An FMU may report the interrupt as an error of its own."""
-    if interrupted():
-        raise KeyboardInterrupt
 
 
 class Place(Protocol):
@@ -147,8 +69,8 @@ class Place(Protocol):
 class ThisProcess:
     """Runs one after the other in this process."""
 
-    def __init__(self, files: Files, keep_log: bool) -> None:
-        self._files, self._keep_log = files, keep_log
+    def __init__(self, files: Files) -> None:
+        self._files = files
         self._scratch = TemporaryDirectory(prefix="campaign_")
         self._work = Workplace(Path(self._scratch.name))
 
@@ -156,8 +78,26 @@ class ThisProcess:
         for job in jobs:
             copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
             self._work.pool.resettable |= self._files.resettable
-            yield job, self._work.run(job.content, self._keep_log)
+            yield job, self._work.run(job.content, job.task)
 
     def close(self) -> None:
         self._work.close()
         self._scratch.cleanup()
+
+
+def place_for(files: Files, scheduler: str | None, workers: int | None) -> Place:
+    """Where the runs of a campaign are made.
+
+    Args:
+        files: what they need.
+        scheduler: address of a Dask scheduler; None is this computer.
+        workers: processes on this computer; None is one for each core, 0 is this process.
+
+    Raises:
+        InputError: no scheduler answers at the address.
+    """
+    if workers == 0 and scheduler is None:
+        return ThisProcess(files)
+    from .dispatch import DaskWorkers  # Dask takes a second to import
+
+    return DaskWorkers(files, scheduler, workers)
