@@ -161,9 +161,9 @@ def test_finished_runs_are_not_made_again(base, monkeypatch):
     journal.write_bytes(lines[0] + lines[1][:40])  # killed while it wrote the second row
     axes["m"]["values"].append(16.0)
     made = []
-    original = cosim.campaign.single_run.Workplace.run
+    original = cosim.dispatch.workplace.Workplace.run
     monkeypatch.setattr(
-        "cosim.campaign.single_run.Workplace.run",
+        "cosim.dispatch.workplace.Workplace.run",
         lambda self, content, keep: made.append(content) or original(self, content, keep),
     )
     second = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
@@ -175,7 +175,7 @@ def test_finished_runs_are_not_made_again(base, monkeypatch):
 
 
 def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
-    original, made = cosim.campaign.single_run.Workplace.run, []
+    original, made = cosim.dispatch.workplace.Workplace.run, []
 
     def run(self, content, keep):
         if len(made) == 2:
@@ -183,7 +183,7 @@ def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
         made.append(content)
         return original(self, content, keep)
 
-    monkeypatch.setattr("cosim.campaign.single_run.Workplace.run", run)
+    monkeypatch.setattr("cosim.dispatch.workplace.Workplace.run", run)
     path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0, 15.0, 16.0]}})
     with pytest.raises(KeyboardInterrupt):
         main([str(path), "--workers", "0", "--out", str(base / "out")])

@@ -3,14 +3,14 @@
 import json
 from typing import Any
 
+from ..dispatch.job import Job, Task, job_of
+from ..dispatch.travelling_files import Files
 from ..errors import InputError
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..system.preparation import prepare
 from .campaign_file import LoadedCampaign
 from .design import Case
-from .job import Job, Task, job_of
-from .travelling_files import Files
 
 # Values of an axis that are all tried before anything runs; chosen: of longer axes, which hold seeds or
 # drawn numbers, the smallest and largest tell whether all are allowed.

@@ -18,6 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
+from ..dispatch.job import Job, Row
+from ..dispatch.measured_run import Measured
+from ..dispatch.places import Place, place_for
+from ..dispatch.travelling_files import Files
 from ..errors import InputError
 from ..files import write_json
 from ..process.scratch import sweep
@@ -25,11 +29,7 @@ from .campaign_file import LoadedCampaign
 from .case_scenarios import CaseScenarios
 from .comparison import StopRule
 from .design import Case, cases
-from .job import Job, Row
-from .measured_run import Measured
 from .run_table import Journal, keep_log, table, write_table
-from .single_run import Place, place_for
-from .travelling_files import Files
 
 if TYPE_CHECKING:
     import pandas

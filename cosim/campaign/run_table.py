@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..dispatch.job import Row
 from ..errors import InputError
 from ..files import atomic_write, write_all
 from ..results.performance import METRICS
 from .design import Case
-from .job import Row
 
 if TYPE_CHECKING:
     import pandas

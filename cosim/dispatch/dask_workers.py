@@ -1,4 +1,4 @@
-"""The runs of a campaign on the workers of a Dask scheduler, on this computer or elsewhere."""
+"""Runs on the workers of a Dask scheduler, on this computer or elsewhere."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from distributed import (
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
 from .job import Job, Row, Task
-from .single_run import Workplace
 from .travelling_files import Files, put
+from .workplace import Workplace
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
 # percent of it; chosen: little is lost with a worker.
