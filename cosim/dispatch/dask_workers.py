@@ -5,33 +5,28 @@ from __future__ import annotations
 import logging
 import os
 import statistics
-import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable
 from contextlib import suppress
 from importlib.metadata import version
 from itertools import islice
-from pathlib import Path
+from queue import Empty, Queue
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 from distributed import (
     Client,
     Future,
     KilledWorker,
     LocalCluster,
-    Worker,
-    WorkerPlugin,
-    as_completed,
-    get_worker,
 )
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
-from .job import Job, Row, Task
-from .travelling_files import Files, put
-from .workplace import Workplace
+from .dask_task import OneFile, Request, run_on_worker
+from .job import Job, Row
+from .travelling_files import Files
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
 # percent of it; chosen: little is lost with a worker.
@@ -40,70 +35,14 @@ TASK_TIME = 1.0
 MOST_IN_TASK = 64
 # Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
 AHEAD = 2
-# Wall time that a worker waits for a file [s], of which it gets all when it starts; between two looks.
-PATIENCE, LOOK = 60.0, 0.05
 # Wall time until a scheduler has to answer [s]; chosen.
 ANSWER = 10.0
+# Wall time for which there may be no worker [s]: one that died here is back within seconds, elsewhere
+# somebody may still start some. Between two looks.
+WITHOUT_WORKERS, GLANCE = 120.0, 1.0
 # How often the workers of a task may die here before it is suspected; chosen: once by chance.
 DEATHS = 1
-FOLDER = "cybership"  # below a worker's own folder
-
-
-class Request(NamedTuple):
-    """What a task of Dask gets.
-
-    Attributes:
-        runs: scenarios with files named by their contents, each with what makes it.
-        files: those names.
-        resettable: SHA-256 of the FMUs that may be reset.
-        version: of the package, without which equal numbers are not certain.
-    """
-
-    runs: list[tuple[dict[str, Any], Task]]
-    files: tuple[str, ...]
-    resettable: frozenset[str]
-    version: str
-
-
-class OneFile(WorkerPlugin):
-    """A file on every worker, also on those that start later.
-
-    Args:
-        file: its name by content.
-        content: of the file.
-    """
-
-    def __init__(self, file: str, content: bytes) -> None:
-        self.name = f"cybership-{file}"
-        self._file, self._content = file, content
-
-    def setup(self, worker: Worker) -> None:
-        put(_folder(worker), self._file, self._content)
-
-
-def _folder(worker: Worker) -> Path:
-    return Path(worker.local_directory) / FOLDER
-
-
-# The workplace of this process, if it is that of a worker.
-_workplaces: dict[Path, Workplace] = {}
-_making = threading.Lock()
-
-
-def _run(request: Request) -> list[Row]:
-    """A task on a worker."""
-    if request.version != (own := version("cybership")):
-        raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
-    folder = _folder(get_worker())
-    with _making:
-        work = _workplaces.setdefault(folder, Workplace(folder))
-    work.pool.resettable |= request.resettable
-    until = time.monotonic() + PATIENCE
-    while missing := [name for name in request.files if not (folder / name).is_file()]:
-        if time.monotonic() > until:
-            raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
-        time.sleep(LOOK)
-    return [work.run(content, task) for content, task in request.runs]
+LOST, KEPT = "the workers were lost", "finished runs are kept"
 
 
 def _rows_of(future: Future) -> list[Row] | None:
@@ -120,7 +59,7 @@ def _rows_of(future: Future) -> list[Row] | None:
     except InputError:
         raise
     except Exception as error:
-        raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+        raise SimulationError(f"{LOST}: {error!r}; {KEPT}") from error
 
 
 class DaskWorkers:
@@ -139,7 +78,8 @@ class DaskWorkers:
         self._files = files
         self._cluster: LocalCluster | None = None
         self._scratch = TemporaryDirectory(prefix="campaign_")
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
+            logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
             if address is None:
                 # A Ctrl-C is for this process alone; the workers end with it.
@@ -173,12 +113,12 @@ class DaskWorkers:
         # the end, each alone, to find the one that ends its process.
         suspects: deque[Job] = deque()
         running: dict[Any, tuple[Future, list[Job], bool]] = {}
-        ended = as_completed(loop=self._client.loop)
+        ended: Queue[Future] = Queue()
 
         def start(batch: list[Job], alone: bool) -> None:
             future = self._submit(batch)
             running[future.key] = future, batch, alone
-            ended.add(future)
+            future.add_done_callback(ended.put)
 
         def fill() -> None:
             while len(running) < AHEAD * max(1, self._threads()):
@@ -191,7 +131,7 @@ class DaskWorkers:
         try:
             fill()
             while running:
-                future = next(ended)
+                future = self._next(ended)
                 _, batch, alone = running.pop(future.key)
                 found = _rows_of(future)
                 if found is None and not alone:
@@ -202,8 +142,28 @@ class DaskWorkers:
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()
+        except OSError as error:
+            raise SimulationError(f"{LOST}: {error}; {KEPT}") from None
         finally:
-            self._client.cancel([future for future, *_ in running.values()])
+            with suppress(OSError):
+                self._client.cancel([future for future, *_ in running.values()])
+
+    def _next(self, ended: Queue[Future]) -> Future:
+        """The next task that ends.
+
+        Raises:
+            SimulationError: there is no worker, and none comes.
+        """
+        seen = time.monotonic()
+        while True:
+            try:
+                return ended.get(timeout=GLANCE)
+            except Empty:
+                now = time.monotonic()
+            if self._threads():
+                seen = now
+            elif now - seen > WITHOUT_WORKERS:
+                raise SimulationError(f"there was no worker for {WITHOUT_WORKERS:g} s; {KEPT}")
 
     def _threads(self) -> int:
         """Threads of all workers."""
@@ -226,7 +186,7 @@ class DaskWorkers:
             frozenset(self._files.resettable),
             version("cybership"),
         )
-        return self._client.submit(_run, request, pure=False)
+        return self._client.submit(run_on_worker, request, pure=False)
 
     def _send(self, name: str) -> None:
         """Have a file on all workers, unless the scheduler has sent it before."""
