@@ -73,11 +73,14 @@ class Analysed:
 
     def __call__(self, pool: InstancePool, scenario: Scenario) -> Row:
         run = FinishedRun(self.content, self.folder)
-        if self.folder is None:
-            _in_memory(pool, scenario, run)
-        else:
-            _in_folder(pool, scenario, run, self.folder)
-        return Row("done", "", 0.0, {}, {}, self.analyse(run))
+        try:
+            if self.folder is None:
+                _in_memory(pool, scenario, run)
+            else:
+                _in_folder(pool, scenario, run, self.folder)
+            return Row("done", "", 0.0, {}, {}, self.analyse(run))
+        except Exception as error:  # told where the runs were asked for
+            return Row("failed", str(error), 0.0, {}, {}, error)
 
 
 def _in_memory(pool: InstancePool, scenario: Scenario, run: FinishedRun) -> None:
@@ -154,7 +157,7 @@ def _make(
     found: dict[Job, Any] = {}
     with closing(place_for(files, None, workers)) as place, closing(place.rows(jobs)) as rows:
         for job, row in rows:
-            if isinstance(row.value, Exception) and row.status != "done":
+            if row.status == "failed" and row.value is not None:
                 raise row.value
             if row.status != "done":
                 raise SimulationError(row.message)

@@ -38,9 +38,9 @@ class Workplace:
             try:
                 row = task(self.pool, scenario)
             except (InputError, SimulationError) as error:
-                row = Row("failed", str(error), 0.0, {}, {}, error)
+                row = Row("failed", str(error), 0.0, {}, {})
             except Exception as error:  # of this computer, as a full disk, or of this program
-                row = Row("lost", repr(error), 0.0, {}, {}, error)
+                row = Row("lost", repr(error), 0.0, {}, {})
             finally:
                 os.chdir(here)
             return row._replace(wall_s=time.perf_counter() - started)
