@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from distributed import Worker, WorkerPlugin, get_worker
 
 from ..errors import InputError, SimulationError
-from .job import Row, Task
+from .job import Row, Task, own_version
 from .travelling_files import put
 from .workplace import Workplace
 
@@ -63,7 +62,7 @@ _making = threading.Lock()
 
 def run_on_worker(request: Request) -> list[Row]:
     """A task on a worker."""
-    if request.version != (own := version("cybership")):
+    if request.version != (own := own_version()):
         raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
     folder = _folder(get_worker())
     with _making:

@@ -9,7 +9,6 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterable
 from contextlib import suppress
-from importlib.metadata import version
 from itertools import islice
 from queue import Empty, Queue
 from tempfile import TemporaryDirectory
@@ -25,7 +24,7 @@ from distributed import (
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
 from .dask_task import OneFile, Request, run_on_worker
-from .job import Job, Row
+from .job import Job, Row, own_version
 from .travelling_files import Files
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
@@ -89,11 +88,11 @@ class DaskWorkers:
                         threads_per_worker=1,  # FMUs of one process cannot run side by side
                         processes=True,
                         host="127.0.0.1",
-                        dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                        dashboard_address="127.0.0.1:0",  # where Dask tells of its health
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
                         local_directory=self._scratch.name,
                         silence_logs=logging.CRITICAL,
-                        scheduler_kwargs={"allowed_failures": DEATHS},
+                        scheduler_kwargs={"allowed_failures": DEATHS, "dashboard": False},
                     )
                     self._client = Client(self._cluster, set_as_default=False)
             else:
@@ -184,7 +183,7 @@ class DaskWorkers:
             [(job.content, job.task) for job in batch],
             tuple(names),
             frozenset(self._files.resettable),
-            version("cybership"),
+            own_version(),
         )
         return self._client.submit(run_on_worker, request, pure=False)
 

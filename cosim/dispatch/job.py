@@ -1,9 +1,10 @@
 """One run as it travels to whoever makes it, and what comes back."""
 
 import hashlib
-import importlib.metadata
 import json
 from collections.abc import Callable, Iterable
+from functools import cache
+from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from ..scenario.schema import Scenario
@@ -38,6 +39,12 @@ class Row(NamedTuple):
 Task = Callable[[InstancePool, Scenario], Row]
 
 
+@cache
+def own_version() -> str:
+    """The version of this package, which takes a while to find."""
+    return version("cybership")
+
+
 class Job:
     """One run.
 
@@ -55,7 +62,7 @@ class Job:
         self.files = tuple(files)
         self.task = task
         counted = {key: value for key, value in content.items() if key not in WITHOUT_EFFECT}
-        text = json.dumps([counted, importlib.metadata.version("cybership")], sort_keys=True)
+        text = json.dumps([counted, own_version()], sort_keys=True)
         self.hash = hashlib.sha256(text.encode()).hexdigest()
 
 
