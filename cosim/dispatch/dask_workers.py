@@ -12,6 +12,7 @@ from contextlib import suppress
 from itertools import islice
 from queue import Empty, Queue
 from tempfile import TemporaryDirectory
+from threading import Thread
 from typing import Any
 
 from distributed import (
@@ -105,6 +106,7 @@ class DaskWorkers:
             self._close_cluster()
             raise
         self._walls: deque[float] = deque(maxlen=20)
+        self._sent: set[str] = set()
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         waiting = iter(jobs)
@@ -188,14 +190,22 @@ class DaskWorkers:
         return self._client.submit(run_on_worker, request, pure=False)
 
     def _send(self, name: str) -> None:
-        """Have a file on all workers, unless the scheduler has sent it before."""
-        if self._client.get_metadata(["cybership", name], False):
-            return
-        file = OneFile(name, self._files.paths[name].read_bytes())
-        # A worker that dies meanwhile is no reason to end: the scheduler keeps what later ones get.
-        with suppress(OSError):
-            self._client.register_plugin(file)
-        self._client.set_metadata(["cybership", name], True)
+        """Have a file on all workers, unless it was sent before.
+
+        Beside the rest, and without waiting: for a worker that has just died the scheduler tries half a
+        minute, in which the others have the file and work.
+        """
+        if name not in self._sent:
+            self._sent.add(name)
+            Thread(target=self._deliver, args=(name,), daemon=True).start()
+
+    def _deliver(self, name: str) -> None:
+        key = ["cybership", name]
+        # Where this fails, the scheduler is gone, or keeps what workers get that start later.
+        with suppress(OSError, RuntimeError):
+            if not self._client.get_metadata(key, False):
+                self._client.register_plugin(OneFile(name, self._files.paths[name].read_bytes()))
+                self._client.set_metadata(key, True)
 
     def close(self) -> None:
         self._client.close()
