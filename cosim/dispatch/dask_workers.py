@@ -77,7 +77,7 @@ class DaskWorkers:
     def __init__(self, files: Files, address: str | None, workers: int | None) -> None:
         self._files = files
         self._cluster: LocalCluster | None = None
-        self._scratch = TemporaryDirectory(prefix="campaign_")
+        self._scratch = TemporaryDirectory(prefix="campaign_", ignore_cleanup_errors=True)
         for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
             logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
@@ -208,10 +208,12 @@ class DaskWorkers:
                 self._client.set_metadata(key, True)
 
     def close(self) -> None:
-        self._client.close()
+        with suppress(OSError):  # on a computer that is busy Dask gives up waiting; all has ended then
+            self._client.close()
         self._close_cluster()
 
     def _close_cluster(self) -> None:
         if self._cluster is not None:
-            self._cluster.close()
+            with suppress(OSError):
+                self._cluster.close()
         self._scratch.cleanup()

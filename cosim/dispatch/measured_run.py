@@ -66,7 +66,7 @@ def run_in_memory(
     with interruptible() as interrupted:
         master = Master(system, lambda _: None, interrupted, pool)
         try:
-            recorder = Recorder(system, master, log)
+            recorder = Recorder(system, master, None, log)
             _step(master, recorder, interrupted)
         finally:
             STATE.calls_nothing()

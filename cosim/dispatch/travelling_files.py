@@ -40,7 +40,7 @@ class Files:
         """
         notes: list[str] = []
         for native in (False, True):
-            alike = [s for s in scenarios if s.native == native]
+            alike = [s for s in scenarios if bool(s.native) == native]
             entries = {e.path: e for s in alike for e in s.fmus.values()}
             new = {path: e for path, e in entries.items() if (path, native) not in self._models}
             if new:
@@ -58,11 +58,11 @@ class Files:
 
     def models(self, scenario: Scenario) -> dict[str, Model]:
         """The FMU of each instance; :meth:`read` has read them."""
-        return {name: self._models[e.path, scenario.native] for name, e in scenario.fmus.items()}
+        return {name: self._models[e.path, bool(scenario.native)] for name, e in scenario.fmus.items()}
 
     def fmu(self, scenario: Scenario, instance: str) -> str:
         """The name by content of the FMU of an instance; :meth:`read` has read it."""
-        return f"{self._models[scenario.fmus[instance].path, scenario.native].sha256}.fmu"
+        return f"{self._models[scenario.fmus[instance].path, bool(scenario.native)].sha256}.fmu"
 
     def table(self, folder: Path, path: str) -> str:
         """The name by content of a table.

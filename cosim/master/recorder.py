@@ -1,11 +1,12 @@
 """Recording of the value table after every step."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from ..errors import SimulationError
-from ..results.log import LogInMemory, LogWriter
+from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
 from ..results.performance import needed
 from ..system.system import System
@@ -19,17 +20,19 @@ class Recorder:
     Args:
         system: what runs.
         master: its master.
-        writer: gets the log; None if there is none.
+        folder: for the log; None writes none.
+        memory: gets the log in place of a folder.
 
     Attributes:
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
     def __init__(
-        self, system: System, master: Master, writer: LogWriter | LogInMemory | None = None
+        self, system: System, master: Master, folder: Path | None, memory: LogInMemory | None = None
     ) -> None:
+        self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = writer
+        self._writer = memory if folder is None else LogWriter(folder / CSV, self.columns)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
@@ -57,10 +60,8 @@ class Recorder:
         """
         times, taken = self._pending.all()
         message = ""
-        # A sum is finite only if all its terms are.
-        with np.errstate(invalid="ignore", over="ignore"):
-            suspect = not np.isfinite(taken.sum(axis=0)[self._outputs]).all()
-        if suspect and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
+        # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
+        if not np.isfinite(taken).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
             k = int(np.argmax(wrong.any(axis=1)))
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"

@@ -160,8 +160,7 @@ def _record(
     result = Result("running", folder, warnings=system.warnings)
     try:
         write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
-        writer = logs.LogWriter(folder / logs.CSV, ["time", *system.logged])
-        recorder = Recorder(system, master, writer)
+        recorder = Recorder(system, master, folder)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     STATE.numbers[LOGGING] = 1
