@@ -78,7 +78,7 @@ def seeds_of(condition: str, seeds: Sequence[int]) -> Sequence[int]:
     return seeds if condition in SENSES else seeds[:3]
 
 
-def run(seeds: Sequence[int], seconds: float | None, jobs: int | None) -> dict[str, Table]:
+def run(seeds: Sequence[int], seconds: float | None, jobs: int | None) -> Mapping[str, Table]:
     """Path -> condition -> controller -> outcomes by seed."""
     todo = {
         (path, condition, controller): content
