@@ -26,6 +26,7 @@ COSIM_LAYERS = (
     ("system",),
     ("results",),
     ("master", "watch"),
+    ("dispatch",),
     ("export", "campaign"),
     ("run", "metrics", "plots", "interface"),  # commands
 )
@@ -65,6 +66,7 @@ PUBLIC = (
     "cosim",
     "cosim.campaign",
     "cosim.command",
+    "cosim.dispatch",
     "cosim.errors",
     "cosim.export",
     "cosim.fmu",

@@ -105,6 +105,39 @@ class LogWriter:
             self._file.close()
 
 
+class LogInMemory:
+    """A log that is kept in memory, in place of a file.
+
+    Args:
+        columns: names, ``time`` first.
+
+    Attributes:
+        rows: number of rows so far.
+    """
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        self.rows = 0
+        self._names = list(columns)
+        self._blocks: list[np.ndarray] = []
+
+    def write(self, block: np.ndarray) -> None:
+        """Append rows.
+
+        Args:
+            block: (rows, columns); is kept, so that the caller must not change it afterwards.
+        """
+        self._blocks.append(block)
+        self.rows += len(block)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def read(self) -> dict[str, np.ndarray]:
+        """What :func:`read_log` reads from the file of the same run, to the bit."""
+        table = np.concatenate(self._blocks) if self._blocks else np.empty((0, len(self._names)))
+        return {name: table[:, k] for k, name in enumerate(self._names)}
+
+
 def format_rows(block: np.ndarray) -> list[bytes]:
     """Rows of a log as text, without the ends of lines.
 
