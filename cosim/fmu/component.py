@@ -208,15 +208,19 @@ class Component:
             why = f": {self.complaint}" if self.complaint else ""
             raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{note}{why}")
 
-    def function(self, name: str) -> Callable[..., int]:
-        """An FMI function of the library; its arguments must be ctypes values."""
-        kind = ctypes.PYFUNCTYPE if self.is_python else ctypes.CFUNCTYPE
+    def address(self, name: str) -> int:
+        """Address of an FMI function of the library."""
         try:
             address = ctypes.cast(getattr(self.slave.dll, name), ctypes.c_void_p).value
         except AttributeError:
             raise InputError(f"'{self.model.path}' does not export {name}") from None
         assert address is not None
-        return kind(ctypes.c_int)(address)
+        return address
+
+    def function(self, name: str) -> Callable[..., int]:
+        """An FMI function of the library; its arguments must be ctypes values."""
+        kind = ctypes.PYFUNCTYPE if self.is_python else ctypes.CFUNCTYPE
+        return kind(ctypes.c_int)(self.address(name))
 
     def free(self) -> None:
         """Free the instance and its library; after a fatal error no function of it may be called."""

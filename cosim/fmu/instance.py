@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from .fmu_model import Model, Value, Variable
 from .memory import Memory, Port
+
+if TYPE_CHECKING:
+    from .calls import DirectCalls
 
 # Receives (instance, status, text) of each message that an FMU logs; the status is that of FMI.
 OnMessage = Callable[[str, int, str], None]
@@ -21,12 +24,14 @@ class Access(NamedTuple):
         step: ``step(t)`` steps from t [s] and gets the outputs.
         begin: ``begin(t)`` starts a step from t [s] that runs beside those of other FMUs, and
             ``step(t)`` waits for its end; None if the FMU cannot.
+        direct: the same calls for a loop in C; None for an FMU in a process of its own.
     """
 
     put: Callable[[], None]
     get: Callable[[], None]
     step: Callable[[float], None]
     begin: Callable[[float], None] | None = None
+    direct: DirectCalls | None = None
 
 
 class Instance(Protocol):

@@ -23,6 +23,7 @@ class Recorder:
         folder: for the log; None writes none.
 
     Attributes:
+        pending: the rows that are not written yet.
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
@@ -36,8 +37,8 @@ class Recorder:
         self._kept_slots = self._slots(table, self._kept_names)
         self._kept: list[np.ndarray] = []
         logged = self._slots(table, system.logged)
-        self._pending = PendingRows(table.row, logged, system.scenario.log.every)
-        self.take = self._pending.take
+        self.pending = PendingRows(table.row, logged, system.scenario.log.every)
+        self.take = self.pending.take
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:
@@ -55,7 +56,7 @@ class Recorder:
             SimulationError: an output is not finite; the rows up to there are written.
             OSError: not all could be written; then none can follow.
         """
-        times, taken = self._pending.all()
+        times, taken = self.pending.all()
         wrong = ~np.isfinite(taken[:, self._outputs])
         message = ""
         if wrong.any():
@@ -64,9 +65,9 @@ class Recorder:
             message = f"{name} is not finite at t = {times[k]:g} s"
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
-            self._writer.write(self._pending.logged(len(times)))
+            self._writer.write(self.pending.logged(len(times)))
         self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
-        self._pending.clear()
+        self.pending.clear()
         if message:
             raise SimulationError(message)
 

@@ -28,13 +28,18 @@ class PendingRows:
 
     Attributes:
         take: ``take(t)`` copies the table as it is at t [s]; returns whether there is room for no more.
+        instants, taken: memory of their times [s], shape (rows,), and of the rows, shape (rows, signals).
+        count: how many there are, shape (1,).
+        room: how many there may be.
     """
 
     def __init__(self, row: np.ndarray, slots: np.ndarray, every: int) -> None:
         width = len(row)
         memory, self._counts = STATE.pending(8 * BLOCK * (1 + width))
-        self._times, self._taken = _parts(memory, width)
-        self._instants = memory[: 8 * BLOCK].cast("d")
+        self.instants, self.taken = _parts(memory, width)
+        self.count = np.frombuffer(self._counts, np.int32)[TAKEN : TAKEN + 1]
+        self.room = BLOCK
+        self._doubles = memory[: 8 * BLOCK].cast("d")
         self._slots, self._every = slots, every
         layout = {"width": width, "slots": slots.tolist(), "every": every}
         STATE.write(LAYOUT, json.dumps(layout))
@@ -42,7 +47,7 @@ class PendingRows:
 
     def _make_take(self, row: np.ndarray) -> Callable[[float], bool]:
         # What runs every step keeps what it needs in its own scope, where Python finds it fastest.
-        times, taken, counts = self._instants, self._taken, self._counts
+        times, taken, counts = self._doubles, self.taken, self._counts
 
         def take(t: float) -> bool:
             count = counts[TAKEN]
@@ -56,12 +61,12 @@ class PendingRows:
     def all(self) -> tuple[np.ndarray, np.ndarray]:
         """The times [s] of the rows, and the rows, shape (rows, signals)."""
         count = self._counts[TAKEN]
-        return self._times[:count], self._taken[:count]
+        return self.instants[:count], self.taken[:count]
 
     def logged(self, count: int) -> np.ndarray:
         """What belongs into the log of the first rows: times and logged signals."""
         return _logged(
-            self._times[:count], self._taken[:count], self._slots, self._every, self._counts[STEPS]
+            self.instants[:count], self.taken[:count], self._slots, self._every, self._counts[STEPS]
         )
 
     def clear(self) -> None:

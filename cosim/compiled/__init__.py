@@ -1,0 +1,1 @@
+"""What runs as machine code where it can: the step loop and the text of the log, from C in this folder."""
