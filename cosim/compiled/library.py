@@ -33,11 +33,15 @@ SYSTEM = ("gcc", "cc", "clang")
 PATIENCE = 600.0
 
 
+def asks_for_plain_loop() -> bool:
+    """Whether the user wants nothing compiled, for comparison."""
+    return os.environ.get("CYBERSHIP_LOOP") == "plain"
+
+
 class NoLibraryError(Exception):
     """There is no library; the message says why."""
 
 
-@cache
 def library(with_zig: bool = False) -> ctypes.CDLL:
     """The loaded library.
 
@@ -48,6 +52,15 @@ def library(with_zig: bool = False) -> ctypes.CDLL:
     Raises:
         NoLibraryError: none is in the cache, and none can be made.
     """
+    found = _found(with_zig)
+    if isinstance(found, str):
+        raise NoLibraryError(found)
+    return found
+
+
+@cache
+def _found(with_zig: bool) -> ctypes.CDLL | str:
+    """The library, or why there is none: asked once in a process."""
     content = b"".join((FOLDER / name).read_bytes() for name in SOURCES)
     key = repr((content, OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
@@ -61,8 +74,10 @@ def library(with_zig: bool = False) -> ctypes.CDLL:
                 if not path.is_file():
                     _compile(path, with_zig)
         return ctypes.CDLL(str(path))
+    except NoLibraryError as error:
+        return str(error)
     except (OSError, Timeout, subprocess.SubprocessError) as error:
-        raise NoLibraryError(f"the library of C functions cannot be made or loaded: {error}") from None
+        return f"the library of C functions cannot be made or loaded: {error}"
 
 
 def _compile(path: Path, with_zig: bool) -> None:

@@ -70,28 +70,22 @@ static Decimal shortest(uint64_t fraction, int biased) {
     return found;
 }
 
-static const char pairs[] =
-    "0001020304050607080910111213141516171819202122232425262728293031323334353637383940414243444546474849"
-    "5051525354555657585960616263646566676869707172737475767778798081828384858687888990919293949596979899";
+/* Eight digits of a number below 10**8, the first one in the lowest byte: halves, quarters and digits side by side
+   in one word. */
+static uint64_t eight_digits(uint32_t number) {
+    const uint64_t halves = number / 10000 | (uint64_t)(number % 10000) << 32;
+    const uint64_t hundreds = (halves * 10486 >> 20) & UINT64_C(0x0000007f0000007f);
+    const uint64_t quarters = hundreds | (halves - 100 * hundreds) << 16;
+    const uint64_t tens = (quarters * 103 >> 10) & UINT64_C(0x000f000f000f000f);
+    return (tens | (quarters - 10 * tens) << 8) + UINT64_C(0x3030303030303030);
+}
 
-/* A positive number in decimal digits; returns how many. */
-static int write_digits(char *out, uint64_t number) {
-    char text[20];
-    int first = 20;
-    while (number >= 100) {
-        const unsigned pair = (unsigned)(number % 100);
-        number /= 100;
-        first -= 2;
-        memcpy(text + first, pairs + 2 * pair, 2);
-    }
-    if (number >= 10) {
-        first -= 2;
-        memcpy(text + first, pairs + 2 * number, 2);
-    } else {
-        text[--first] = (char)('0' + number);
-    }
-    memcpy(out, text + first, (size_t)(20 - first));
-    return 20 - first;
+/* The digits of a number below 10**17 as 24 characters, zeros in front. */
+static void write_digits(char *out, uint64_t number) {
+    const uint64_t upper = number / 100000000, parts[] = {
+        eight_digits((uint32_t)(upper / 100000000)), eight_digits((uint32_t)(upper % 100000000)),
+        eight_digits((uint32_t)(number % 100000000))};
+    memcpy(out, parts, 24);
 }
 
 /* Text of a double; returns its length, at most LONGEST - 1. */
@@ -99,7 +93,7 @@ static int write_number(char *out, uint64_t bits) {
     const uint64_t fraction = bits & ((UINT64_C(1) << 52) - 1);
     const int biased = (int)(bits >> 52) & 0x7ff;
     char *begin = out;
-    char digits[20];
+    char written[24], *digits = written;
     Decimal number;
     int count, point;
     if (biased == 0x7ff && fraction) {
@@ -112,11 +106,10 @@ static int write_number(char *out, uint64_t bits) {
         return (int)(out - begin) + 3;
     }
     number = shortest(fraction, biased);
-    while (number.digits % 10 == 0) {
-        number.digits /= 10;
-        number.exponent++;
-    }
-    count = write_digits(digits, number.digits);
+    write_digits(written, number.digits);
+    while (*digits == '0') digits++;
+    count = (int)(written + 24 - digits);
+    while (digits[count - 1] == '0') count--, number.exponent++;
     point = count + number.exponent; /* digits before the point */
     if (number.exponent >= 0 && point <= 16) { /* 1200.0 */
         memcpy(out, digits, (size_t)count);
@@ -144,7 +137,9 @@ static int write_number(char *out, uint64_t bits) {
         *out++ = 'e';
         *out++ = exponent < 0 ? '-' : '+';
         if (exponent < 0) exponent = -exponent;
-        out += write_digits(out, (uint64_t)exponent);
+        if (exponent >= 100) *out++ = (char)('0' + exponent / 100);
+        if (exponent >= 10) *out++ = (char)('0' + exponent / 10 % 10);
+        *out++ = (char)('0' + exponent % 10);
     }
     return (int)(out - begin);
 }

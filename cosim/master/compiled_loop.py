@@ -7,7 +7,6 @@ of an FMU that returns more than a warning. There Python does what remains of th
 from __future__ import annotations
 
 import ctypes
-import os
 from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
@@ -16,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.library import NoLibraryError, library
+from ..compiled.library import NoLibraryError, asks_for_plain_loop, library
 from ..process.run_state import INSTANCE, STATE
 from ..results.pending_rows import PendingRows
 from ..scenario.faults import TIME_TOLERANCE, Effect
@@ -55,7 +54,7 @@ def compiled_run(
     Raises:
         PlainLoopError: this run cannot.
     """
-    if os.environ.get("CYBERSHIP_LOOP") == "plain":
+    if asks_for_plain_loop():
         raise PlainLoopError("CYBERSHIP_LOOP is plain")
     if native is False:
         raise PlainLoopError('"native" is false')
@@ -151,22 +150,23 @@ class _CompiledLoop:
     def _plan(self, horizon: int) -> None:
         """Plan what operations do until base step ``horizon``."""
         master, loop = self._master, self._loop
-        done, time = self._horizon, master.time
+        done = self._horizon
         first = max(0, done - max(stepper.every for stepper in self._steppers))
-        self._times = array("d", map(time, range(first, horizon + 1)))
-        loop.first, loop.times = first, address(self._times)
-        times = self._times
+        self._times = times = array("d", map(master.time, range(first, horizon + 1)))
+        loop.first, loop.times = first, address(times)
         for stepper in self._steppers:
             every, h = stepper.every, stepper.step_size
             due = range((done // every + 1) * every, horizon + 1, every)
-            # Inputs of a step are those of its end, or with Jacobi's method of the base step's beginning.
-            shift = first + master.is_jacobi
-            inputs = [times[k - shift] for k in due]
-            outputs = [times[k - every - first] + h for k in due]
-            for operation in _operations(stepper.input_effects):
-                operation.ask_ahead(inputs)
-            for operation in _operations(stepper.output_effects):
-                operation.ask_ahead(outputs)
+            if on_inputs := _operations(stepper.input_effects):
+                # Inputs of a step are those of its end; with Jacobi's method of the base step's beginning.
+                shift = first + master.is_jacobi
+                inputs = [times[k - shift] for k in due]
+                for operation in on_inputs:
+                    operation.ask_ahead(inputs)
+            if on_outputs := _operations(stepper.output_effects):
+                outputs = [times[k - every - first] + h for k in due]
+                for operation in on_outputs:
+                    operation.ask_ahead(outputs)
         self._horizon = horizon
 
     def _lay_out_operations(self) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
 from ..results.log import CSV, LogWriter
 from ..results.pending_rows import PendingRows
@@ -30,7 +31,7 @@ class Recorder:
     def __init__(self, system: System, master: Master, folder: Path | None) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = None if folder is None else LogWriter(folder / CSV, self.columns)
+        self._writer = None if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
@@ -39,6 +40,11 @@ class Recorder:
         logged = self._slots(table, system.logged)
         self.pending = PendingRows(table.row, logged, system.scenario.log.every)
         self.take = self.pending.take
+
+    def _log_writer(self, path: Path, system: System) -> LogWriter:
+        native = system.scenario.native
+        compiled = native is not False and not asks_for_plain_loop()
+        return LogWriter(path, self.columns, compiled, with_zig=bool(native))
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:

@@ -232,9 +232,11 @@ def _loop(
             recorder.flush()
             return True
         # At every step: the next may be a slow one, and the last of its process.
-        if full or clock() > due:
+        is_due = clock() > due
+        if full or is_due:
             STATE.calls_nothing()
             recorder.flush()
+        if is_due:
             gc.collect()
             progress(t)
             due = clock() + UPDATE_INTERVAL

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import orjson
 
+from ..compiled.row_text import Lines, compiled_lines
 from ..errors import InputError, nearest
 from ..files import atomic_write, write_all
 from ..process.run_state import Owner
@@ -33,6 +34,8 @@ class LogWriter:
     Args:
         path: file to write; an older one is replaced.
         columns: names for the header line, ``time`` first.
+        compiled: whether the text may come from C; it is the same.
+        with_zig: whether zig may compile that; see :func:`cosim.compiled.library.library`.
 
     Attributes:
         rows: number of rows in the file.
@@ -41,8 +44,11 @@ class LogWriter:
         OSError: the file cannot be made; then there is none.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+    def __init__(
+        self, path: Path, columns: Sequence[str], compiled: bool = False, with_zig: bool = False
+    ) -> None:
         self.rows = 0
+        self._lines = (compiled_lines(with_zig) if compiled else None) or _lines
         self._owner = Owner()
         self._failure: OSError | None = None
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
@@ -73,29 +79,28 @@ class LogWriter:
             raise self._failure
         if not len(block):
             return
-        lines = format_rows(block)
+        lines, ends = self._lines(block)
         try:
             if self._identify() != self._identity:
                 raise OSError(errno.EBADF, "its file was closed by something else")
             begun = self._file.tell()
             try:
-                write_all(self._file, b"\n".join(lines) + b"\n")
+                write_all(self._file, lines)
             except OSError:
-                self._cut(begun, lines)
+                self._cut(begun, begun + ends)
                 raise
         except OSError as error:
             self._failure = error
             raise
-        self.rows += len(lines)
+        self.rows += len(ends)
 
-    def _cut(self, begun: int, lines: Sequence[bytes]) -> None:
+    def _cut(self, begun: int, ends: np.ndarray) -> None:
         """Keep the rows of a block that are whole.
 
         Args:
             begun: position at which the block begins [bytes].
-            lines: its rows.
+            ends: positions behind its rows [bytes].
         """
-        ends = begun + np.cumsum([len(line) + 1 for line in lines])
         whole = int(np.searchsorted(ends, self._file.tell(), side="right"))
         self._file.truncate(int(ends[whole - 1]) if whole else begun)
         self.rows += whole
@@ -103,6 +108,12 @@ class LogWriter:
     def close(self) -> None:
         with suppress(OSError):  # closed by something else
             self._file.close()
+
+
+def _lines(block: np.ndarray) -> Lines:
+    """Lines, and the bytes up to the end of each."""
+    rows = format_rows(block)
+    return memoryview(b"\n".join(rows) + b"\n"), np.cumsum([len(row) + 1 for row in rows])
 
 
 def format_rows(block: np.ndarray) -> list[bytes]:
