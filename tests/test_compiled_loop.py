@@ -10,7 +10,7 @@ import pytest
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
-from cosim.compiled.row_text import compiled_lines
+from cosim.compiled.row_text import Rows, compiled_lines
 from cosim.results.log import format_rows
 from cosim.scenario import faults, operations
 
@@ -212,7 +212,7 @@ def test_plan_may_be_asked_ahead_and_left_in_the_middle(kind):
 def shown(block):
     lines = compiled_lines()
     assert lines is not None
-    text, ends = lines(block)
+    text, ends = lines(Rows(block[:, 0], block, np.arange(1, block.shape[1])))
     assert np.array_equal(np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1, ends)
     return bytes(text).splitlines()
 

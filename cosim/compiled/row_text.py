@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import orjson
@@ -18,15 +19,36 @@ PROBES = (
     1.7976931348623157e308, 1 / 3, 2.0**60, 0.3 - 0.1, 9007199254740993.0, 12345678.901234567, -1e-100,
 )  # fmt: skip
 
-# Lines and, behind each line, its end included, the bytes so far; shapes (bytes,), (rows,).
+
+
+class Rows(NamedTuple):
+    """Rows of a log.
+
+    Attributes:
+        times: [s], float64, shape (rows,).
+        table: values of all signals, float64, shape (rows, signals); those of a row are adjacent.
+        slots: places in it of the logged signals, intp, shape (columns,).
+    """
+
+    times: np.ndarray
+    table: np.ndarray
+    slots: np.ndarray
+
+    def block(self) -> np.ndarray:
+        """Times and logged signals, shape (rows, 1 + columns), C-contiguous."""
+        block = np.empty((len(self.times), 1 + len(self.slots)))
+        block[:, 0] = self.times
+        block[:, 1:] = self.table[:, self.slots]
+        return block
+
+
+# Lines, shape (bytes,), and the bytes up to the end of each, shape (rows,).
 Lines = tuple[memoryview, np.ndarray]
 
 
 @cache
-def compiled_lines(with_zig: bool = False) -> Callable[[np.ndarray], Lines] | None:
-    """A function of rows, shape (rows, columns), float64, C-contiguous; None where there is no library.
-
-    The lines that it returns are valid until its next call.
+def compiled_lines(with_zig: bool = False) -> Callable[[Rows], Lines] | None:
+    """A function of rows; None where there is no library. The lines that it returns are valid until its next call.
 
     Args:
         with_zig: as in :func:`cosim.compiled.library.library`.
@@ -36,18 +58,31 @@ def compiled_lines(with_zig: bool = False) -> Callable[[np.ndarray], Lines] | No
     except NoLibraryError:
         return None
     function.restype = None
-    function.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
+    pointer, number = ctypes.c_void_p, ctypes.c_int64
+    function.argtypes = [pointer, number, pointer, number, number, pointer, number, pointer, pointer]
     text = np.empty(0, np.uint8)
 
-    def lines(block: np.ndarray) -> Lines:
+    def lines(rows: Rows) -> Lines:
         nonlocal text
-        rows, columns = block.shape
-        if len(text) < LONGEST * rows * columns:
-            text = np.empty(LONGEST * rows * columns, np.uint8)
-        ends = np.empty(rows, np.int64)
-        function(block.ctypes.data, rows, columns, text.ctypes.data, ends.ctypes.data)
-        return memoryview(text)[: int(ends[-1]) if rows else 0], ends
+        times, table, slots = rows.times, rows.table, rows.slots.astype(np.int64, copy=False)
+        count, columns = len(times), len(slots)
+        if len(text) < (room := LONGEST * count * (1 + columns)):
+            text = np.empty(room, np.uint8)
+        ends = np.empty(count, np.int64)
+        function(
+            times.ctypes.data,
+            times.strides[0] // times.itemsize,
+            table.ctypes.data,
+            table.strides[0] // table.itemsize,
+            count,
+            slots.ctypes.data,
+            columns,
+            text.ctypes.data,
+            ends.ctypes.data,
+        )
+        return memoryview(text)[: int(ends[-1]) if count else 0], ends
 
     probes = np.array([PROBES])
     expected = orjson.dumps(probes, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2] + b"\n"
-    return lines if bytes(lines(probes)[0]) == expected else None
+    found, _ = lines(Rows(probes[:, 0], probes, np.arange(1, len(PROBES))))
+    return lines if bytes(found) == expected else None

@@ -28,13 +28,13 @@ typedef struct {
 } Decimal;
 
 /* Product with a power of ten without its last 128 bits; whether they were more than rounding is in bit 0. */
-static uint64_t product(const Power *power, uint64_t factor) {
+static inline uint64_t product(const Power *power, uint64_t factor) {
     const uint64_t carry = (uint64_t)(((Wide)power->low * factor) >> 64);
     const Wide whole = (Wide)power->high * factor + carry;
     return (uint64_t)(whole >> 64) | ((uint64_t)whole > 1);
 }
 
-static Decimal shortest(uint64_t fraction, int biased) {
+static inline Decimal shortest(uint64_t fraction, int biased) {
     const int is_normal = biased != 0;
     const uint64_t c = is_normal ? fraction | (UINT64_C(1) << 52) : fraction;
     const int q = (is_normal ? biased : 1) - 1075;
@@ -72,7 +72,7 @@ static Decimal shortest(uint64_t fraction, int biased) {
 
 /* Eight digits of a number below 10**8, the first one in the lowest byte: halves, quarters and digits side by side
    in one word. */
-static uint64_t eight_digits(uint32_t number) {
+static inline uint64_t eight_digits(uint32_t number) {
     const uint64_t halves = number / 10000 | (uint64_t)(number % 10000) << 32;
     const uint64_t hundreds = (halves * 10486 >> 20) & UINT64_C(0x0000007f0000007f);
     const uint64_t quarters = hundreds | (halves - 100 * hundreds) << 16;
@@ -81,7 +81,7 @@ static uint64_t eight_digits(uint32_t number) {
 }
 
 /* The digits of a number below 10**17 as 24 characters, zeros in front. */
-static void write_digits(char *out, uint64_t number) {
+static inline void write_digits(char *out, uint64_t number) {
     const uint64_t upper = number / 100000000, parts[] = {
         eight_digits((uint32_t)(upper / 100000000)), eight_digits((uint32_t)(upper % 100000000)),
         eight_digits((uint32_t)(number % 100000000))};
@@ -152,19 +152,21 @@ typedef struct {
     char text[28];
 } Kept;
 
-/* Rows of numbers as lines of CSV.
+/* Rows of a table as lines of CSV, each its time and the values of some columns.
 
-   numbers: (rows, columns); out: room for LONGEST characters a number; ends: behind each line, its end included. */
-EXPORT void format_rows(const double *numbers, int64_t rows, int64_t columns, char *out, int64_t *ends) {
+   times, table: first time and first row; next_time, next_row: how many numbers further the next one is; slots: the
+   columns; out: room for LONGEST characters a number; ends: behind each line, its end included. */
+EXPORT void format_rows(const double *times, int64_t next_time, const double *table, int64_t next_row, int64_t rows,
+                        const int64_t *slots, int64_t columns, char *out, int64_t *ends) {
     Kept kept[1 << KEPT_BITS];
     char *next = out;
     int64_t i, j;
     for (i = 0; i < 1 << KEPT_BITS; i++) kept[i].length = 0;
     for (i = 0; i < rows; i++) {
-        for (j = 0; j < columns; j++) {
+        for (j = -1; j < columns; j++) {
             Kept *place;
             uint64_t bits;
-            memcpy(&bits, numbers++, sizeof bits);
+            memcpy(&bits, j < 0 ? times : table + slots[j], sizeof bits);
             place = kept + ((bits * UINT64_C(0x9E3779B97F4A7C15)) >> (64 - KEPT_BITS));
             if (!place->length || place->bits != bits) {
                 place->bits = bits;
@@ -176,5 +178,7 @@ EXPORT void format_rows(const double *numbers, int64_t rows, int64_t columns, ch
         }
         next[-1] = '\n';
         ends[i] = next - out;
+        times += next_time;
+        table += next_row;
     }
 }

@@ -152,7 +152,7 @@ class _CompiledLoop:
         master, loop = self._master, self._loop
         done = self._horizon
         first = max(0, done - max(stepper.every for stepper in self._steppers))
-        self._times = times = array("d", map(master.time, range(first, horizon + 1)))
+        self._times = times = array("d", master.times(first, horizon).tobytes())
         loop.first, loop.times = first, address(times)
         for stepper in self._steppers:
             every, h = stepper.every, stepper.step_size

@@ -63,9 +63,9 @@ class Recorder:
             OSError: not all could be written; then none can follow.
         """
         times, taken = self.pending.all()
-        wrong = ~np.isfinite(taken[:, self._outputs])
         message = ""
-        if wrong.any():
+        # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
+        if not np.isfinite(taken).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
             k = int(np.argmax(wrong.any(axis=1)))
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"

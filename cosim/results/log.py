@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import orjson
 
-from ..compiled.row_text import Lines, compiled_lines
+from ..compiled.row_text import Lines, Rows, compiled_lines
 from ..errors import InputError, nearest
 from ..files import atomic_write, write_all
 from ..process.run_state import Owner
@@ -65,11 +65,8 @@ class LogWriter:
         info = os.fstat(self._file.fileno())
         return info.st_dev, info.st_ino
 
-    def write(self, block: np.ndarray) -> None:
+    def write(self, rows: Rows) -> None:
         """Append rows.
-
-        Args:
-            block: (rows, columns), float64, C-contiguous.
 
         Raises:
             OSError: not all could be written; ``rows`` tells how many were, and none can follow.
@@ -77,9 +74,9 @@ class LogWriter:
         self._owner.leave_copies()
         if self._failure:
             raise self._failure
-        if not len(block):
+        if not len(rows.times):
             return
-        lines, ends = self._lines(block)
+        lines, ends = self._lines(rows)
         try:
             if self._identify() != self._identity:
                 raise OSError(errno.EBADF, "its file was closed by something else")
@@ -110,10 +107,10 @@ class LogWriter:
             self._file.close()
 
 
-def _lines(block: np.ndarray) -> Lines:
+def _lines(rows: Rows) -> Lines:
     """Lines, and the bytes up to the end of each."""
-    rows = format_rows(block)
-    return memoryview(b"\n".join(rows) + b"\n"), np.cumsum([len(row) + 1 for row in rows])
+    found = format_rows(rows.block())
+    return memoryview(b"\n".join(found) + b"\n"), np.cumsum([len(line) + 1 for line in found])
 
 
 def format_rows(block: np.ndarray) -> list[bytes]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled.row_text import Rows
 from ..files import write_all
 from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
 from .log import cut_to_rows, format_rows
@@ -63,8 +64,8 @@ class PendingRows:
         count = self._counts[TAKEN]
         return self.instants[:count], self.taken[:count]
 
-    def logged(self, count: int) -> np.ndarray:
-        """What belongs into the log of the first rows: times and logged signals."""
+    def logged(self, count: int) -> Rows:
+        """What belongs into the log of the first rows."""
         return _logged(
             self.instants[:count], self.taken[:count], self._slots, self._every, self._counts[STEPS]
         )
@@ -81,10 +82,8 @@ def _parts(memory: memoryview, width: int) -> tuple[np.ndarray, np.ndarray]:
     return numbers[:BLOCK], numbers[BLOCK:].reshape(BLOCK, width)
 
 
-def _logged(
-    times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int
-) -> np.ndarray:
-    """What belongs into the log: shape (rows, 1 + slots), C-contiguous.
+def _logged(times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int) -> Rows:
+    """What belongs into the log.
 
     Args:
         times: of the rows [s].
@@ -94,10 +93,7 @@ def _logged(
         before: steps before the first row.
     """
     chosen = slice(-before % every, None, every)
-    block = np.empty((len(times[chosen]), 1 + len(slots)))
-    block[:, 0] = times[chosen]
-    block[:, 1:] = taken[chosen, slots]
-    return block
+    return Rows(times[chosen], taken[chosen], slots)
 
 
 def rescue(path: Path) -> int:
@@ -116,9 +112,9 @@ def rescue(path: Path) -> int:
         return rows
     times, taken = _parts(memory, layout["width"])
     count, before, every = counts[TAKEN], counts[STEPS], layout["every"]
-    block = _logged(times[:count], taken[:count], np.array(layout["slots"], np.intp), every, before)
+    logged = _logged(times[:count], taken[:count], np.array(layout["slots"], np.intp), every, before)
     # It may have died while it wrote them.
-    block = block[rows + before // -every :]
+    block = logged.block()[rows + before // -every :]
     try:
         with open(path, "ab", buffering=0) as file:
             write_all(file, b"".join(line + b"\n" for line in format_rows(block)))
