@@ -1,8 +1,8 @@
-"""What do FMUs and the master cost beside the same equations in one C program? ``python -m benchmarks.one_program``.
+"""What do FMUs and a master cost beside one C program? ``python -m benchmarks.one_program``.
 
-Runs scenarios/ellipse.json without faults: with native FMUs in this master, with nothing logged, and as one
-program made of the components' plain C (``fmus.build --native --source``), which passes values in memory. Both
-must end with the same outputs to the bit. Processor time of the steps alone, in turns; the ratio of medians.
+Runs scenarios/ellipse.json without faults: with native FMUs in this master, with nothing logged, and as
+one program made of the components' plain C (``fmus.build --native --source``), which passes values in
+memory. Both must end with the same outputs to the bit. Processor time of the steps alone, in turns.
 """
 
 import argparse
@@ -112,7 +112,10 @@ def in_master(content, folder):
 
     Master.time = first
     cosim.simulate(
-        cosim.load_scenario(content), folder, progress=lambda t: marks.append(process_time()), native=True
+        cosim.load_scenario(content),
+        folder,
+        progress=lambda t: marks.append(process_time()),
+        native=True,
     )
     return marks[-1] - marks[0]
 
@@ -135,10 +138,12 @@ def main():
             log = cosim.read_log(Path(work) / "out")
             end = struct.pack(f"{len(outputs)}d", *(log[name][-1] for name in outputs))
             same = same and end == done.stdout
-    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}, {steps} steps, medians of {options.repeats}")
-    master, one = 1e6 * median(ours), 1e6 * median(theirs)
-    print(f"native FMUs in this master {master:.2f} us a step, one C program {one:.2f}, ratio {master / one:.2f}")
-    print(f"least of each: {1e6 * min(ours):.2f}, {1e6 * min(theirs):.2f}, ratio {min(ours) / min(theirs):.2f}")
+    load = f"load {os.getloadavg()[0]:.1f}"
+    print(f"{os.cpu_count()} cores, {load}, {steps} steps, {options.repeats} repeats in turns")
+    for name, pick in (("median", median), ("least", min)):
+        master, one = 1e6 * pick(ours), 1e6 * pick(theirs)
+        print(f"{name}: native FMUs in this master {master:.2f} us a step, ", end="")
+        print(f"one C program {one:.2f}, ratio {master / one:.2f}")
     print(f"last outputs {'the same to the bit' if same else 'DIFFER'}")
     return 0 if same else 1
 

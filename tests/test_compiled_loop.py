@@ -68,7 +68,9 @@ def disturbed(ellipse, seed=0, **changes):
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
-def test_faults_and_events_are_the_same_to_the_bit(algorithm, seed, ellipse, native, tmp_path, monkeypatch):
+def test_faults_and_events_are_the_same_to_the_bit(
+    algorithm, seed, ellipse, native, tmp_path, monkeypatch
+):
     content = disturbed(ellipse, seed, algorithm=algorithm, stop=25.0 if seed else 3.0)
     for entry in content["fmus"].values():
         entry["path"] = str(native[entry["path"].removesuffix(".fmu")])
@@ -76,7 +78,9 @@ def test_faults_and_events_are_the_same_to_the_bit(algorithm, seed, ellipse, nat
 
 
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
-def test_steps_of_several_lengths_are_the_same_to_the_bit(algorithm, ellipse, native, tmp_path, monkeypatch):
+def test_steps_of_several_lengths_are_the_same_to_the_bit(
+    algorithm, ellipse, native, tmp_path, monkeypatch
+):
     content = disturbed(ellipse, algorithm=algorithm, step=0.005)
     for name, entry in content["fmus"].items():
         entry["path"] = str(native[entry["path"].removesuffix(".fmu")])
@@ -173,7 +177,9 @@ def test_fault_of_a_user_that_is_a_function_takes_the_plain_loop(tmp_path, monke
         values[slot[0]] = 0.25
 
     slot = []
-    monkeypatch.setattr(faults.Bias, "bind", lambda self, slots, step, rng: (slot.extend(slots), effect)[1])
+    monkeypatch.setattr(
+        faults.Bias, "bind", lambda self, slots, step, rng: (slot.extend(slots), effect)[1]
+    )
     bias = {"kind": "bias", "signals": ["lag.in[1]"], "value": 1.0}
     content = lagging(build_lag(tmp_path), stop=0.1, faults=[bias])
     result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
@@ -220,7 +226,12 @@ def shown(block):
 def test_numbers_of_the_log_are_those_of_orjson():
     """Random bits, whole numbers, times, and numbers beside powers of two and of ten, where digits run out."""
     rng = np.random.default_rng(4)
-    exact = np.concatenate([2.0 ** np.arange(-1074, 1024), [float(f"{d}e{k}") for k in range(-323, 309) for d in (1, 5, 9.999)]])
+    exact = np.concatenate(
+        [
+            2.0 ** np.arange(-1074, 1024),
+            [float(f"{d}e{k}") for k in range(-323, 309) for d in (1, 5, 9.999)],
+        ]
+    )
     kinds = [
         rng.integers(0, 2**64, 60_000, dtype=np.uint64).view(np.float64),
         rng.integers(0, 2**20, 2_000, dtype=np.uint64).view(np.float64),

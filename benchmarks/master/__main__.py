@@ -135,7 +135,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--repeat", type=int, default=3, help="how often each is run (3)")
     parser.add_argument("--native", action="store_true", help="with native FMUs")
     parser.add_argument(
-        "--cases", nargs="+", choices=CASES, default=[*CASES], metavar="CASE", help="only these, and ours"
+        "--cases",
+        nargs="+",
+        choices=CASES,
+        default=[*CASES],
+        metavar="CASE",
+        help="only these, and ours",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers here as well")
     parser.add_argument("--case", nargs=2, metavar=("CASE", "FOLDER"), help=argparse.SUPPRESS)

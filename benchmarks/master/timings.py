@@ -24,8 +24,9 @@ def _per_step(found: dict[str, Any], pick: Callable[[Sequence[float]], float]) -
 def report(results: dict[str, Any]) -> None:
     """Print the tables."""
     print(", ".join(f"{name} {value}" for name, value in results["machine"].items()))
+    kind = "native" if results["native"] else "Python"
     print(
-        f"{results['fmus']} {'native ' if results['native'] else ''}FMUs, {results['connections']} connections, {results['signals']} signals "
+        f"{results['fmus']} {kind} FMUs, {results['connections']} connections, {results['signals']} signals "
         f"logged at each of {results['steps']} steps, {results['repeat']} interleaved repeats\n"
     )
     _report_tools(results["cases"])

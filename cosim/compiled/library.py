@@ -1,7 +1,7 @@
 """The library of C functions: compiled at its first use on a computer, kept in the cache, loaded.
 
-It is a convenience. Whatever uses it has a body in Python that gives the same bytes, and takes that where
-there is no library.
+It is a convenience. Whatever uses it has a body in Python that gives the same bytes, and takes that
+where there is no library.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def library(with_zig: bool = False) -> ctypes.CDLL:
     """The loaded library.
 
     Args:
-        with_zig: whether zig (extra ``native``) may compile it, where the system has no compiler: that takes
-            minutes once.
+        with_zig: whether zig (extra ``native``) may compile it, where the system has no compiler: that
+            takes minutes once.
 
     Raises:
         NoLibraryError: none is in the cache, and none can be made.
@@ -101,7 +101,9 @@ def _compile(path: Path, with_zig: bool) -> None:
             )
             if done.returncode != 0 or not built.is_file():
                 said = [line for line in done.stderr.splitlines() if "error" in line.lower()]
-                raise NoLibraryError(f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}")
+                raise NoLibraryError(
+                    f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}"
+                )
             shutil.copyfile(built, scratch)
 
 

@@ -15,10 +15,10 @@ from .library import NoLibraryError, library
 LONGEST = 25  # characters of a number and what follows it; of rows.c
 # Numbers of every notation, to find out whether the installed orjson has the same.
 PROBES = (
-    0.0, -0.0, 1.0, -1.5, 0.1, 1e-4, 1.25e-5, 123456.0, 1e15, 1e16, 1.2e17, 1e22, 1e-9, 5e-324, 2.0**-1022,
+    0.0, -0.0, 1.0, -1.5, 0.1, 1e-4, 1.25e-5, 123456.0, 1e15, 1e16, 1.2e17, 1e22, 1e-9, 5e-324,
+    2.0**-1022,
     1.7976931348623157e308, 1 / 3, 2.0**60, 0.3 - 0.1, 9007199254740993.0, 12345678.901234567, -1e-100,
 )  # fmt: skip
-
 
 
 class Rows(NamedTuple):
@@ -48,7 +48,8 @@ Lines = tuple[memoryview, np.ndarray]
 
 @cache
 def compiled_lines(with_zig: bool = False) -> Callable[[Rows], Lines] | None:
-    """A function of rows; None where there is no library. The lines that it returns are valid until its next call.
+    """A function of rows; None where there is no library. The lines that it returns are valid until
+    its next call.
 
     Args:
         with_zig: as in :func:`cosim.compiled.library.library`.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from ..errors import SimulationError
 from .component import DISCARD, Component
 from .fmu_model import INT_LIMIT
-from .instance import Access
+from .instance import Access, DirectCalls, DirectTransfer
 from .memory import Memory, Port
 from .stepping import Steps, redoing_steps, single_steps
 
@@ -37,10 +37,7 @@ class Transfer:
         setting: whether to set.
 
     Attributes:
-        function: address of the FMI function.
-        references: value references.
-        address: of the values that the function takes or gives.
-        slots: places of the values of a buffer; None for Reals, which need none.
+        direct: the same for a loop in C.
         call: makes it; returns an FMI status.
     """
 
@@ -49,28 +46,25 @@ class Transfer:
     ) -> None:
         what, c_type = _SETTERS[kind][not setting], _SETTERS[kind][2]
         self._component, self._ports, self._values = component, ports, memory.values
-        self.function = component.address(what)
-        self.references = (ctypes.c_uint * len(ports))(*[p.variable.reference for p in ports])
+        references = (ctypes.c_uint * len(ports))(*[p.variable.reference for p in ports])
         is_real = kind == "Real"
         self._buffer = None if is_real else (c_type * len(ports))()
-        self.slots = None if is_real else [p.slot for p in ports]
-        self.address = (
+        address = (
             memory.address + 8 * ports[0].slot
             if self._buffer is None
             else ctypes.addressof(self._buffer)
         )
-        self._direct: Call = (
-            component.function(what),
-            (
-                ctypes.c_void_p.from_param(component.pointer),
-                ctypes.byref(self.references),
-                ctypes.c_size_t.from_param(len(ports)),
-                ctypes.c_void_p.from_param(self.address),
-            ),
+        slots = None if is_real else [p.slot for p in ports]
+        self.direct = DirectTransfer(component.address(what), references, address, slots)
+        self._function = component.function(what)
+        self._arguments = (
+            ctypes.c_void_p.from_param(component.pointer),
+            ctypes.byref(references),
+            ctypes.c_size_t.from_param(len(ports)),
+            ctypes.c_void_p.from_param(address),
         )
-        self.call: Call = (
-            self._direct if is_real else (self._set_buffered if setting else self._get_buffered, ())
-        )
+        buffered = self._set_buffered if setting else self._get_buffered
+        self.call: Call = (self._function, self._arguments) if is_real else (buffered, ())
 
     # Integers are converted on the way.
 
@@ -82,34 +76,31 @@ class Transfer:
                 name = f"{self._component.name}.{port.variable.name}"
                 raise SimulationError(f"{name} = {value} is not a 32-bit number")
             self._buffer[k] = round(value)
-        function, arguments = self._direct
-        return function(*arguments)
+        return self._function(*self._arguments)
 
     def _get_buffered(self) -> int:
         assert self._buffer is not None
-        function, arguments = self._direct
-        status = function(*arguments)
+        status = self._function(*self._arguments)
         for k, port in enumerate(self._ports):
             self._values[port.slot] = float(self._buffer[k])
         return status
 
 
-class DirectCalls:
-    """What a compiled loop needs in order to make the calls of an FMU itself.
-
-    Args:
-        component: the FMU.
-        sets, gets: of its inputs and outputs, in their order.
-        steps: its steps.
-    """
-
-    def __init__(
-        self, component: Component, sets: list[Transfer], gets: list[Transfer], steps: Steps
-    ) -> None:
-        self.component = component
-        self.sets, self.gets = sets, gets
-        self.settle = steps.settle
-        self.saves = steps.saves
+def _direct(
+    component: Component, sets: Sequence[Transfer], gets: Sequence[Transfer], steps: Steps
+) -> DirectCalls:
+    return DirectCalls(
+        component.pointer,
+        component.is_python,
+        component.address("fmi2DoStep"),
+        component.address("fmi2GetFMUstate") if steps.saves else None,
+        ctypes.addressof(component.saved_state),
+        [transfer.direct for transfer in sets],
+        [transfer.direct for transfer in gets],
+        steps.settle,
+        component.check,
+        [component, *sets, *gets],
+    )
 
 
 def bind(
@@ -147,9 +138,7 @@ def bind(
             if (status := function(*arguments)) >= DISCARD:
                 check("getting its outputs", status)
 
-    return Access(
-        put, get, step, direct=DirectCalls(component, set_transfers, get_transfers, steps)
-    )
+    return Access(put, get, step, direct=_direct(component, set_transfers, get_transfers, steps))
 
 
 def _transfers(
@@ -157,6 +146,4 @@ def _transfers(
 ) -> list[Transfer]:
     """What sets or gets some variables of one FMU: a call for each type."""
     of_kind = {kind: [p for p in ports if p.variable.type == kind] for kind in _SETTERS}
-    return [
-        Transfer(component, kind, some, memory, setting) for kind, some in of_kind.items() if some
-    ]
+    return [Transfer(component, kind, some, memory, setting) for kind, some in of_kind.items() if some]

@@ -26,8 +26,8 @@ class Steps(NamedTuple):
     Attributes:
         step: ``step(t)`` steps from t [s].
         settle: ``settle(t, status, saved)`` brings the step from t to its end after the first call of
-            fmi2DoStep has returned ``status``, worse than a warning; ``saved`` tells whether the state of
-            before has been saved.
+            fmi2DoStep has returned ``status``, worse than a warning; ``saved`` tells whether the state
+            of before has been saved.
         saves: whether the state is saved before each step.
     """
 

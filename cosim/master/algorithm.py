@@ -173,8 +173,8 @@ class Master:
         """Times of base steps from ``first`` to ``last`` [s], each as :meth:`time` has it."""
         found = np.arange(first, last + 1) * self.system.scenario.step
         whole = np.rint(found * 1e12)
-        # Below 2**52 the product is at most 0.25 wrong, so these are the whole numbers that are meant; and a
-        # quotient of two exact numbers is rounded once, as a decimal number that is read.
+        # Below 2**52 the product is at most 0.25 wrong, so these are the whole numbers that are meant;
+        # and a quotient of two exact numbers is rounded once, as a decimal number that is read.
         if whole[-1] < 2.0**52 and np.abs(found * 1e12 - whole).max() < 0.2:
             return whole / 1e12
         return np.array([self.time(k) for k in range(first, last + 1)])

@@ -23,9 +23,9 @@ from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
 from ..system.system import System
 from .algorithm import Master
-from .chosen_loop import ChosenLoop, choose_loop
 from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
+from .loops.chosen_loop import ChosenLoop, choose_loop
 from .real_time import Pace
 from .recorder import Recorder
 from .run_record import describe

@@ -25,8 +25,8 @@ class Stepper:
         read: ``read(t)`` copies its outputs to the table.
         begin: ``begin(t)`` starts a step from t that runs beside those of others; None if it cannot.
         advance: ``advance(t)`` steps from t, and reads the outputs.
-        settle: ``settle(t, status, saved)`` does the rest of :attr:`advance` where another loop has called
-            fmi2DoStep and stopped at what it returned; see :class:`cosim.fmu.stepping.Steps`.
+        settle: ``settle(t, status, saved)`` does the rest of :attr:`advance` where another loop has
+            called fmi2DoStep and stopped at what it returned; see :class:`cosim.fmu.stepping.Steps`.
         input_effects, output_effects: act on the values on their way, in this order.
         copies: connections without conversion: first target, first source, how many.
         access: the calls of the FMU.
@@ -139,7 +139,7 @@ class Stepper:
 def _transfers(
     connections: Sequence[Connection], table: ValueTable
 ) -> tuple[list[tuple[int, int, int]], Convert | None]:
-    """Connections as copies (first target, first source, how many), and those between different units."""
+    """Connections as copies (first target, first source, how many), and those between units."""
     converted: list[Connection] = []
     plain: list[tuple[int, int]] = []
     for c in connections:

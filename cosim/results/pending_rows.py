@@ -29,7 +29,8 @@ class PendingRows:
 
     Attributes:
         take: ``take(t)`` copies the table as it is at t [s]; returns whether there is room for no more.
-        instants, taken: memory of their times [s], shape (rows,), and of the rows, shape (rows, signals).
+        instants, taken: memory of their times [s], shape (rows,), and of the rows, shape (rows,
+            signals).
         count: how many there are, shape (1,).
         room: how many there may be.
     """

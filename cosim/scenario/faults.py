@@ -3,9 +3,9 @@
 A fault is a class that declares its options; bound to slots of the value table, it returns a function
 that is called each time the values have been set. A new fault is a new class, here or in a module of the
 user: it registers itself by its ``kind``. Where the function is an operation
-(:mod:`cosim.scenario.operations`), as it is for all faults here, the run can take the compiled step loop.
-Faults on the same signal act in the order of their ``stage``, as along a real measurement chain, whatever
-their order in the scenario.
+(:mod:`cosim.scenario.operations`), as it is for all faults here, the run can take the compiled step
+loop. Faults on the same signal act in the order of their ``stage``, as along a real measurement chain,
+whatever their order in the scenario.
 """
 
 import math
@@ -18,7 +18,6 @@ from pydantic import Field, PositiveFloat, model_validator
 from . import operations
 from .operations import Add, Hold, Replace, Values
 from .strict import Strict
-
 
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]

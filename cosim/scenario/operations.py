@@ -1,8 +1,9 @@
-"""Operations: what the project's faults do to values, for the step loop in Python and for the compiled one.
+"""Operations: what the project's faults do to values, for both step loops, in Python and compiled.
 
-An operation splits a fault in two. What depends on time and chance is a function of time: what it applies at
-a call, or that it does not act. The compiled loop asks for it ahead, for a block of calls, and what is left
-to it is to add, set, hold, delay. The loop in Python asks at each call, or takes what has been asked ahead.
+An operation splits a fault in two. What depends on time and chance is a function of time: what it
+applies at a call, or that it does not act. The compiled loop asks for it ahead, for a block of calls, and
+what is left to it is to add, set, hold, delay. The loop in Python asks at each call, or takes what has
+been asked ahead.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ class Operation:
 
     Args:
         slots: places in the value table.
-        plan: what it applies; is called once for each call, with times that do not decrease. A sequence is
-            applied at every call.
+        plan: what it applies; is called once for each call, with times that do not decrease. A
+            sequence is applied at every call.
 
     Attributes:
         code: what it does, for cosim/compiled/loop.c.
@@ -142,7 +143,7 @@ class Delay(Operation):
         self.samples = samples
 
     def reserve(self, calls: int) -> None:
-        """Make room for the values of some more calls: no more than have come so far, as a delay may be long."""
+        """Make room for the values of some more calls; a delay may be longer than the run."""
         rows = min(self.calls[0] + calls, self.samples + 1)
         missing = rows * len(self.slots) - len(self.memory)
         if missing > 0:

@@ -1,7 +1,7 @@
-"""The step loop in C: blocks of base steps that give the same values, to the bit, as the loop in Python.
+"""The step loop in C: blocks of base steps with the values of the loop in Python, to the bit.
 
-A block ends where Python has to act: at an event, when no more rows fit, when the log is due, and at a call
-of an FMU that returns more than a warning. There Python does what remains of the step.
+A block ends where Python has to act: at an event, when no more rows fit, when the log is due, and at a
+call of an FMU that returns more than a warning. There Python does what remains of the step.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled.library import NoLibraryError, asks_for_plain_loop, library
-from ..process.run_state import INSTANCE, STATE
-from ..results.pending_rows import PendingRows
-from ..scenario.faults import TIME_TOLERANCE, Effect
-from ..scenario.operations import Operation
-from .algorithm import Master
-from .changes import Changes
+from ...compiled.library import NoLibraryError, asks_for_plain_loop, library
+from ...process.run_state import INSTANCE, STATE
+from ...results.pending_rows import PendingRows
+from ...scenario.faults import TIME_TOLERANCE, Effect
+from ...scenario.operations import Operation
+from ..algorithm import Master
+from ..changes import Changes
+from ..stepper import Stepper
 from .layout import STRUCTURES, FmuLayout, LoopLayout, address, lay_out_fmu, operations_layout
-from .stepper import Stepper
 
-# Base steps whose times and chances are planned at once; chosen: the cost of a plan is small beside that of
-# the steps, and the wait for it not noticed.
+# Base steps whose times and chances are planned at once; chosen: the cost of a plan is small beside
+# that of the steps, and the wait for it not noticed.
 HORIZON = 2048
 # Why a block ended, as loop.c has it.
 AT_END, FULL, DUE, PUT, STEP, GET = range(6)
@@ -49,7 +49,8 @@ def compiled_run(
         patience: wall time after which the caller wants to act [s].
 
     Returns:
-        As :meth:`Master.steps`: time [s] after some base steps, and whether there is room for no more rows.
+        As :meth:`Master.steps`: time [s] after some base steps, and whether there is room for no more
+        rows.
 
     Raises:
         PlainLoopError: this run cannot.
@@ -118,9 +119,9 @@ class _CompiledLoop:
         )
 
     def _block_function(self, functions: ctypes.CDLL) -> Callable[..., int]:
-        """The block with Python's lock held if all FMUs are Python: others may work in threads of their own."""
+        """The block, with Python's lock held if all FMUs are Python; others may have threads."""
         direct = [stepper.access.direct for stepper in self._steppers]
-        holds = all(calls is not None and calls.component.is_python for calls in direct)
+        holds = all(calls is not None and calls.is_python for calls in direct)
         kind = ctypes.PYFUNCTYPE if holds else ctypes.CFUNCTYPE
         place = ctypes.cast(functions.run_block, ctypes.c_void_p).value
         assert place is not None
@@ -158,7 +159,8 @@ class _CompiledLoop:
             every, h = stepper.every, stepper.step_size
             due = range((done // every + 1) * every, horizon + 1, every)
             if on_inputs := _operations(stepper.input_effects):
-                # Inputs of a step are those of its end; with Jacobi's method of the base step's beginning.
+                # Inputs of a step are those of its end; with Jacobi's method of the base step's
+                # beginning.
                 shift = first + master.is_jacobi
                 inputs = [times[k - shift] for k in due]
                 for operation in on_inputs:
@@ -185,9 +187,7 @@ class _CompiledLoop:
             return self._horizon
         done = self._loop.step - self._loop.first
         # As Master.begin_events tells it.
-        later = bisect_left(
-            self._times, True, lo=done, key=lambda t: event.time <= t + TIME_TOLERANCE
-        )
+        later = bisect_left(self._times, True, lo=done, key=lambda t: event.time <= t + TIME_TOLERANCE)
         return min(self._horizon, self._loop.first + later)
 
     def _finish_step(self, why: int) -> bool:
@@ -207,4 +207,4 @@ class _CompiledLoop:
         assert calls is not None
         if status < 0:
             stepper.access.put()  # tells which value is no 32-bit number
-        calls.component.check(what, status)
+        calls.check(what, status)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from ..results.pending_rows import PendingRows
-from .algorithm import Master
+from ...results.pending_rows import PendingRows
+from ..algorithm import Master
 from .compiled_loop import PlainLoopError, compiled_run
 
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from ctypes import POINTER, c_double, c_int64, c_void_p
 from typing import Any, ClassVar
 
-from ..fmu.calls import Transfer
-from ..scenario.operations import Operation
-from .stepper import Stepper
+from ...fmu.instance import DirectTransfer
+from ...scenario.operations import Operation
+from ..stepper import Stepper
 
 
 class OperationLayout(ctypes.Structure):
@@ -121,7 +121,9 @@ def operations_layout(operations: Sequence[Operation], kept: list[Any]) -> ctype
     return layout
 
 
-def _transfers_layout(transfers: Sequence[Transfer], kept: list[Any]) -> ctypes.Array[TransferLayout]:
+def _transfers_layout(
+    transfers: Sequence[DirectTransfer], kept: list[Any]
+) -> ctypes.Array[TransferLayout]:
     layout = (TransferLayout * len(transfers))()
     for place, transfer in zip(layout, transfers, strict=True):
         place.function, place.count = transfer.function, len(transfer.references)
@@ -144,13 +146,9 @@ def lay_out_fmu(place: FmuLayout, stepper: Stepper, kept: list[Any]) -> None:
     """
     direct = stepper.access.direct
     assert direct is not None
-    component = direct.component
-    place.component, place.number = component.pointer, stepper.number
+    place.component, place.number = direct.pointer, stepper.number
     place.every, place.h = stepper.every, stepper.step_size
-    place.do_step = component.address("fmi2DoStep")
-    if direct.saves:
-        place.save = component.address("fmi2GetFMUstate")
-        place.state = ctypes.addressof(component.saved_state)
+    place.do_step, place.save, place.state = direct.do_step, direct.save, direct.state
     copied = (CopyLayout * len(stepper.copies))(*stepper.copies)
     sets, gets = _transfers_layout(direct.sets, kept), _transfers_layout(direct.gets, kept)
     place.copies, place.copied = len(copied), copied
