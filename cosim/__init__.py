@@ -9,10 +9,9 @@ runs a scenario; from Python::
     log = cosim.read_log(result.folder)
 
 The packages below, each using only those before it: ``compiled`` (C for the step loop and the log),
-``fmu`` (one FMU), ``formats`` (files of the SSP and
-OSP standards), ``scenario`` (the user's input), ``system`` (a scenario checked against its FMUs),
-``results`` (log, metrics, pictures), ``master`` (the run), ``campaign`` (many runs), ``export``
-(systems for other tools).
+``fmu`` (one FMU), ``formats`` (files of the SSP and OSP standards), ``scenario`` (the user's input),
+``system`` (a scenario checked against its FMUs), ``results`` (log, metrics, pictures), ``master`` (the
+run), ``campaign`` (many runs), ``export`` (systems for other tools).
 """
 
 from .lazy import lazy_names

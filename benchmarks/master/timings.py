@@ -25,10 +25,9 @@ def report(results: dict[str, Any]) -> None:
     """Print the tables."""
     print(", ".join(f"{name} {value}" for name, value in results["machine"].items()))
     kind = "native" if results["native"] else "Python"
-    print(
-        f"{results['fmus']} {kind} FMUs, {results['connections']} connections, {results['signals']} signals "
-        f"logged at each of {results['steps']} steps, {results['repeat']} interleaved repeats\n"
-    )
+    size = f"{results['fmus']} {kind} FMUs, {results['connections']} connections"
+    times = f"each of {results['steps']} steps, {results['repeat']} interleaved repeats"
+    print(f"{size}, {results['signals']} signals logged at {times}\n")
     _report_tools(results["cases"])
     if not results["native"]:
         _report_parts(results["cases"])

@@ -1,9 +1,9 @@
 """Operations: what the project's faults do to values, for both step loops, in Python and compiled.
 
 An operation splits a fault in two. What depends on time and chance is a function of time: what it
-applies at a call, or that it does not act. The compiled loop asks for it ahead, for a block of calls, and
-what is left to it is to add, set, hold, delay. The loop in Python asks at each call, or takes what has
-been asked ahead.
+applies at a call, or that it does not act. The compiled loop asks for it ahead, for a block of calls,
+and what is left to it is to add, set, hold, delay. The loop in Python asks at each call, or takes what
+has been asked ahead.
 """
 
 from __future__ import annotations
