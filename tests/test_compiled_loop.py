@@ -7,6 +7,7 @@ from array import array
 import numpy as np
 import orjson
 import pytest
+from support.cases import slow
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
@@ -66,7 +67,7 @@ def disturbed(ellipse, seed=0, **changes):
     return ellipse | {"faults": FAULTS, "events": EVENTS, "seed": seed} | changes
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, slow(1)])
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
 def test_faults_and_events_are_the_same_to_the_bit(
     algorithm, seed, ellipse, native, tmp_path, monkeypatch
@@ -89,7 +90,7 @@ def test_steps_of_several_lengths_are_the_same_to_the_bit(
     same(content, tmp_path, monkeypatch)
 
 
-@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", slow("jacobi")])
 def test_python_fmus_too(algorithm, ellipse, tmp_path, monkeypatch):
     same(disturbed(ellipse, algorithm=algorithm), tmp_path, monkeypatch)
 
@@ -137,7 +138,7 @@ FAILURES = {
 }
 
 
-@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", slow("jacobi")])
 @pytest.mark.parametrize("failure", FAILURES)
 def test_failures_end_the_run_at_the_same_row(failure, algorithm, tmp_path, monkeypatch):
     fmu = build_lag(tmp_path, "lag", FAILURES[failure], f"{ANY_STEP} {STATE}")
@@ -152,6 +153,7 @@ def test_number_too_large_for_a_whole_number_is_refused_in_the_same_words(tmp_pa
     assert "lag.on = 3000000001.0 is not a 32-bit number" in result.message
 
 
+@pytest.mark.slow
 def test_reason_for_the_plain_loop_is_told(tmp_path):
     fmu = build_lag(tmp_path)
     reasons = {
@@ -172,14 +174,23 @@ def test_reason_for_the_plain_loop_is_told(tmp_path):
     assert cosim.simulate(scenario, tmp_path / "c").loop == "compiled"
 
 
-def test_fault_of_a_user_that_is_a_function_takes_the_plain_loop(tmp_path, monkeypatch):
-    def effect(values, t):
-        values[slot[0]] = 0.25
+class Quarter(operations.Replace):
+    """What a user makes of an operation: C would not know."""
 
-    slot = []
-    monkeypatch.setattr(
-        faults.Bias, "bind", lambda self, slots, step, rng: (slot.extend(slots), effect)[1]
-    )
+    def act(self, values, row):
+        values[self.slots[0]] = 0.25
+
+
+def quarter(slots):
+    def effect(values, t):
+        values[slots[0]] = 0.25
+
+    return effect
+
+
+@pytest.mark.parametrize("effect", [Quarter, quarter])
+def test_fault_of_a_user_that_is_no_known_operation_takes_the_plain_loop(effect, tmp_path, monkeypatch):
+    monkeypatch.setattr(faults.Bias, "bind", lambda self, slots, step, rng: effect(slots))
     bias = {"kind": "bias", "signals": ["lag.in[1]"], "value": 1.0}
     content = lagging(build_lag(tmp_path), stop=0.1, faults=[bias])
     result = cosim.simulate(cosim.load_scenario(content), tmp_path / "out")

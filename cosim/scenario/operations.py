@@ -73,6 +73,10 @@ class Operation:
         none = (0.0,) * self.width
         self.acts = array("B", [row is not None for row in rows])
         self.numbers = array("d", chain.from_iterable([none if row is None else row for row in rows]))
+        if len(self.numbers) != self.width * len(rows):
+            raise ValueError(
+                f"the plan of {type(self).__name__} gives another number of numbers than slots"
+            )
 
     def __call__(self, values: Values, t: float) -> None:
         """Act on the values of time t [s]."""
@@ -196,3 +200,7 @@ class Convert(Operation):
         numbers = self.numbers
         for k, (target, source) in enumerate(zip(self.slots, self.sources, strict=True)):
             values[target] = numbers[2 * k] * values[source] + numbers[2 * k + 1]
+
+
+# Those that the compiled loop knows; of a class derived from one it would not know what that changes.
+OPERATIONS = (Add, Replace, Hold, Delay, Wrap, Convert)

@@ -10,7 +10,6 @@ import ctypes
 from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterator
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from ...compiled.library import NoLibraryError, asks_for_plain_loop, library
 from ...process.run_state import INSTANCE, STATE
 from ...results.pending_rows import PendingRows
 from ...scenario.faults import TIME_TOLERANCE, Effect
-from ...scenario.operations import Operation
+from ...scenario.operations import OPERATIONS, Operation
 from ..algorithm import Master
 from ..changes import Changes
 from ..stepper import Stepper
@@ -65,7 +64,7 @@ def compiled_run(
         if stepper.access.direct is None:
             raise PlainLoopError(f"{stepper.instance.name} has a process of its own")
         for effect in (*stepper.input_effects, *stepper.output_effects):
-            if not isinstance(effect, Operation | Changes):
+            if type(effect) not in (*OPERATIONS, Changes):
                 raise PlainLoopError(
                     f"a fault of {stepper.instance.name} is a function in Python, not an operation "
                     "(cosim.scenario.operations)"
@@ -80,11 +79,13 @@ def compiled_run(
 
 
 def _operations(effects: list[Effect]) -> list[Operation]:
-    return [
-        *chain.from_iterable(
-            effect.operations() if isinstance(effect, Changes) else [effect] for effect in effects
-        )
-    ]
+    found: list[Operation] = []
+    for effect in effects:
+        if isinstance(effect, Changes):
+            found += effect.operations()
+        elif isinstance(effect, Operation):
+            found.append(effect)
+    return found
 
 
 class _CompiledLoop:
