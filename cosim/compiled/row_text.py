@@ -81,7 +81,7 @@ def compiled_lines(with_zig: bool = False) -> Callable[[Rows], Lines] | None:
             text.ctypes.data,
             ends.ctypes.data,
         )
-        return memoryview(text)[: int(ends[-1]) if count else 0], ends
+        return text.data[: int(ends[-1]) if count else 0], ends
 
     probes = np.array([PROBES])
     expected = orjson.dumps(probes, option=orjson.OPT_SERIALIZE_NUMPY)[2:-2] + b"\n"

@@ -6,7 +6,7 @@ import ctypes
 from array import array
 from collections.abc import Sequence
 from ctypes import POINTER, c_double, c_int64, c_void_p
-from typing import Any, ClassVar
+from typing import Any
 
 from ...fmu.instance import DirectTransfer
 from ...scenario.operations import Operation
@@ -14,7 +14,7 @@ from ..stepper import Stepper
 
 
 class OperationLayout(ctypes.Structure):
-    _fields_: ClassVar[list[tuple[str, Any]]] = [
+    _fields_ = (
         ("code", c_int64),
         ("count", c_int64),
         ("slots", c_void_p),
@@ -26,29 +26,29 @@ class OperationLayout(ctypes.Structure):
         ("memory", c_void_p),
         ("calls", c_void_p),
         ("sources", c_void_p),
-    ]
+    )
 
 
 class CopyLayout(ctypes.Structure):
-    _fields_: ClassVar[list[tuple[str, Any]]] = [
+    _fields_ = (
         ("target", c_int64),
         ("source", c_int64),
         ("count", c_int64),
-    ]
+    )
 
 
 class TransferLayout(ctypes.Structure):
-    _fields_: ClassVar[list[tuple[str, Any]]] = [
+    _fields_ = (
         ("function", c_void_p),
         ("references", c_void_p),
         ("count", c_int64),
         ("values", c_void_p),
         ("slots", c_void_p),
-    ]
+    )
 
 
 class FmuLayout(ctypes.Structure):
-    _fields_: ClassVar[list[tuple[str, Any]]] = [
+    _fields_ = (
         ("component", c_void_p),
         ("number", c_int64),
         ("every", c_int64),
@@ -66,11 +66,11 @@ class FmuLayout(ctypes.Structure):
         ("on_outputs", POINTER(OperationLayout)),
         ("set", POINTER(TransferLayout)),
         ("get", POINTER(TransferLayout)),
-    ]
+    )
 
 
 class LoopLayout(ctypes.Structure):
-    _fields_: ClassVar[list[tuple[str, Any]]] = [
+    _fields_ = (
         ("table", c_void_p),
         ("width", c_int64),
         ("fmus", c_int64),
@@ -88,7 +88,7 @@ class LoopLayout(ctypes.Structure):
         ("index", c_int64),
         ("status", c_int64),
         ("saved", c_int64),
-    ]
+    )
 
 
 STRUCTURES = (OperationLayout, CopyLayout, TransferLayout, FmuLayout, LoopLayout)
