@@ -27,6 +27,7 @@ COSIM_LAYERS = (
     ("system",),
     ("results",),
     ("master", "watch"),
+    ("dispatch",),
     ("export", "campaign"),
     ("run", "metrics", "plots", "interface"),  # commands
 )
@@ -66,6 +67,7 @@ PUBLIC = (
     "cosim",
     "cosim.campaign",
     "cosim.command",
+    "cosim.dispatch",
     "cosim.errors",
     "cosim.export",
     "cosim.fmu",

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
-from ..results.log import CSV, LogWriter
+from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
 from ..results.performance import needed
 from ..system.system import System
@@ -22,21 +22,24 @@ class Recorder:
         system: what runs.
         master: its master.
         folder: for the log; None writes none.
+        memory: gets the log in place of a folder.
 
     Attributes:
         pending: the rows that are not written yet.
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
-    def __init__(self, system: System, master: Master, folder: Path | None) -> None:
+    def __init__(
+        self, system: System, master: Master, folder: Path | None, memory: LogInMemory | None = None
+    ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = None if folder is None else self._log_writer(folder / CSV, system)
+        self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
-        self._kept: list[np.ndarray] = []
+        self._kept: list[np.ndarray] = []  # blocks, shape (1 + names, rows)
         logged = self._slots(table, system.logged)
         self.pending = PendingRows(table.row, logged, system.scenario.log.every)
         self.take = self.pending.take
@@ -72,7 +75,7 @@ class Recorder:
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
             self._writer.write(self.pending.logged(len(times)))
-        self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
+        self._kept.append(np.vstack([times, taken.T[self._kept_slots]]))
         self.pending.clear()
         if message:
             raise SimulationError(message)
@@ -83,5 +86,6 @@ class Recorder:
 
     def kept(self) -> dict[str, np.ndarray]:
         """The columns for metrics and pictures, at every step."""
-        table = np.concatenate(self._kept) if self._kept else np.empty((0, 1 + len(self._kept_names)))
-        return {name: table[:, k] for k, name in enumerate(["time", *self._kept_names])}
+        names = ["time", *self._kept_names]
+        table = np.concatenate(self._kept, axis=1) if self._kept else np.empty((len(names), 0))
+        return dict(zip(names, table, strict=True))

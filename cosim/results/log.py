@@ -107,6 +107,35 @@ class LogWriter:
             self._file.close()
 
 
+class LogInMemory:
+    """A log that is kept in memory, in place of a file.
+
+    Args:
+        columns: names, ``time`` first.
+
+    Attributes:
+        rows: number of rows so far.
+    """
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        self.rows = 0
+        self._names = list(columns)
+        self._blocks: list[np.ndarray] = []
+
+    def write(self, rows: Rows) -> None:
+        """Append rows."""
+        self._blocks.append(rows.block())
+        self.rows += len(rows.times)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def read(self) -> dict[str, np.ndarray]:
+        """What :func:`read_log` reads from the file of the same run, to the bit."""
+        table = np.concatenate(self._blocks) if self._blocks else np.empty((0, len(self._names)))
+        return {name: table[:, k] for k, name in enumerate(self._names)}
+
+
 def _lines(rows: Rows) -> Lines:
     """Lines, and the bytes up to the end of each."""
     found = format_rows(rows.block())
