@@ -20,6 +20,7 @@ COSIM_LAYERS = (
     ("lazy", "errors", "files", "process"),
     ("interrupts", "conversion"),
     ("command",),
+    ("compiled",),
     ("fmu",),
     ("formats",),
     ("scenario",),

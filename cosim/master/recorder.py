@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
@@ -24,6 +25,7 @@ class Recorder:
         memory: gets the log in place of a folder.
 
     Attributes:
+        pending: the rows that are not written yet.
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
@@ -32,15 +34,20 @@ class Recorder:
     ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = memory if folder is None else LogWriter(folder / CSV, self.columns)
+        self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
         self._kept: list[np.ndarray] = []  # blocks, shape (1 + names, rows)
         logged = self._slots(table, system.logged)
-        self._pending = PendingRows(table.row, logged, system.scenario.log.every)
-        self.take = self._pending.take
+        self.pending = PendingRows(table.row, logged, system.scenario.log.every)
+        self.take = self.pending.take
+
+    def _log_writer(self, path: Path, system: System) -> LogWriter:
+        native = system.scenario.native
+        compiled = native is not False and not asks_for_plain_loop()
+        return LogWriter(path, self.columns, compiled, with_zig=bool(native))
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:
@@ -58,7 +65,7 @@ class Recorder:
             SimulationError: an output is not finite; the rows up to there are written.
             OSError: not all could be written; then none can follow.
         """
-        times, taken = self._pending.all()
+        times, taken = self.pending.all()
         message = ""
         # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
         if not np.isfinite(taken).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
@@ -67,9 +74,9 @@ class Recorder:
             message = f"{name} is not finite at t = {times[k]:g} s"
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
-            self._writer.write(self._pending.logged(len(times)))
+            self._writer.write(self.pending.logged(len(times)))
         self._kept.append(np.vstack([times, taken.T[self._kept_slots]]))
-        self._pending.clear()
+        self.pending.clear()
         if message:
             raise SimulationError(message)
 
