@@ -104,8 +104,8 @@ def test_short_writes_lose_nothing_and_a_full_disk_leaves_whole_rows(
     whole = cosim.simulate(scenario, tmp_path / "whole")
     make = LogWriter.__init__
 
-    def short(self, path, columns):
-        make(self, path, columns)
+    def short(self, path, columns, **options):
+        make(self, path, columns, **options)
         position = self._file.tell()
         self._file.close()
         self._file = Short(path, "r+")

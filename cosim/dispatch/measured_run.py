@@ -9,8 +9,9 @@ from tempfile import TemporaryDirectory
 from ..errors import SimulationError
 from ..master.algorithm import Master
 from ..master.loop_surroundings import interruptible
+from ..master.loops.chosen_loop import choose_loop
 from ..master.recorder import Recorder
-from ..master.simulation import simulate
+from ..master.simulation import UPDATE_INTERVAL, simulate
 from ..process.run_state import STATE
 from ..results import performance
 from ..results.log import LogInMemory
@@ -79,11 +80,10 @@ def run_in_memory(
 
 def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:
     """Run to the end, looking for an interrupt after each step."""
-    take = recorder.take
-    take(0.0)
+    recorder.take(0.0)
     try:
-        for t in master.run():
-            if take(t):
+        for _, full in choose_loop(master, recorder.pending, False, UPDATE_INTERVAL).run():
+            if full:
                 recorder.flush()
             if interrupted():
                 raise KeyboardInterrupt
