@@ -8,6 +8,7 @@ from functools import partial
 from ..fmu.instance import Instance
 from ..fmu.memory import Port
 from ..scenario.faults import Effect, Values
+from ..system.recordings import Recorded
 from ..system.system import Connection, System
 from .changes import Changes
 from .value_table import ValueTable
@@ -59,7 +60,7 @@ class Stepper:
             self.step_size,
         )
         self.begin = self._access.begin
-        self.exchange = self._make_exchange(incoming)
+        self.exchange = self._make_exchange(incoming, system.recordings.get(instance.name, ()))
         self.read = self._make_read()
         self.advance = self._make_advance()
 
@@ -75,11 +76,16 @@ class Stepper:
     # The three functions that run every step keep what they need in their own scope, where Python finds
     # it fastest.
 
-    def _make_exchange(self, incoming: Sequence[Connection]) -> Callable[[float], None]:
+    def _make_exchange(
+        self, incoming: Sequence[Connection], recordings: Sequence[Recorded]
+    ) -> Callable[[float], None]:
         values, effects, put = self._table.values, self.input_effects, self._access.put
         copies, runs, conversions = _transfers(incoming, self._table)
         if conversions:
             effects.append(partial(_convert, conversions))
+        slots = self._table.slots
+        for part in recordings:
+            effects.append(part.bind([slots[name] for name in part.names]))
 
         def exchange(t: float) -> None:
             for target, source in copies:
