@@ -42,8 +42,9 @@ DIAGNOSIS_LAYERS = (
     ("session",),
     ("report",),
     ("analysis",),
+    ("open_loop",),
     ("command_line",),
-    ("compare", "learn", "pca", "pls", "sysid"),  # commands
+    ("compare", "learn", "pca", "pls", "replay", "sysid", "watch"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.
@@ -73,7 +74,7 @@ PUBLIC = (
     "cosim.scenario",
     "cosim.system",
 )
-# diagnosis reads logs and parameter sets; it runs nothing.
+# diagnosis reads logs and parameter sets, and plays a run to FMUs.
 PUBLIC_TO_DIAGNOSIS = (
     "cosim",
     "cosim.command",

@@ -115,7 +115,7 @@ class Recording(Strict):
     """Inputs that get their values from a file over time."""
 
     path: Annotated[str, AfterValidator(_table_path)] = Field(
-        description="CSV file with a column 'time' [s], relative to the scenario; rows hold until the next"
+        description="CSV file with a column 'time' [s], relative to the scenario; rows hold over time"
     )
     inputs: dict[str, str] = Field(
         min_length=1,
