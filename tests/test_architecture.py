@@ -53,6 +53,7 @@ FMUS_LAYERS = (
     ("frames", "hull"),
     ("effects",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),
+    ("watch",),
     ("ship",),
     ("fmi",),
     ("native",),
@@ -97,7 +98,7 @@ PUBLIC_OF_FMUS = (
     "fmus.thrusters.allocation",
     "fmus.thrusters.chain",
 )
-COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel")
+COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
     "diagnosis.analysis",
