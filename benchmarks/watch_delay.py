@@ -3,9 +3,10 @@
     python -m benchmarks.watch_delay                       # 200 runs
     python -m benchmarks.watch_delay --runs 24 --out /tmp/watch
 
-Half of the runs have no failure. The detector is ``watch_thrusters``; beside it the threshold on the losses of
-thrust that concurrent learning estimates (``controller_cl_improved``), as 7.2.5 proposes. Both see the same
-estimates of the modified derivative filter. All runs of a batch go on at once, an array for each scalar.
+Half of the runs have no failure. The detector is ``watch_thrusters``; beside it the threshold on the
+losses of thrust that concurrent learning estimates (``controller_cl_improved``), as 7.2.5 proposes. Both
+see the same estimates of the modified derivative filter. All runs of a batch go on at once, an array for
+each scalar.
 """
 
 import argparse
@@ -33,7 +34,7 @@ THRESHOLDS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 
 
 class Told(NamedTuple):
-    """What a detector says of one run: times (n,) [s], and a score of each thruster (n, 2), VSP and bow."""
+    """What a detector says of a run: times (n,) [s], and scores of VSP and bow thruster (n, 2)."""
 
     case: Case
     time: np.ndarray

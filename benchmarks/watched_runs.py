@@ -1,4 +1,4 @@
-"""Runs with and without a failing thruster: ships of several kinds, manoeuvres and noise, many at once."""
+"""Runs with and without a failing thruster: several ships, manoeuvres and noise, many at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from .hidden_effects.fleet import Fleet, Order
 from .hidden_effects.manoeuvres import manoeuvres
 from .hidden_effects.simulated_runs import NOISE, STEP, STOP, Hidden
 
-# What the ships have that the detector's model lacks, constant over the run: instance.parameter -> value.
+# What the ships have that the detector's model lacks, over the whole run: instance.parameter -> value.
 SHIPS: dict[str, dict[str, float]] = {
     "nominal": {},
     "SYSID4": sysid4.parameters(),
@@ -48,7 +48,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """Measurements of a run: time (n,), pose (n, 3), commanded force (n, 3), and the true estimate's end."""
+    """Measurements of a run: time (n,) [s], pose (n, 3), commanded force (n, 3)."""
 
     case: Case
     time: np.ndarray

@@ -1,14 +1,14 @@
 """A linear model of the model error that is stable by construction, 7.4 and 8.1.
 
-The model omega = c + B x that predicts most like a given one (least squares, PLS) under two conditions, see
-docs/stability.md: every force acts to the side that it is asked for, and the hull dissipates no less than
-the nominal one where it operates:
+The model omega = c + B x that predicts most like a given one (least squares, PLS) under two conditions,
+see docs/stability.md: every force acts to the side that it is asked for, and the hull dissipates no less
+than the nominal one where it operates:
 
     sym(I + B_tau) >= EPSILON I,    -nu . F(nu) >= d_nominal nu . M nu
 
-Both are convex in B: linear for each direction of a force, and for each velocity. They are met by cutting
-planes: the problem is solved with some of them, and the most violated ones are added until none is. Each
-problem is one of least distance, by non-negative least squares (Lawson and Hanson 1974, chapter 23).
+Both are convex in B: linear for each direction of a force, and for each velocity. They are met by
+cutting planes: the problem is solved with some of them, and the most violated ones are added until none
+is. Each problem is one of least distance, by non-negative least squares (Lawson and Hanson 1974, 23).
 """
 
 from collections.abc import Sequence
@@ -42,8 +42,8 @@ class Stable:
     Attributes:
         columns: of x, as a recipe names them.
         c, B: (3,) [N, N, N m] and (3, m), of omega = c + B x.
-        r2, given_r2: (3,), share of the sum of squares of omega about the mean that it explains, and that
-            the given model does.
+        r2, given_r2: (3,), share of the sum of squares of omega about the mean that it explains, and
+            that the given model does.
         changed: whether the given model was not stable.
     """
 
@@ -77,7 +77,7 @@ def dissipation_conditions(columns: tuple[str, ...], region: OperatingRegion) ->
 
 
 def thrust_cuts(B: np.ndarray, columns: Sequence[str]) -> Conditions:
-    """Conditions of the directions in which a force acts too little to its side; none where all is well."""
+    """Conditions of the directions in which a force acts too little to its side, if there are any."""
     B_tau = force_columns(B, columns)
     values, vectors = np.linalg.eigh(np.eye(3) + 0.5 * (B_tau + B_tau.T))
     rows, least = [], []
@@ -105,7 +105,7 @@ def nearest_stable(
         X: (n, m), samples of the columns.
         omega: (n, 3), model error relative to (2.27) [N, N, N m].
         columns: names, of those that the effect ``linear_map`` has.
-        B: (3, m), given; by default that of least squares, so that the result is constrained least squares.
+        B: (3, m), given; by default that of least squares, which gives constrained least squares.
         region: speeds at which the dissipation counts.
 
     Raises:
@@ -139,7 +139,7 @@ def nearest_stable(
 def _least_distance(
     given: np.ndarray, root: np.ndarray, size: np.ndarray, G: np.ndarray, h: np.ndarray
 ) -> np.ndarray:
-    """The B with G vec(B) >= h whose predictions are nearest to those of the given one, axes by their size."""
+    """The B with G vec(B) >= h that predicts most like the given one, axes weighted by their size."""
     m = given.shape[1]
     parts = G.reshape(-1, 3, m)
     # In coordinates in which the distance is Euclidean: B_k = given_k + size_k root^-1 z_k.

@@ -105,6 +105,12 @@ def loop_of(run: Path, controller: str, observer: str | None, scenario: Path | N
     return Loop(law, eyes, thrusters, taken.get("guidance"), told, own and scenario is None)
 
 
+def watch_loop(run: Path, watch: str, observer: str | None, scenario: Path | None) -> Loop:
+    """The observer as of :func:`loop_of`, and a detector in the controller's place."""
+    found = loop_of(run, watch, observer, scenario)
+    return replace(found, guidance=None, thrusters=None, told=True)
+
+
 def _content_of(run: Path) -> dict[str, Any] | None:
     """The scenario of a log of this project."""
     sidecar = (run if run.is_dir() else run.parent) / "log.json"
@@ -234,7 +240,7 @@ def _scenario(
     if loop.guidance is not None and (source.target is None or gaps):
         fmus["guidance"] = loop.guidance
         connections.append(["guidance.*", "controller.*"])
-    elif source.target is None:
+    elif source.target is None and loop.thrusters is not None:
         notes.append(
             "the run has no target, and no --scenario gives one: errors are zero, and the requested "
             "force says nothing; learning by ε needs neither"

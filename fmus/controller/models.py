@@ -170,9 +170,9 @@ def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullBelief) -> Regressor
     return (-MX - CX, X, -tau[0]), (-MY - CY, Y, -tau[1]), (-MN - CN, N, -tau[2])
 
 
-# (2.20)-(2.23): phi is what the factors of inertia and damping exceed 1 by, and what that of the thrust
-# lacks to 1. All three factors times one number are the same ship, so that one must be known: with its
-# gain of zero it is the thrust. To learn the thrust, take the gain of the inertia, which a balance tells.
+# (2.20)-(2.23): phi is what the factors of inertia and damping exceed 1 by, and what the thrust's factor
+# lacks to 1. All three factors times one number are the same ship, so that one must be known: the
+# thrust's, as its gain is zero. To learn it, set the gain of the inertia to zero: a balance tells that.
 SCALED = Parametrisation(
     coefficients=(
         Coefficient("delta_M - 1", "1", "excess of the inertia's factor", 0.0, 1.0),

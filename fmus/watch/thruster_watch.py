@@ -1,11 +1,12 @@
 """Tells that a thruster has lost force: which, since when, how sure; 7.2.5 and Fig. 7.3.
 
-The model error omega = M nu' + C(nu)nu + D(nu)nu - tau of the whole hull, low-passed so that no acceleration
-is needed, is told as the forces g that the thrusters seem to give too much. What of g is usual for a
-velocity and a command is learned by recursive least squares from samples that are older than a window.
-In the window, a thruster that lost a share s of its force f leaves g = -s f of its own: the generalised
-likelihood ratio over s and over the time of the failure, divided by its mean so far (which is 1 for white
-noise), against the odds of a failure. While a failure is told, nothing is learned.
+The model error omega = M nu' + C(nu)nu + D(nu)nu - tau of the whole hull, low-passed so that no
+acceleration is needed, is written as the forces g that the thrusters seem to give too much. What of g is
+usual for a velocity and a command is learned by recursive least squares from samples that are older than
+a window. In the window, a thruster that lost a share s of its force f leaves g = -s f of its own: its
+likelihood ratio, the largest over s and over the time of the failure, is divided by its mean so far
+(which is 1 for white noise) and held against the odds of a failure. While one is told, nothing is
+learned.
 
 The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
 """
@@ -27,8 +28,8 @@ ROWS = 20  # of the window
 LEAST_ROWS = 4  # since the failure, before it is told
 COUNT = 7  # regressors of what is usual: 1, u, v, r, and the forces of the three thrusters
 STILL: Triple = (0.0, 0.0, 0.0)
-# Prior standard deviations of what is usual [N per 1, m/s, m/s, rad/s, N, N, N]; chosen: a hull and thrusters
-# that differ from their model by as much as Table 7.1 says.
+# Prior standard deviations of what is usual [N per 1, m/s, m/s, rad/s, N, N, N]; chosen: a hull and
+# thrusters that differ from their model by as much as Table 7.1 says.
 SPREAD = (0.3, 3.0, 3.0, 2.0, 0.4, 0.4, 0.4)
 START = 5.0  # s of judging that the first values of mean square and ratios count for (chosen)
 HUBER = 3.0  # standard deviations that a single sample counts for at the most (chosen)
@@ -46,9 +47,8 @@ class Params(NamedTuple):
     least_loss: Annotated[float, "1", "share of thrust below which no loss is told", Range(0.0, 1.0)] = (
         0.15
     )
-    failures_per_hour: Annotated[float, "1/h", "how often a failure is to be expected", Range(1e-9)] = (
-        0.1
-    )
+    # One in ten hours: chosen.
+    failure_rate: Annotated[float, "1/s", "how often a failure is to be expected", Range(1e-12)] = 2.8e-5
 
 
 class Outputs(NamedTuple):
@@ -77,8 +77,8 @@ class Row(NamedTuple):
 
 
 class Usual(NamedTuple):
-    """What is usual: covariance of the regressors' weights over the noise, weights of each g, mean square
-    error of the prediction, mean likelihood ratios, and how long was learned, and judged by that [s]."""
+    """What is usual: covariance of the regressors' weights over the noise, weights of each g, mean
+    square error of the prediction, mean likelihood ratios, how long was learned, and judged [s]."""
 
     P: tuple[tuple[Any, ...], ...] = tuple(
         [
@@ -165,8 +165,8 @@ def learned(usual: Usual, old: Row, p: Params) -> Usual:
 
 
 def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: Number) -> Any:
-    """Likelihood ratio of a loss on some of the axes of g: of the whole window, the largest over the time
-    of the failure, with the share lost and that time."""
+    """Likelihood ratio of a loss on some of the axes of g: of the whole window, and the largest over the
+    time of the failure, with the share lost and that time."""
     up, full, down, best, share, since = 0.0, 0.0, 1e-12, 0.0, 0.0, 0.0
     for k, row in enumerate(rows):
         error = unusual(row, usual)
@@ -190,7 +190,7 @@ def judged(rows: tuple[Row, ...], usual: Usual, p: Params) -> tuple[tuple[Any, A
     whole_v, best_v, lost_v, since_v = evidence(rows, usual, (0, 1), p.least_loss)
     whole_b, best_b, lost_b, since_b = evidence(rows, usual, (2,), p.least_loss)
     # A failure somewhere in the window, at any of its times.
-    expected = p.failures_per_hour / 3600.0 * p.sample_time
+    expected = p.failure_rate * p.sample_time
     against = -log(expected)
     odds = [
         exp(clip(0.5 * best / fmax(mean, 1.0) - against, -NEVER_SURE, NEVER_SURE))
