@@ -23,7 +23,14 @@ from cosim import InputError
 from fmus.effects.linear_map import REGRESSORS
 from fmus.effects.linear_map import regressors as regressors_at
 
-from ..assessment.stability import OPERATING, OperatingRegion, dissipation, mass, sampled_motions
+from ..assessment.stability import (
+    OPERATING,
+    OperatingRegion,
+    dissipation,
+    least_dissipation,
+    mass,
+    sampled_motions,
+)
 from ..model import Model
 from .into_the_plant import EPSILON, as_model, force_columns, goes_into_the_plant, regressor
 from .samples import TAU
@@ -68,7 +75,7 @@ def dissipation_conditions(columns: tuple[str, ...], region: OperatingRegion) ->
     """Dissipation of a hull with the map, no less than the nominal one's least, over a region."""
     metric, nu = mass(Model()), sampled_motions(region)
     base = as_model(np.zeros(3), np.zeros((3, len(columns))), columns)
-    least = float(dissipation(Model(), nu, metric).min())
+    least = least_dissipation(Model(), region)
     values = dict(zip(REGRESSORS, regressors_at(*nu.T, (0.0, 0.0, 0.0)), strict=True))
     x = np.column_stack([np.broadcast_to(values[regressor(c)], len(nu)) for c in columns])
     energy = np.einsum("ij,jk,ik->i", nu, metric, nu)
@@ -109,7 +116,7 @@ def nearest_stable(
         region: speeds at which the dissipation counts.
 
     Raises:
-        InputError: the plant has no such columns, or no model of them is stable.
+        InputError: the plant has no such columns, or the cuts do not come to an end.
     """
     names = list(columns)
     if not goes_into_the_plant(names):
@@ -156,7 +163,7 @@ def _least_distance(
     u, _ = nnls(E, goal, maxiter=50 * E.shape[1])
     rest = E @ u - goal
     if abs(rest[-1]) < 1e-12:
-        raise InputError("no stable model of these columns exists: their hull cannot be braked enough")
+        raise InputError("the conditions of a stable model contradict each other")
     z = (-rest[:-1] / rest[-1] * scale).reshape(3, m)
     return given + np.array([size[k] * solve_triangular(root, z[k]) for k in range(3)])
 
