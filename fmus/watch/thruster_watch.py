@@ -217,8 +217,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     quiet = where(e.frozen > 0.5, 0.0, s.quiet + h)
     waited = s.waited + h
     time = s.time + h
-    # The low pass forgets a jump at the end of a freeze in a few time constants.
-    due = (h > 0.0) & (waited > p.sample_time * (1.0 - 1e-9)) & (quiet > 2.0 * p.filter_time)
+    # The low pass forgets a jump at the end of a freeze in a few time constants; times within rounding.
+    ready = (waited > p.sample_time * (1.0 - 1e-9)) & (quiet > 2.0 * p.filter_time * (1.0 - 1e-9))
+    due = (h > 0.0) & ready
 
     def sampled() -> tuple[tuple[Row, ...], Usual, Outputs]:
         omega = (moved[0] - rest[0], moved[1] - rest[1], moved[2] - rest[2])
