@@ -19,7 +19,9 @@ from fmus.effects.text import Found
 
 
 def values(effect, x):
-    return dict.fromkeys(effect.coefficients, x)
+    """Every parameter x; the ends of an interval after its start."""
+    ends = {end: 2.0 * x for _, end in effect.search.intervals}
+    return dict.fromkeys(effect.coefficients, x) | ends
 
 
 @pytest.mark.parametrize("name", STANDARD)
@@ -51,6 +53,12 @@ def test_the_other_sign_says_the_other(name):
     [
         ("mass", {"mass": 3.1}, "The ship has 3.1 kg more mass than the model believes."),
         ("bow_failure", {"bow_failure_time": 118.0}, "The bow thruster is dead from t = 118 s on."),
+        (
+            "bow_outage",
+            {"bow_outage_start_1": 40.0, "bow_outage_end_1": 48.0, "bow_outage_end_3": 15.5},
+            "The bow thruster is dead from 0 to 15.5 s and from 40 to 48 s.",
+        ),
+        ("vsp_outage", {}, "The propellers are dead at no time."),
         ("loss_surge", {"loss_surge": 0.3}, "Of the commanded surge force 30 % do not arrive."),
         ("current", {"V_n": 0.0, "V_e": 0.05}, "The water moves at 0.05 m/s towards 90°."),
         (

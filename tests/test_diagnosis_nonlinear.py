@@ -45,6 +45,12 @@ def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure(
         assert not candidate([w], model, base, STANDARD["bow_outage"]).shapes
 
 
+def test_what_is_dead_most_of_the_time_is_no_outage():
+    w = integrals(smoothed(sail(64.0, thrusters=times("vsp", [(8.0, 45.0)]))[0]))
+    model = Model()
+    assert not candidate([w], model, model_error([w], model), STANDARD["vsp_outage"]).shapes
+
+
 def test_dynamic_programming_gives_the_least_sum():
     """Against all ways to place up to one interval, and up to what is charged for more."""
     rng = np.random.default_rng(1)

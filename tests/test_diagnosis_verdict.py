@@ -10,6 +10,7 @@ from support.planted import bank, dead_bow, gusts, voyages
 import diagnosis
 from diagnosis import Model, Run, integrals, omega
 from diagnosis.assessment.recurrence import recurrence
+from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import axis_remainders
 from diagnosis.identification.acceptance import worse
 from diagnosis.identification.confidence import confidence, evidence
@@ -74,15 +75,24 @@ def test_remainder_repeats_with_what_it_was_made_of(lap, space):
     assert how.lasts > 2.0
 
 
+def test_error_that_is_large_in_one_part_of_the_basin_is_said_to_be_there(lap):
+    (w,) = lap
+    noise = 0.01 * np.random.default_rng(2).standard_normal((w.middle.size, 3))
+    north = w.smooth @ np.nan_to_num(w.smoothed.eta[:, 0])
+    found = find_regions(lap, [np.where(north > 1.0, 8.0, 1.0)[:, None] * noise], [0.2 * np.abs(noise)])
+    assert all("worst north of 0.9" in sentence for sentence in found.sentences)
+
+
 def test_force_that_depends_on_the_place_is_a_remainder():
     assert left(voyages(**SHORT, **BANK))["N"].significant
 
 
-@pytest.mark.slow
-def test_force_that_fails_at_times_is_told_by_its_command():
-    runs = voyages(**DEAD)
-    assert left(runs)["N"].significant
-    assert recurrence(runs, np.concatenate([omega(w, Model()) for w in runs]))[2].in_part
+@pytest.mark.parametrize("at_times", [True, False])
+def test_part_of_a_command_that_comes_and_goes_is_told_from_a_force_that_does(lap, at_times):
+    (w,) = lap
+    dead = ((w.run.time // 8.0) % 3.0 == 1.0).astype(float)
+    left = w.held @ (dead[:, None] * (w.run.tau_cmd if at_times else np.ones(3)))
+    assert [axis.in_part for axis in recurrence(lap, left)] == [at_times] * 3
 
 
 def learned(runs, prior):
@@ -142,12 +152,17 @@ def test_coefficient_far_outside_of_the_prior_is_an_effect():
 
 @pytest.mark.slow
 @pytest.mark.numerical
-def test_thruster_that_fails_at_times_gives_no_sure_finding():
+def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     found = learned(voyages(**DEAD), 0.1)
-    assert found.remainder.significant
-    assert all(f.confidence < 0.8 for f in found.learned.effects)
+    assert found.verdict == "found"
+    (effect,) = found.learned.effects
+    assert effect.id == "bow_outage"
+    assert effect.confidence > 0.9
+    ends = sorted(effect.values.values())
+    assert ends == pytest.approx([11.0, 15.0, 40.0, 48.0, 71.0, 75.0, 100.0, 108.0], abs=0.3)
+    assert not found.remainder.significant
     for e in found.comparison.evaluations:
-        assert e.after.position < 1.5 * e.before.position
+        assert e.after.position < 0.5 * e.before.position
 
 
 def finding(start, **values):

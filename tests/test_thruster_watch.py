@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from benchmarks.watch_delay import Told, outcome
-from benchmarks.watched_runs import cases
 from support.project import ROOT
 
 import cosim
+from benchmarks.watch_delay import Told, outcome
+from benchmarks.watched_runs import cases
 from diagnosis.watch import main
 from fmus.controller.backstepping import Applied, Inputs
 from fmus.watch import thruster_watch as watch

@@ -1,4 +1,4 @@
-"""Covariates of the model error: time, speed, yaw rate, thruster level and heading of each window."""
+"""Covariates of the model error: time, place, speed, yaw rate, thruster level and heading of windows."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -93,6 +93,12 @@ HEADING = Covariate(
     bounded=True,
     cyclic=True,
 )
+NORTH = Covariate(
+    "north", "m", 1.0, "north of {0} m", "south of {0} m", "from {0} to {1} m north", _quantiles, True
+)
+EAST = Covariate(
+    "east", "m", 1.0, "east of {0} m", "west of {0} m", "from {0} to {1} m east", _quantiles, True
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +132,13 @@ def covariates_by_axis(data: Sequence[Integrals]) -> list[list[CovariateValues]]
     counts = [w.middle.size for w in data]
     every = np.arange(sum(counts))
     first = np.cumsum([0, *counts])
-    speed, turn, level, heading = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
+    speed, turn, level, heading, place = map(np.concatenate, zip(*map(_of_run, data), strict=True))
     shared = [
         CovariateValues(SPEED, every, speed),
         CovariateValues(YAW_RATE, every, turn),
         CovariateValues(HEADING, every, heading),
+        CovariateValues(NORTH, every, place[:, 0]),
+        CovariateValues(EAST, every, place[:, 1]),
     ]
     times = [
         CovariateValues(TIME, np.arange(a, a + w.middle.size), w.middle, w.run.name)
@@ -144,9 +152,11 @@ def _of_run(w: Integrals) -> tuple[np.ndarray, ...]:
     """Means over the windows of a run.
 
     Returns:
-        Speed (K,) [m/s], yaw rate (K,) [rad/s], command by axis (K, 3) [N, N, N m], heading (K,) [rad].
+        Speed (K,) [m/s], yaw rate (K,) [rad/s], command by axis (K, 3) [N, N, N m], heading (K,) [rad],
+        place (K, 2) [m].
     """
     nu, eta = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.nu, w.smoothed.eta))
     heading = np.arctan2(w.smooth @ np.sin(eta[:, 2]), w.smooth @ np.cos(eta[:, 2]))
     magnitude = w.smooth @ np.abs(nu[:, [0, 2]])
-    return magnitude[:, 0], magnitude[:, 1], w.held @ np.abs(w.run.tau_cmd), heading
+    level, place = w.held @ np.abs(w.run.tau_cmd), w.smooth @ eta[:, :2]
+    return magnitude[:, 0], magnitude[:, 1], level, heading, place

@@ -195,7 +195,9 @@ def with_intervals(
     """
     p = problem(data, model, base, e)
     spans = [] if p is None else intervals(p)
-    if p is None or not spans or (e.search.lasting and len(spans) == 1 and spans[0][1] == p.count):
+    if p is None or not spans or not p.passing(spans):
+        return []
+    if e.search.lasting and len(spans) == 1 and spans[0][1] == p.count:
         return []
     return [additions(model, e, named(e, p.seconds(spans)))]
 

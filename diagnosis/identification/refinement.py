@@ -285,7 +285,7 @@ def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start)
         p = whole.weighted(np.asarray(t.sigma))
         spans = p.cells(intervals_of(e, present))
         better = segmented(p, spans)
-        if not better or p.cost(better) > p.cost(spans) - ENOUGH:
+        if not better or not p.passing(better) or p.cost(better) > p.cost(spans) - ENOUGH:
             break
         present = named(e, p.seconds(better))
         found = _gauss_newton(t, at, along, replace(start, values=present))

@@ -36,6 +36,9 @@ LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one de
 
 SETTLED = 0.95  # share of the noise by which it must still fall for another round; chosen
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
+# Share of the time at work of a thruster in which it fails at the most: what is so most of the time is
+# the rule and no failure, such as a dead band of small commands; chosen.
+EXCEPTION = 0.5
 RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
 Interval = tuple[float, float]
@@ -56,6 +59,7 @@ class Problem:
         along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
         precision, offset: (q, q) and (q,), of the nuisance parameters.
         most: intervals, at the most.
+        work: (m,), share of the time in which the thruster is commanded, in each cell.
     """
 
     first: float
@@ -68,6 +72,11 @@ class Problem:
     precision: np.ndarray
     offset: np.ndarray
     most: int
+    work: np.ndarray
+
+    def passing(self, spans: Spans) -> bool:
+        """Whether the thruster works for at least half of the time for which it is commanded."""
+        return sum(float(self.work[a:b].sum()) for a, b in spans) <= EXCEPTION
 
     @property
     def charge(self) -> float:
@@ -260,10 +269,11 @@ def problem(
     dead = model.plus({start: first - model.value(start), end: last - model.value(end)})
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
-    parts = []
+    parts, work = [], np.zeros(count)
     for w in data:
         lost = thrust_along(w, model) - thrust_along(w, dead)
         place = np.clip(((w.run.time - first) / cell + 1e-6).astype(int), 0, count - 1)
+        work += np.bincount(place, np.any(lost != 0.0, axis=1), count)
         where = csr_matrix((np.ones(place.size), (np.arange(place.size), place)), (place.size, count))
         force = [w.held @ diags(-axis) @ where for axis in lost.T]
         by_axis = vstack([sum(f * g for f, g in zip(force, gain, strict=True)) for gain in turned.T])
@@ -285,4 +295,5 @@ def problem(
         precision,
         offset,
         len(e.search.intervals),
+        work / work.sum(),
     )

@@ -43,6 +43,8 @@ def pairs_of(parameters: Sequence[Variable]) -> tuple[tuple[str, str], ...]:
 def spans(f: Found) -> str:
     """The intervals of an outage in words."""
     found = [(f[a], f[b]) for a, b in pairs_of(f.effect.parameters) if f[b] > f[a]]
+    if not found:
+        return "at no time"
     *most, last = [f"from {number(a)} to {number(b)} s" for a, b in sorted(found)]
     return f"{', '.join(most)} and {last}" if most else last
 
@@ -62,7 +64,7 @@ BOW, VSP = outage_parameters("bow"), outage_parameters("vsp")
     needs=("bow",),
     parameters=BOW,
     search=Search(intervals=pairs_of(BOW), lasting="bow_failure"),
-    wording=Wording(lambda f: f"The bow thruster gives nothing {spans(f)}.", BOW_THRUSTER),
+    wording=Wording(lambda f: f"The bow thruster is dead {spans(f)}.", BOW_THRUSTER),
 )
 def bow_outage(f: Thrust, now: Running, *times: Number) -> Thrust:
     """Bow thruster dead during intervals."""
@@ -81,7 +83,7 @@ def bow_outage(f: Thrust, now: Running, *times: Number) -> Thrust:
     needs=("vsp",),
     parameters=VSP,
     search=Search(intervals=pairs_of(VSP)),
-    wording=Wording(lambda f: f"The propellers give nothing {spans(f)}.", PROPELLERS),
+    wording=Wording(lambda f: f"The propellers are dead {spans(f)}.", PROPELLERS),
 )
 def vsp_outage(f: Thrust, now: Running, *times: Number) -> Thrust:
     """Voith Schneider propellers dead during intervals."""
