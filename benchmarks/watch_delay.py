@@ -79,13 +79,15 @@ def watched(runs: Sequence[Watched], component: Component, score: Callable[[Any]
 
     pose, tau = filled("pose"), filled("tau")
     seen = parameters(mdf.COMPONENT, measurement_period=STEP)
-    first = mdf.Inputs(Measurement(*pose[0]), Force(*tau[0]))
+    first = mdf.COMPONENT.inputs(Measurement(*pose[0]), Force(*tau[0]))
     eye, estimate = mdf.step(mdf.init(first, seen), first, seen, 0.0)
     p = parameters(component)
     state = component.init(Inputs(estimate, applied=Applied(*tau[0])), p)
     found = []
     for k in range(1, steps):
-        eye, estimate = mdf.step(eye, mdf.Inputs(Measurement(*pose[k]), Force(*tau[k - 1])), seen, STEP)
+        eye, estimate = mdf.step(
+            eye, mdf.COMPONENT.inputs(Measurement(*pose[k]), Force(*tau[k - 1])), seen, STEP
+        )
         if k % EVERY == 0:
             acted = Applied(*tau[k - EVERY : k].mean(axis=0))
             state, out = component.step(state, Inputs(estimate, applied=acted), p, EVERY * STEP)

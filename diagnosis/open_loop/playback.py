@@ -20,7 +20,7 @@ from fmus.declare import Component, variables
 from fmus.thrusters.allocation import Allocation
 
 from ..progress import Advance, silent
-from .source import COMMAND, TARGET, Source
+from .run_source import COMMAND, TARGET, Source
 
 Entry = dict[str, Any]  # of an FMU in a scenario
 POSE = ("x_m", "y_m", "psi_m")

@@ -12,7 +12,7 @@ from ..report.formatting import number, percent
 from ..report.panels import figure_of
 from ..report.svg import AFTER, BAND, BEFORE
 from .replayed import Replay, stretches
-from .source import ASKED, COMMAND, ERRORS
+from .run_source import ASKED, COMMAND, ERRORS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

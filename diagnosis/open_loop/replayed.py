@@ -6,7 +6,7 @@ import numpy as np
 
 from ..smoothing import smooth
 from .playback import Played
-from .source import COMMAND
+from .run_source import COMMAND
 
 WITHIN = 1.0  # s after a spike in which an observer's estimate still shows it, 7.1.1
 INSTANCE = {**dict.fromkeys(COMMAND, "thrusters")}  # of what is not the controller's
