@@ -1,56 +1,80 @@
 """What a campaign costs beside its runs: ``python -m benchmarks.campaign_speed``.
 
-The ellipse with faults and metrics, over seeds. The same runs in a bare loop of one process (FMUs loaded
-once and reset), as a campaign in this process, on one worker and on two. Repeats are interleaved. At the
-end, the memory of a process over many short runs.
+The ellipse with faults and metrics, over seeds: the same runs in a bare loop of one process (FMUs loaded
+once and reset), as a campaign in this process, on one worker and on two. Repeats are interleaved; wall
+time, and processor time of all processes. Then what a run costs beside its steps, and the memory of a
+process over many short runs.
 """
 
 import argparse
 import json
 import os
 import platform
+import resource
 import statistics
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent
+# Runs of two steps that tell the cost beside the steps, and those before, in which all is loaded.
+SHORT, WARM = 200, 20
 
 
-def axes(runs: int, stop: float, first: int) -> dict[str, Any]:
-    """A campaign of the ellipse over seeds that were not used before."""
-    return {
-        "scenario": str(ROOT / "scenarios" / "ellipse.json"),
-        "axes": {
-            "stop": {"set": "stop", "values": [stop]},
-            "seed": {"set": "seed", "values": list(range(first, first + runs))},
-        },
-    }
+class Taken(NamedTuple):
+    """Time [s] that some runs took: by the clock, and of the processors."""
+
+    wall: float
+    processor: float
 
 
-def campaign(content: dict[str, Any], workers: int) -> tuple[float, Any]:
-    """Wall time [s] of a campaign, and its table."""
+def axes(scenario: Path, runs: int, first: int) -> dict[str, Any]:
+    """A campaign over seeds that were not used before."""
+    seeds = list(range(first, first + runs))
+    return {"scenario": str(scenario), "axes": {"seed": {"set": "seed", "values": seeds}}}
+
+
+def ellipse(folder: Path, native: bool, stop: float, **keys: Any) -> Path:
+    """The shipped ellipse with another end, in a file of its own."""
+    content = json.loads((ROOT / "scenarios" / "ellipse.json").read_text())
+    path = folder / f"{'native' if native else 'python'}_{stop:g}.json"
+    path.write_text(json.dumps(content | {"native": native, "stop": stop} | keys))
+    return path
+
+
+def processor() -> float:
+    """Processor time [s] of this process and of those that it has waited for."""
+    whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    found = [resource.getrusage(who) for who in whom]
+    return sum(used.ru_utime + used.ru_stime for used in found)
+
+
+def timed(work: Callable[[], object]) -> Taken:
+    started, used = time.perf_counter(), processor()
+    work()
+    return Taken(time.perf_counter() - started, processor() - used)
+
+
+def campaign(content: dict[str, Any], workers: int) -> None:
+    """The runs as a campaign."""
     import cosim
 
     with tempfile.TemporaryDirectory(prefix="speed_") as folder:
-        started = time.perf_counter()
         made = cosim.run_campaign(content, folder, workers=workers)
-        return time.perf_counter() - started, made
+    assert set(made["status"]) == {"done"}
 
 
-def bare(content: dict[str, Any]) -> float:
-    """Wall time [s] of the same runs without campaign: prepare, step, compute the metrics."""
+def bare(content: dict[str, Any]) -> None:
+    """The same runs without campaign: prepare, step, compute the metrics."""
     import cosim
     from cosim.master import Master
     from cosim.results import compute
     from cosim.system import InstancePool, prepare
 
     scenario = json.loads(Path(content["scenario"]).read_text())
-    scenario["stop"] = content["axes"]["stop"]["values"][0]
-    started = time.perf_counter()
     system = prepare(cosim.load_scenario(scenario))
     pool = InstancePool({model.sha256 for model in system.models.values()})
     for seed in content["axes"]["seed"]["values"]:
@@ -64,10 +88,18 @@ def bare(content: dict[str, Any]) -> float:
         compute(columns, varied.scenario.metrics.start, varied.scenario.metrics.stop)
     pool.close()
     system.close()
-    return time.perf_counter() - started
 
 
-def memory(runs: int) -> list[float]:
+def beside_steps(folder: Path, native: bool) -> float:
+    """Processor time [ms] of a run of two steps in a campaign of this process."""
+    path = ellipse(folder, native, 0.02, metrics={})
+    few, many = (
+        timed(lambda n=n: campaign(axes(path, n, 0), 0)).processor for n in (WARM, WARM + SHORT)
+    )
+    return 1e3 * (many - few) / SHORT
+
+
+def memory(folder: Path, native: bool, runs: int) -> list[float]:
     """Resident memory [MiB] of this process after each tenth of many short runs."""
     import cosim
 
@@ -79,11 +111,33 @@ def memory(runs: int) -> list[float]:
             pages = int(Path("/proc/self/statm").read_text().split()[1])
             found.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
 
-    content = axes(runs, 1.0, 0)
-    content["axes"]["since"] = {"set": "metrics.from", "values": [0.0]}
-    with tempfile.TemporaryDirectory(prefix="speed_") as folder:
-        cosim.run_campaign(content, folder, workers=0, progress=progress)
+    content = axes(ellipse(folder, native, 1.0, metrics={}), runs, 0)
+    with tempfile.TemporaryDirectory(prefix="speed_") as out:
+        cosim.run_campaign(content, out, workers=0, progress=progress)
     return found
+
+
+def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
+    """Print what the runs take in each place."""
+    path = ellipse(folder, native, options.stop)
+    cases: dict[str, Callable[[dict[str, Any]], None]] = {
+        "bare loop": bare,
+        "campaign, this process": lambda c: campaign(c, 0),
+        "campaign, 1 worker": lambda c: campaign(c, 1),
+        "campaign, 2 workers": lambda c: campaign(c, 2),
+    }
+    campaign(axes(path, 1, 0), 0)  # builds the FMUs, and reads all modules
+    taken: dict[str, list[Taken]] = {name: [] for name in cases}
+    for k in range(options.repeat):
+        for name, work in cases.items():
+            content = axes(path, options.runs, 1 + k * options.runs)
+            taken[name].append(timed(lambda w=work, c=content: w(c)))
+    kind = "native" if native else "Python"
+    print(f"{kind} FMUs, {options.runs} runs of {options.stop:g} s; medians")
+    print(f"{'':28}{'wall s':>9}{'runs/s':>9}{'processor s':>13}{'a run, s':>10}")
+    for name, each in taken.items():
+        wall, used = (statistics.median(column) for column in zip(*each, strict=True))
+        print(f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -93,27 +147,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--stop", type=float, default=198.0, help="end of a run [s] (198)")
     parser.add_argument("--repeat", type=int, default=3, help="how often each is timed (3)")
     parser.add_argument("--short", type=int, default=1000, help="runs of 1 s for the memory (1000)")
+    parser.add_argument("--python", action="store_true", help="Python FMUs, which are slow (native)")
     options = parser.parse_args(arguments)
-    cases: dict[str, Callable[[dict[str, Any]], float]] = {
-        "bare loop": bare,
-        "campaign, this process": lambda c: campaign(c, 0)[0],
-        "campaign, 1 worker": lambda c: campaign(c, 1)[0],
-        "campaign, 2 workers": lambda c: campaign(c, 2)[0],
-    }
-    times: dict[str, list[float]] = {name: [] for name in cases}
-    for k in range(options.repeat):
-        for name, timed in cases.items():
-            times[name].append(timed(axes(options.runs, options.stop, 100 * k)))
-    print(
-        f"Python {platform.python_version()}, {options.runs} runs of {options.stop:g} s, wall time [s]"
-    )
-    print(f"{'':28}{'median':>9}{'smallest':>10}{'runs/s':>9}")
-    for name, each in times.items():
-        median = statistics.median(each)
-        print(f"{name:28}{median:9.2f}{min(each):10.2f}{options.runs / median:9.3f}")
-    if options.short:
-        found = memory(options.short)
-        print(f"memory over {options.short} runs of 1 s [MiB]: {', '.join(f'{m:.1f}' for m in found)}")
+    print(f"Python {platform.python_version()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    with tempfile.TemporaryDirectory(prefix="speed_") as scratch:
+        folder, native = Path(scratch), not options.python
+        compare(folder, native, options)
+        print(f"beside its steps a run takes {beside_steps(folder, native):.1f} ms of processor time")
+        if options.short:
+            found = memory(folder, native, options.short)
+            told = ", ".join(f"{m:.1f}" for m in found)
+            print(f"memory over {options.short} runs of 1 s [MiB]: {told}")
     return 0
 
 

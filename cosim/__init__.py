@@ -8,9 +8,10 @@ runs a scenario; from Python::
     result = cosim.simulate(cosim.load_scenario("scenarios/ellipse.json"), "results/ellipse")
     log = cosim.read_log(result.folder)
 
-The packages below, each using only those before it: ``fmu`` (one FMU), ``formats`` (files of the SSP and
-OSP standards), ``scenario`` (the user's input), ``system`` (a scenario checked against its FMUs),
-``results`` (log, metrics, pictures), ``master`` (the run), ``campaign`` (many runs), ``export``
+The packages below, each using only those before it: ``compiled`` (C for the step loop and the log),
+``fmu`` (one FMU), ``formats`` (files of the SSP and OSP standards), ``scenario`` (the user's input),
+``system`` (a scenario checked against its FMUs), ``results`` (log, metrics, pictures), ``master`` (the
+run), ``dispatch`` (runs in many processes), ``campaign`` (many runs and their table), ``export``
 (systems for other tools).
 """
 

@@ -79,6 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         complain(error)
         return BAD_INPUT
+    if options.verbose and result.loop:
+        why = f": {result.loop_reason}" if result.loop_reason else ""
+        show(f"note: the {result.loop} step loop ran{why}")
     handlers = on_interrupt(_no_interrupt)  # the run has ended, and its log says how
     try:
         with suppress(BrokenPipeError):
@@ -184,6 +187,7 @@ def _parser() -> argparse.ArgumentParser:
         help="SSP parameter set whose values override the scenario's; may be given several times",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
+    parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
         "--only-own",

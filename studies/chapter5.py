@@ -13,9 +13,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import cosim
+from cosim.dispatch import FinishedRun
 from cosim.results import draw
 
-from .monte_carlo import Content, interval, ratio, run_all, shipped, vary
+from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
 from .outcome import LEARNED_FROM, Outcome, columns, outcome, true_states
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
@@ -77,20 +78,20 @@ def seeds_of(condition: str, seeds: Sequence[int]) -> Sequence[int]:
     return seeds if condition in SENSES else seeds[:3]
 
 
-def run(seeds: Sequence[int], seconds: float | None, jobs: int | None) -> dict[str, Table]:
+def run(seeds: Sequence[int], seconds: float | None, jobs: int | None) -> Mapping[str, Table]:
     """Path -> condition -> controller -> outcomes by seed."""
-    found: dict[str, Table] = {}
     todo = {
-        (path, condition): contents
+        (path, condition, controller): content
         for path in PATHS
         for condition, contents in variants(path, seconds).items()
+        for controller, content in contents.items()
     }
-    total = sum(len(c) * len(seeds_of(condition, seeds)) for (_, condition), c in todo.items())
-    with progress(total, "chapter 5") as advance:
-        for (path, condition), contents in todo.items():
-            some = seeds_of(condition, seeds)
-            outcomes = run_all(contents, some, outcome, processes=jobs, advance=advance)
-            found.setdefault(path, {})[condition] = outcomes  # pyright: ignore[reportIndexIssue]
+    some = {key: seeds_of(key[1], seeds) for key in todo}
+    with progress(sum(map(len, some.values())), "chapter 5") as advance:
+        outcomes = run_each(todo, some, outcome, processes=jobs, advance=advance)
+    found: dict[str, dict[str, dict[str, list[Outcome]]]] = {}
+    for (path, condition, controller), each in outcomes.items():
+        found.setdefault(path, {}).setdefault(condition, {})[controller] = each
     return found
 
 
@@ -150,9 +151,9 @@ def pictures(report: Report, seconds: float | None, jobs: int | None) -> None:
     report.figure("singular_values", singular_values(singular), "Smallest singular value (Fig. 5.7)")
 
 
-def done(result: cosim.Result) -> bool:
+def done(run: FinishedRun) -> bool:
     """Whether a run went through."""
-    return result.status == "done"
+    return run.status == "done"
 
 
 def singular_values(runs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:

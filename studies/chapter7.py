@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import cosim
+from cosim.dispatch import FinishedRun
 from diagnosis import analysis
 from diagnosis.analysis import Regressed, Samples
 from diagnosis.model import write_model
@@ -44,11 +45,10 @@ def scenarios(seconds: float | None) -> dict[str, Content]:
     return {name: logged(c, seconds) for name, c in made.items()}
 
 
-def folder(result: cosim.Result) -> str:
+def folder(run: FinishedRun) -> str:
     """Where a run lies; it must have gone through."""
-    if result.status != "done":
-        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    return str(result.folder)
+    run.demand()
+    return str(run.folder)
 
 
 def true_samples(run: Path) -> Samples:

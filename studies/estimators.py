@@ -15,6 +15,7 @@ from rich.console import Console
 
 import cosim
 from cosim.command import BAD_INPUT, FAILED, run_command
+from cosim.dispatch import FinishedRun
 
 from . import basin, claims, pictures
 from .estimates_replayed import LOGGED, OBSERVERS, SIGNALS, UNITS, freezes, measures, observer, replay
@@ -55,11 +56,10 @@ def variants(stop: float) -> dict[str, dict[str, Any]]:
     return found
 
 
-def analyse(result: cosim.Result) -> Found:
+def analyse(run: FinishedRun) -> Found:
     """Measures of every observer on one run."""
-    if result.status != "done":
-        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    log = cosim.read_log(result.folder)
+    run.demand()
+    log = run.log
     return {name: measures(log, replay(observer(name), log)) for name in OBSERVERS}
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import cosim
+from cosim.dispatch import FinishedRun
 from fmus.controller.models import SURGE
 
 from . import sysid4
@@ -66,15 +67,14 @@ def surge_parts(log: Log, phi: Sequence[np.ndarray]) -> tuple[float, float, floa
     return float(damping.mean()), float(loss.mean()), float((damping + loss).mean())
 
 
-def last_lap(result: cosim.Result) -> Lap:
+def last_lap(run: FinishedRun) -> Lap:
     """The numbers of a run.
 
     Raises:
         SimulationError: it broke off.
     """
-    if result.status != "done":
-        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    complete = cosim.read_log(result.folder)
+    run.demand()
+    complete = run.log
     lap_time = complete["time"] >= max(complete["time"][-1] - LAP, 0.5 * complete["time"][-1])
     log = {name: column[lap_time] for name, column in complete.items()}
     z1 = log["controller.z1_x"]

@@ -3,24 +3,26 @@
 import copy
 import json
 import math
-import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
-from multiprocessing import get_context
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from scipy import stats
 
 import cosim
+from cosim.dispatch import FinishedRun, analyse_runs
 from cosim.errors import nearest
+from fmus.build import BuildError, native_targets
 
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
+# Simulated time from which on FMUs are compiled [s]: their compilation takes as long, up to a minute for
+# all controllers, as this time takes with Python FMUs.
+PAYS = 2000.0
+
 Content = dict[str, Any]
+K = TypeVar("K", bound=Hashable)
 
 
 def shipped(name: str) -> Content:
@@ -69,30 +71,20 @@ def without(faults: Sequence[Content], *kinds: str) -> list[Content]:
     return [fault for fault in faults if fault["kind"] not in kinds]
 
 
-def metrics(result: cosim.Result) -> dict[str, float]:
+def metrics(run: FinishedRun) -> dict[str, float]:
     """The metrics of a run that must have ended well.
 
     Raises:
         SimulationError: it did not.
     """
-    if result.status != "done":
-        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    return result.metrics
-
-
-def _one(content: Content, folder: Path | None, analyse: Callable[[cosim.Result], Any]) -> Any:
-    """One run in a process of the pool, and what the analysis makes of it."""
-    with TemporaryDirectory() as scratch:
-        result = cosim.simulate(cosim.load_scenario(content), folder or scratch)
-        if result.status == "interrupted":
-            raise KeyboardInterrupt
-        return analyse(result)
+    run.demand()
+    return run.metrics
 
 
 def run_all(
     variants: Mapping[str, Content],
     seeds: Sequence[int],
-    analyse: Callable[[cosim.Result], Any] = metrics,
+    analyse: Callable[[FinishedRun], Any] = metrics,
     folder: Path | None = None,
     processes: int | None = None,
     advance: Callable[[], None] = lambda: None,
@@ -103,7 +95,7 @@ def run_all(
         variants: name -> content of a scenario.
         seeds: of noise and faults.
         analyse: function of a module (another process calls it) that takes the run, which may have
-            failed, reads from its folder what it needs, and returns the little that is kept.
+            failed, and returns the little that is kept.
         folder: keeps the logs in ``<folder>/<variant>/<seed>``; None keeps none.
         processes: how many runs at a time; None is one for each core.
         advance: called after each finished run.
@@ -111,28 +103,44 @@ def run_all(
     Returns:
         Variant -> what the analysis returned, in the order of the seeds.
     """
-    jobs = [(name, seed) for name in variants for seed in seeds]
-    found: dict[str, list[Any]] = {name: [] for name in variants}
-    # Forking a process that has loaded FMUs would copy their threads' locks.
-    pool = ProcessPoolExecutor(processes or os.cpu_count(), get_context("spawn"))
-    try:
-        futures = [
-            pool.submit(
-                _one,
-                {**variants[name], "seed": seed},
-                folder / name / str(seed) if folder else None,
-                analyse,
-            )
-            for name, seed in jobs
-        ]
-        for future in futures:
-            future.add_done_callback(lambda _: advance())
-        for (name, _), future in zip(jobs, futures, strict=True):
-            found[name].append(future.result())
-    finally:
-        with suppress(KeyboardInterrupt):
-            pool.shutdown(cancel_futures=True)
+    wanted = dict.fromkeys(variants, seeds)
+    return run_each(variants, wanted, analyse, folder, processes, advance)
+
+
+def run_each(
+    variants: Mapping[K, Content],
+    seeds: Mapping[K, Sequence[int]],
+    analyse: Callable[[FinishedRun], Any],
+    folder: Path | None = None,
+    processes: int | None = None,
+    advance: Callable[[], None] = lambda: None,
+) -> dict[K, list[Any]]:
+    """Run every variant with seeds of its own; arguments as of :func:`run_all`."""
+    jobs = [(name, seed) for name in variants for seed in seeds[name]]
+    contents = [{**variants[name], "seed": seed} for name, seed in jobs]
+    native = _native(contents)
+    made = analyse_runs(
+        [{"native": native, **content} for content in contents],
+        analyse,
+        [folder / str(name) / str(seed) if folder else None for name, seed in jobs],
+        processes,
+        advance,
+    )
+    found: dict[K, list[Any]] = {name: [] for name in variants}
+    for (name, _), value in zip(jobs, made, strict=True):
+        found[name].append(value)
     return found
+
+
+def _native(contents: Sequence[Content]) -> bool:
+    """Whether FMUs are compiled: where it pays, and this computer can. The results are the same."""
+    if sum(content["stop"] for content in contents) < PAYS:
+        return False
+    try:
+        native_targets()
+    except BuildError:
+        return False
+    return True
 
 
 class Interval(NamedTuple):

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import signal
 
-import cosim
+from cosim.dispatch import FinishedRun
 
 Log = Mapping[str, np.ndarray]
 
@@ -89,12 +89,12 @@ def missing(log: Log, axis: str) -> np.ndarray:
     return log[f"vessel.omega_star_{axis}"] + lost
 
 
-def outcome(result: cosim.Result) -> Outcome:
+def outcome(run: FinishedRun) -> Outcome:
     """The numbers of a run; those of one that broke off are NaN."""
-    if result.status == "failed":
+    if run.status == "failed":
         return BROKEN
-    log = cosim.read_log(result.folder)
-    m = result.metrics
+    log = run.log
+    m = run.metrics
     settled = log["time"] >= m["from"]
     half = log["time"] >= 0.5 * log["time"][-1]
     wrong = {a: rms((log[f"controller.omega_hat_{a}"] - missing(log, a))[settled]) for a in AXES}

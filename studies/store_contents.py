@@ -5,12 +5,11 @@ its state is looked at.
 """
 
 import importlib
-import json
 from typing import Any, NamedTuple
 
 import numpy as np
 
-import cosim
+from cosim.dispatch import FinishedRun
 from fmus.declare import Component, packer, variables
 
 from .estimates_replayed import Log, parameters
@@ -79,17 +78,15 @@ def echo(times: np.ndarray, spikes: np.ndarray) -> np.ndarray:
     return np.any((since >= 0.0) & (since < WITHIN), axis=1)
 
 
-def store_contents(result: cosim.Result) -> StoreContents:
+def store_contents(run: FinishedRun) -> StoreContents:
     """The contents of the store of a finished run.
 
     Raises:
         SimulationError: the run broke off.
     """
-    if result.status != "done":
-        raise cosim.SimulationError(f"'{result.folder}' {result.status}: {result.message}")
-    log = cosim.read_log(result.folder)
-    sidecar = json.loads((result.folder / "log.json").read_text(encoding="utf-8"))
-    entry = sidecar["scenario"]["fmus"]["controller"]
+    run.demand()
+    log = run.log
+    entry = run.scenario["fmus"]["controller"]
     sigma, state = replayed(controller(entry["path"]), log, entry.get("parameters", {}))
     spikes = spike_times(log)
     taken = np.array([row.time for row in state.store.rows if row.filled > 0.5])

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import signal
 from scipy.spatial import KDTree
 
-import cosim
+from cosim.dispatch import FinishedRun
 from cosim.scenario import Roles
 
 from . import sysid4
@@ -139,14 +139,14 @@ def inside(log: Log, part: np.ndarray) -> float:
     return float(np.mean(aside * np.sign(np.gradient(psi))[nearest]))
 
 
-def sailed(result: cosim.Result) -> Sailed:
+def sailed(run: FinishedRun) -> Sailed:
     """The numbers of a run; those of one that broke off are NaN."""
-    if result.status == "failed":
+    if run.status == "failed":
         return BROKEN
-    log = cosim.read_log(result.folder)
+    log = run.log
     t = log["time"]
     settled, half = t >= min(SETTLED, 0.5 * t[-1]), t >= 0.5 * t[-1]
-    m, z1_x, h = result.metrics, log["controller.z1_x"], t[1] - t[0]
+    m, z1_x, h = run.metrics, log["controller.z1_x"], t[1] - t[0]
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     swing = quick(log["vessel.r"], h, SLOW)[settled]
     frequencies, power = signal.periodogram(swing, 1.0 / h)

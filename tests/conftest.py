@@ -12,9 +12,9 @@ import pytest
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
-from support.serial import Serial
 from support.shared import keep_in, once, shared_folder
 
+from cosim.dispatch import analyse_runs
 from cosim.fmu import LocalInstance, Model, archive_check
 from cosim.master import loop_surroundings
 from cosim.system import own_fmus
@@ -176,11 +176,12 @@ def _collect_young_garbage_only():
 
 @pytest.fixture
 def serial(monkeypatch):
-    """Runs of a study one after the other in this process; test_studies.py covers the pool of processes.
+    """Runs of a study one after the other in this process; test_studies.py covers several processes."""
 
-    Each process of the pool would import everything and start the builder for each of its runs.
-    """
-    monkeypatch.setattr("studies.monte_carlo.ProcessPoolExecutor", Serial)
+    def here(scenarios, analyse, folders, _, advance):
+        return analyse_runs(scenarios, analyse, folders, 0, advance)
+
+    monkeypatch.setattr("studies.monte_carlo.analyse_runs", here)
 
 
 @pytest.fixture

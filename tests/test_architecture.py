@@ -20,12 +20,14 @@ COSIM_LAYERS = (
     ("lazy", "errors", "files", "process"),
     ("interrupts", "conversion"),
     ("command",),
+    ("compiled",),
     ("fmu",),
     ("formats",),
     ("scenario",),
     ("system",),
     ("results",),
     ("master", "watch"),
+    ("dispatch",),
     ("export", "campaign"),
     ("run", "metrics", "plots", "interface"),  # commands
 )
@@ -67,6 +69,7 @@ PUBLIC = (
     "cosim",
     "cosim.campaign",
     "cosim.command",
+    "cosim.dispatch",
     "cosim.errors",
     "cosim.export",
     "cosim.fmu",

@@ -153,6 +153,30 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
     assert told["versions"]["cybership"]
 
 
+def test_compiled_fmus_that_are_reset_give_the_same(base, native):
+    path = campaign(
+        base,
+        {
+            "compiled": {"set": "native", "values": [True, False]},
+            "seed": {"set": "seed", "values": [0, 1]},
+        },
+    )
+    made = cosim.run_campaign(path, base / "out", workers=0, keep_logs=True)
+    assert list(made["status"]) == ["done"] * 4
+    assert made["hash"].is_unique
+    rest = made.drop(columns=["compiled", "hash", "wall_s"])
+    assert rest[:2].equals(rest[2:].reset_index(drop=True))
+    folders = [base / "out" / "logs" / h[:16] for h in made["hash"]]
+    told = [json.loads((folder / "log.json").read_text()) for folder in folders]
+    assert [t["fmus"]["vessel"]["native"] for t in told] == [True, True, False, False]
+    logs = [(folder / "log.csv").read_bytes() for folder in folders]
+    assert logs[:2] == logs[2:]
+    content = json.loads((base / "base.json").read_text()) | {"native": True, "seed": 1}
+    fresh = cosim.simulate(cosim.load_scenario(content), base / "fresh")
+    assert fresh.metrics == {name: made[name][1] for name in fresh.metrics}
+    assert (base / "fresh" / "log.csv").read_bytes() == logs[1]
+
+
 def test_finished_runs_are_not_made_again(base, monkeypatch):
     axes = {"m": {"set": "vessel.m", "values": [14.0, 15.0]}}
     first = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
@@ -161,9 +185,9 @@ def test_finished_runs_are_not_made_again(base, monkeypatch):
     journal.write_bytes(lines[0] + lines[1][:40])  # killed while it wrote the second row
     axes["m"]["values"].append(16.0)
     made = []
-    original = cosim.campaign.single_run.Workplace.run
+    original = cosim.dispatch.workplace.Workplace.run
     monkeypatch.setattr(
-        "cosim.campaign.single_run.Workplace.run",
+        "cosim.dispatch.workplace.Workplace.run",
         lambda self, content, keep: made.append(content) or original(self, content, keep),
     )
     second = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
@@ -175,7 +199,7 @@ def test_finished_runs_are_not_made_again(base, monkeypatch):
 
 
 def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
-    original, made = cosim.campaign.single_run.Workplace.run, []
+    original, made = cosim.dispatch.workplace.Workplace.run, []
 
     def run(self, content, keep):
         if len(made) == 2:
@@ -183,7 +207,7 @@ def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
         made.append(content)
         return original(self, content, keep)
 
-    monkeypatch.setattr("cosim.campaign.single_run.Workplace.run", run)
+    monkeypatch.setattr("cosim.dispatch.workplace.Workplace.run", run)
     path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0, 15.0, 16.0]}})
     with pytest.raises(KeyboardInterrupt):
         main([str(path), "--workers", "0", "--out", str(base / "out")])
@@ -287,7 +311,7 @@ def scheduler(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_killed_worker_changes_nothing(base, scheduler):
+def test_a_killed_worker_changes_nothing(base, scheduler, monkeypatch):
     address, workers = scheduler
     path = campaign(
         base,
@@ -309,6 +333,12 @@ def test_a_killed_worker_changes_nothing(base, scheduler):
     here = cosim.run_campaign(path, base / "here", workers=0)
     assert set(here["status"]) == {"done"}
     assert without_time(spread).equals(without_time(here))
+    workers[1].kill()
+    monkeypatch.setattr("cosim.dispatch.dask_workers.WITHOUT_WORKERS", 2.0)
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0, 15.0]}})
+    with pytest.raises(cosim.SimulationError, match="no worker for 2 s"):
+        cosim.run_campaign(path, base / "nobody", scheduler=address)
+    assert json.loads((base / "nobody" / "campaign.json").read_text())["status"] == "failed"
 
 
 @pytest.mark.slow

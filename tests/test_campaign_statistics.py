@@ -10,7 +10,7 @@ from cosim import InputError
 from cosim.campaign import differences, pareto
 from cosim.campaign.comparison import FEWEST_PAIRS, StopRule, interval
 from cosim.campaign.design import Case
-from cosim.campaign.single_run import Row
+from cosim.dispatch.job import Row
 
 
 def grid(controllers, seeds):

@@ -91,7 +91,7 @@ def test_an_effect_of_a_user_says_what_it_says_of_itself():
 @pytest.mark.parametrize("name", [e.id for e in STANDARD.values() if e.search.by != "given"])
 def test_equation_has_every_number_with_its_unit(name):
     effect = STANDARD[name]
-    given = values(effect, 0.25)
+    given = dict.fromkeys(effect.coefficients, 0.25)
     text = equation(effect, given, dict.fromkeys(given, (0.125, 0.375)))
     assert effect.formula in text
     assert text.count("0.25") == len(given)

@@ -11,6 +11,7 @@ from support.plain import GAIN, with_unit
 from support.project import COMPONENTS
 
 import cosim
+from cosim.compiled.row_text import Rows
 from cosim.fmu import component
 from cosim.results.log import LogWriter
 from fmus.signals import Force
@@ -346,16 +347,17 @@ def test_two_runs_in_one_process_are_independent(ellipse, tmp_path):
 
 
 def test_bytes_do_not_depend_on_when_blocks_are_written(tmp_path):
-    """Rows with NaN beside rows without, in blocks of any length."""
+    """Rows with NaN beside rows without, in blocks of any length; in Python and in C."""
     rng = np.random.default_rng(0)
     rows = np.column_stack([np.arange(50.0), rng.normal(0, 1e-6, (50, 3))])
     rows[20:30, 2] = np.nan
     rows[31, 1] = np.inf
     texts = set()
-    for length in (1, 7, 50):
-        writer = LogWriter(tmp_path / "log.csv", ["time", "a", "b", "c"])
+    for length, compiled in [(1, False), (7, False), (50, False), (1, True), (7, True), (50, True)]:
+        writer = LogWriter(tmp_path / "log.csv", ["time", "a", "b", "c"], compiled)
         for k in range(0, 50, length):
-            writer.write(np.ascontiguousarray(rows[k : k + length]))
+            some = rows[k : k + length]
+            writer.write(Rows(some[:, 0], some, np.arange(1, 4)))
         writer.close()
         texts.add((tmp_path / "log.csv").read_bytes())
     assert len(texts) == 1

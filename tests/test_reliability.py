@@ -337,8 +337,8 @@ def repeat(count):
     return len(gc.get_objects()), int(Path("/proc/self/statm").read_text().split()[1])
 
 repeat(5)
-before, after = repeat(1), repeat(60)
-print((after[0] - before[0]) / 60, (after[1] - before[1]) / 60)
+before, after = repeat(1), repeat(20)
+print((after[0] - before[0]) / 20, (after[1] - before[1]) / 20)
 """
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cosim
+from cosim.dispatch import FinishedRun
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
 from studies import chapter6, lessons, margin, store_contents, sysid4, trials
@@ -122,7 +123,7 @@ def test_replayed_controller_stores_what_it_stored_in_the_run(name, tmp_path):
     )
     assert sigma[-1] > 0.0
     assert sigma == pytest.approx(log["controller.sigma_min"], rel=1e-9, abs=1e-12)
-    held = store_contents.store_contents(result)
+    held = store_contents.store_contents(FinishedRun(content, log=log, metrics=result.metrics))
     assert held.spikes == 1.0
     assert held.time == pytest.approx(1.0 / 12.0, rel=0.02)
     assert 0.0 <= held.stored <= 1.0

@@ -60,9 +60,9 @@ def compare(plan: Plan, work: Path, case: str) -> dict[str, float]:
     return {"log_mb": size, "away": away, "missing": len(missing)}
 
 
-def time_commands(work: Path, repeat: int) -> dict[str, list[float]]:
+def time_commands(work: Path, repeat: int, native: bool) -> dict[str, list[float]]:
     """Whole runs from the command line, from the start of the process to its end [s]."""
-    content = json.loads(SCENARIO.read_text())
+    content = json.loads(SCENARIO.read_text()) | {"native": native or None}
     times: dict[str, list[float]] = {}
     for _ in range(repeat):
         for stop in (content["stop"], 100.0):
@@ -91,12 +91,12 @@ def machine() -> dict[str, str]:
     return facts
 
 
-def measure(steps: int, repeat: int) -> dict[str, Any]:
-    """Run everything; the result is what ``--json`` writes."""
+def measure(steps: int, repeat: int, native: bool, chosen: Sequence[str]) -> dict[str, Any]:
+    """Run the chosen cases; the result is what ``--json`` writes."""
     with tempfile.TemporaryDirectory(prefix="benchmark_") as folder:
         work = Path(folder)
-        plan = make_plan(work, steps)
-        cases: dict[str, dict[str, Any]] = {case: {"runs": []} for case in CASES}
+        plan = make_plan(work, steps, native)
+        cases: dict[str, dict[str, Any]] = {case: {"runs": []} for case in chosen}
         for k in range(repeat):
             names = list(cases)
             # Each round starts with another case: what ran before makes a difference.
@@ -109,11 +109,11 @@ def measure(steps: int, repeat: int) -> dict[str, Any]:
                         found["error"] = result["error"]
                     else:
                         found["runs"].append(result)
-        for case in TOOLS:
+        for case in [name for name in TOOLS if name in cases]:
             if "error" not in cases[case]:
                 cases[case] |= compare(plan, work, case)
         print(f"\r{'whole runs':46}", end="", file=sys.stderr, flush=True)
-        commands = time_commands(work, repeat)
+        commands = time_commands(work, repeat, native)
         print(f"\r{'':46}\r", end="", file=sys.stderr)
     return {
         "machine": machine(),
@@ -122,6 +122,7 @@ def measure(steps: int, repeat: int) -> dict[str, Any]:
         "fmus": len(plan["fmus"]),
         "connections": len(plan["connections"]),
         "signals": len(plan["signals"]),
+        "native": native,
         "cases": cases,
         "commands": commands,
     }
@@ -132,6 +133,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.master", description=__doc__)
     parser.add_argument("--steps", type=int, default=10_000, help="steps of 0.01 s (10000)")
     parser.add_argument("--repeat", type=int, default=3, help="how often each is run (3)")
+    parser.add_argument("--native", action="store_true", help="with native FMUs")
+    parser.add_argument(
+        "--cases",
+        nargs="+",
+        choices=CASES,
+        default=[*CASES],
+        metavar="CASE",
+        help="only these, and ours",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers here as well")
     parser.add_argument("--case", nargs=2, metavar=("CASE", "FOLDER"), help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -140,7 +150,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     if options.steps < 2 or options.repeat < 1:
         parser.error("needs at least 2 steps and 1 repeat")
-    results = measure(options.steps, options.repeat)
+    results = measure(
+        options.steps,
+        options.repeat,
+        options.native,
+        [case for case in CASES if case in {*options.cases, "master", "master_like_others"}],
+    )
     report(results)
     if options.json:
         options.json.write_text(json.dumps(results, indent=2) + "\n")

@@ -22,9 +22,9 @@ ALSO_LOGGED = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 Plan = dict[str, Any]
 
 
-def make_plan(work: Path, steps: int) -> Plan:
+def make_plan(work: Path, steps: int, native: bool) -> Plan:
     """Everything that the processes need to know, so that no tool has to find it out in its own time."""
-    system = prepare(cosim.load_scenario(SCENARIO))
+    system = prepare(cosim.load_scenario(json.loads(SCENARIO.read_text()) | {"native": native or None}))
     fmus = {name: work / "resources" / f"{name}.fmu" for name in system.models}
     (work / "resources").mkdir()
     for name, path in fmus.items():

@@ -24,12 +24,13 @@ def _per_step(found: dict[str, Any], pick: Callable[[Sequence[float]], float]) -
 def report(results: dict[str, Any]) -> None:
     """Print the tables."""
     print(", ".join(f"{name} {value}" for name, value in results["machine"].items()))
-    print(
-        f"{results['fmus']} FMUs, {results['connections']} connections, {results['signals']} signals "
-        f"logged at each of {results['steps']} steps, {results['repeat']} interleaved repeats\n"
-    )
+    kind = "native" if results["native"] else "Python"
+    size = f"{results['fmus']} {kind} FMUs, {results['connections']} connections"
+    times = f"each of {results['steps']} steps, {results['repeat']} interleaved repeats"
+    print(f"{size}, {results['signals']} signals logged at {times}\n")
     _report_tools(results["cases"])
-    _report_parts(results["cases"])
+    if not results["native"]:
+        _report_parts(results["cases"])
     print("\nWhole command, from the start of the process to its end [s]   median     min")
     for label, times in results["commands"].items():
         print(f"  {label:58} {statistics.median(times):7.2f} {min(times):7.2f}")
@@ -39,7 +40,8 @@ def _report_tools(cases: dict[str, Any]) -> None:
     print("                                 us per step      ratio   set-up     log    end")
     print("                               median     min               [s]    [MB]   away")
     ours = None if "error" in cases["master"] else _per_step(cases["master"], statistics.median)
-    for case in [*TOOLS, "master_like_others"]:
+    shown = [*TOOLS, "master_like_others", "no_log", "neither"]
+    for case in [name for name in shown if name in cases]:
         found = cases[case]
         if "error" in found:
             print(f"{CASES[case].label:30} {found['error']}")
@@ -59,6 +61,8 @@ def _report_tools(cases: dict[str, Any]) -> None:
 
 def _report_parts(cases: dict[str, Any]) -> None:
     parts = ("master", "no_faults", "no_log", "neither", "fmi", "components")
+    if not {*parts} <= {*cases}:
+        return
     if any("error" in cases[case] for case in parts):
         for case in parts:
             if "error" in cases[case]:

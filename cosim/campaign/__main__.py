@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 # Metrics of tables and pictures where the user names none: an error, its heading, and what it costs.
 USUAL = ("e_pos_rms", "cross_track_rms", "heading_rms", "W", "I_tau_dot")
 
+# Width that no table reaches [characters].
+WIDE = 10_000
+
 # Messages of failed runs that are shown; chosen: the table has all.
 MESSAGES = 3
 
@@ -136,7 +139,11 @@ def _print(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> 
         shown.add_column(printable(name), no_wrap=True)
     for row in rows:
         shown.add_row(*map(printable, row))
-    Output(highlight=False, soft_wrap=True).print(shown)
+    console = Output(highlight=False, soft_wrap=True)
+    # A narrow terminal breaks lines, which is better than to cut off numbers.
+    whole = console.measure(shown, options=console.options.update(width=WIDE)).maximum
+    console.width = max(console.width, whole)
+    console.print(shown)
 
 
 def _number(x: object) -> str:

@@ -1,41 +1,20 @@
 """The scenario of each run of a campaign: made of the base, checked before anything runs, and hashed."""
 
-import hashlib
-import importlib.metadata
 import json
-from collections.abc import Iterable
 from typing import Any
 
+from ..dispatch.job import Job, Task, job_of
+from ..dispatch.travelling_files import Files
 from ..errors import InputError
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..system.preparation import prepare
 from .campaign_file import LoadedCampaign
 from .design import Case
-from .travelling_files import Files
 
 # Values of an axis that are all tried before anything runs; chosen: of longer axes, which hold seeds or
 # drawn numbers, the smallest and largest tell whether all are allowed.
 ALL_TRIED = 20
-# Keys of a scenario that change no number of a run.
-WITHOUT_EFFECT = ("name", "description", "log")
-
-
-class Job:
-    """One run as it travels to a worker.
-
-    Attributes:
-        hash: of all that its numbers follow from; equal runs have equal ones.
-        content: of its scenario, with the FMUs and tables named by the hashes of their contents.
-        files: those names.
-    """
-
-    def __init__(self, content: dict[str, Any], files: Iterable[str]) -> None:
-        self.content = content
-        self.files = tuple(files)
-        counted = {key: value for key, value in content.items() if key not in WITHOUT_EFFECT}
-        text = json.dumps([counted, importlib.metadata.version("cybership")], sort_keys=True)
-        self.hash = hashlib.sha256(text.encode()).hexdigest()
 
 
 class CaseScenarios:
@@ -44,11 +23,13 @@ class CaseScenarios:
     Args:
         loaded: the campaign and its base.
         files: collects the FMUs and tables that the scenarios name.
+        task: makes each run.
     """
 
-    def __init__(self, loaded: LoadedCampaign, files: Files) -> None:
+    def __init__(self, loaded: LoadedCampaign, files: Files, task: Task) -> None:
         self._loaded = loaded
         self._files = files
+        self._task = task
 
     def scenario(self, case: Case) -> Scenario:
         """The scenario of a run.
@@ -74,17 +55,7 @@ class CaseScenarios:
         Raises:
             InputError: as :meth:`scenario`; or a file that cannot be read.
         """
-        scenario = self.scenario(case)
-        self._files.read([scenario])
-        content = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
-        names: list[str] = []
-        for entry in content["fmus"].values():
-            entry["path"] = self._files.fmu(entry["path"])
-            names.append(entry["path"])
-            if entry.get("table") is not None:
-                entry["table"] = self._files.table(scenario.folder, entry["table"])
-                names.append(entry["table"])
-        return Job(content, dict.fromkeys(names))
+        return job_of(self.scenario(case), self._files, self._task)
 
     def check(self, cases: list[Case]) -> list[str]:
         """Refuse a campaign one of whose runs cannot be run; nothing has run then.

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..dispatch.job import Row
 from ..errors import InputError, nearest
 from ..results.performance import METRICS
 from .design import Case
-from .single_run import Row
 
 if TYPE_CHECKING:
     import pandas

@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 import platform
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -17,16 +18,18 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
+from ..dispatch.job import Job, Row
+from ..dispatch.measured_run import Measured
+from ..dispatch.places import Place, place_for
+from ..dispatch.travelling_files import Files
 from ..errors import InputError
 from ..files import write_json
 from ..process.scratch import sweep
 from .campaign_file import LoadedCampaign
-from .case_scenarios import CaseScenarios, Job
+from .case_scenarios import CaseScenarios
 from .comparison import StopRule
 from .design import Case, cases
 from .run_table import Journal, keep_log, table, write_table
-from .single_run import Place, Row, ThisProcess
-from .travelling_files import Files
 
 if TYPE_CHECKING:
     import pandas
@@ -83,13 +86,13 @@ def run_campaign(
     sweep()
     files = Files()
     try:
-        scenarios = CaseScenarios(loaded, files)
+        scenarios = CaseScenarios(loaded, files, Measured(keep_logs))
         every = cases(loaded.campaign)
         rule = None if stop_when is None else StopRule(stop_when, every, loaded.campaign.seed)
         for note in scenarios.check(every):
             show(f"note: {note}")
         with _only_one(folder), closing(Journal(folder)) as journal:
-            work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder, keep_logs)
+            work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder)
             told = {
                 "campaign": loaded.campaign.model_dump(mode="json", exclude_unset=True),
                 "scenario": loaded.base.model_dump(mode="json", by_alias=True, exclude_unset=True),
@@ -97,7 +100,7 @@ def run_campaign(
                 "place": scheduler or ("this process" if workers == 0 else "processes on this computer"),
                 "versions": _versions(),
             }
-            return work.run(partial(_place, files, keep_logs, scheduler, workers), told, progress)
+            return work.run(partial(place_for, files, scheduler, workers), told, progress)
     finally:
         files.close()
 
@@ -108,14 +111,6 @@ def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None)
     return Path(out) if out is not None else Path("results") / name
 
 
-def _place(files: Files, keep_logs: bool, scheduler: str | None, workers: int | None) -> Place:
-    if workers == 0 and scheduler is None:
-        return ThisProcess(files, keep_logs)
-    from .dispatch import DaskWorkers  # Dask takes a second to import
-
-    return DaskWorkers(files, keep_logs, scheduler, workers)
-
-
 @dataclass
 class _Work:
     """The runs of one campaign that has been checked.
@@ -123,6 +118,8 @@ class _Work:
     Attributes:
         cases: in the order in which they are made.
         known: those that were asked for so far, with their hashes.
+        waiting: how many of them wait for the run of a hash.
+        ended, failed: how many of them have ended, and failed.
     """
 
     scenarios: CaseScenarios
@@ -130,8 +127,10 @@ class _Work:
     cases: Sequence[Case]
     rule: StopRule | None
     folder: Path
-    keep_logs: bool
     known: dict[int, tuple[Case, str]] = field(default_factory=dict)
+    waiting: Counter[str] = field(default_factory=Counter)
+    ended: int = 0
+    failed: int = 0
 
     def run(
         self, place: Callable[[], Place], told: dict[str, Any], progress: Progress
@@ -140,7 +139,7 @@ class _Work:
         started, status = time.time(), "failed"
         jobs = self._missing()
         first = next(jobs, None)
-        progress(*self._counts())
+        progress(self.ended, self.failed, len(self.cases))
         try:
             if first is not None:
                 with closing(place()) as there, closing(there.rows(chain([first], jobs))) as rows:
@@ -148,7 +147,8 @@ class _Work:
                         if row.log:
                             keep_log(self.folder, job.hash, row.log)
                         self.journal.add(job.hash, row)
-                        progress(*self._counts())
+                        self._count(row, self.waiting.pop(job.hash, 0))
+                        progress(self.ended, self.failed, len(self.cases))
                         if self._settled():
                             break
             status = "done"
@@ -173,15 +173,21 @@ class _Work:
 
     def _missing(self) -> Iterator[Job]:
         """The runs that have not finished yet, each once."""
-        asked: set[str] = set()
         for case in self.cases:
             if self._settled():
                 return
             job = self.scenarios.job(case)
             self.known[case.number] = case, job.hash
-            if job.hash not in self.journal.rows and job.hash not in asked:
-                asked.add(job.hash)
+            if (row := self.journal.rows.get(job.hash)) is not None:
+                self._count(row, 1)
+                continue
+            self.waiting[job.hash] += 1
+            if self.waiting[job.hash] == 1:
                 yield job
+
+    def _count(self, row: Row, runs: int) -> None:
+        self.ended += runs
+        self.failed += runs * (row.status != "done")
 
     def _row(self, number: int) -> Row | None:
         known = self.known.get(number)
@@ -194,11 +200,6 @@ class _Work:
         """The runs of the table: all, or those up to where the difference was known."""
         numbers = self.rule.counted(self._row) if self.rule else None
         return [pair for n, pair in self.known.items() if numbers is None or n in numbers]
-
-    def _counts(self) -> tuple[int, int, int]:
-        """How many runs have ended, how many of them failed, and how many there are."""
-        ended = [row for number in self.known if (row := self._row(number)) is not None]
-        return len(ended), sum(row.status != "done" for row in ended), len(self.cases)
 
 
 class _only_one:  # noqa: N801 - used as a function

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..dispatch.job import Row
 from ..errors import InputError
 from ..files import atomic_write, write_all
 from ..results.performance import METRICS
 from .design import Case
-from .single_run import Row
 
 if TYPE_CHECKING:
     import pandas
@@ -66,10 +66,10 @@ class Journal:
         Raises:
             OSError: it cannot be written.
         """
-        self.rows[hash_] = row._replace(log={})
+        self.rows[hash_] = row._replace(log={}, value=None)
         if row.status != "lost":
             told = {"hash": hash_, **row._asdict()}
-            del told["log"]
+            del told["log"], told["value"]
             write_all(self._file, (json.dumps(told) + "\n").encode())
 
     def close(self) -> None:

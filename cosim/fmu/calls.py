@@ -11,11 +11,12 @@ from collections.abc import Callable, Sequence
 from ..errors import SimulationError
 from .component import DISCARD, Component
 from .fmu_model import INT_LIMIT
-from .instance import Access
+from .instance import Access, DirectCalls, DirectTransfer
 from .memory import Memory, Port
-from .stepping import redoing_steps, single_steps
+from .stepping import Steps, redoing_steps, single_steps
 
 _SETTERS = {
+    "Real": ("fmi2SetReal", "fmi2GetReal", ctypes.c_double),
     "Integer": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
     "Enumeration": ("fmi2SetInteger", "fmi2GetInteger", ctypes.c_int),
     "Boolean": ("fmi2SetBoolean", "fmi2GetBoolean", ctypes.c_int),
@@ -23,6 +24,83 @@ _SETTERS = {
 
 # A function and its arguments, converted for C once; returns an FMI status.
 Call = tuple[Callable[..., int], tuple[object, ...]]
+
+
+class Transfer:
+    """One vector get or set between an FMU and a memory.
+
+    Args:
+        component: the FMU.
+        kind: type of the variables.
+        ports: the variables, all of this type, and their places; Reals are adjacent.
+        memory: where the values are.
+        setting: whether to set.
+
+    Attributes:
+        direct: the same for a loop in C.
+        call: makes it; returns an FMI status.
+    """
+
+    def __init__(
+        self, component: Component, kind: str, ports: Sequence[Port], memory: Memory, setting: bool
+    ) -> None:
+        what, c_type = _SETTERS[kind][not setting], _SETTERS[kind][2]
+        self._component, self._ports, self._values = component, ports, memory.values
+        references = (ctypes.c_uint * len(ports))(*[p.variable.reference for p in ports])
+        is_real = kind == "Real"
+        self._buffer = None if is_real else (c_type * len(ports))()
+        address = (
+            memory.address + 8 * ports[0].slot
+            if self._buffer is None
+            else ctypes.addressof(self._buffer)
+        )
+        slots = None if is_real else [p.slot for p in ports]
+        self.direct = DirectTransfer(component.address(what), references, address, slots)
+        self._function = component.function(what)
+        self._arguments = (
+            ctypes.c_void_p.from_param(component.pointer),
+            ctypes.byref(references),
+            ctypes.c_size_t.from_param(len(ports)),
+            ctypes.c_void_p.from_param(address),
+        )
+        buffered = self._set_buffered if setting else self._get_buffered
+        self.call: Call = (self._function, self._arguments) if is_real else (buffered, ())
+
+    # Integers are converted on the way.
+
+    def _set_buffered(self) -> int:
+        assert self._buffer is not None
+        for k, port in enumerate(self._ports):
+            value = self._values[port.slot]
+            if not abs(value) < INT_LIMIT:
+                name = f"{self._component.name}.{port.variable.name}"
+                raise SimulationError(f"{name} = {value} is not a 32-bit number")
+            self._buffer[k] = round(value)
+        return self._function(*self._arguments)
+
+    def _get_buffered(self) -> int:
+        assert self._buffer is not None
+        status = self._function(*self._arguments)
+        for k, port in enumerate(self._ports):
+            self._values[port.slot] = float(self._buffer[k])
+        return status
+
+
+def _direct(
+    component: Component, sets: Sequence[Transfer], gets: Sequence[Transfer], steps: Steps
+) -> DirectCalls:
+    return DirectCalls(
+        component.pointer,
+        component.is_python,
+        component.address("fmi2DoStep"),
+        component.address("fmi2GetFMUstate") if steps.saves else None,
+        ctypes.addressof(component.saved_state),
+        [transfer.direct for transfer in sets],
+        [transfer.direct for transfer in gets],
+        steps.settle,
+        component.check,
+        [component, *sets, *gets],
+    )
 
 
 def bind(
@@ -36,11 +114,13 @@ def bind(
         memory: where the values are.
         h: length of its steps [s].
     """
+    set_transfers = _transfers(component, inputs, memory, setting=True)
+    get_transfers = _transfers(component, outputs, memory, setting=False)
+    steps = (redoing_steps if component.can_redo else single_steps)(component, h)
     # These run every step and keep what they need in their own scope, where Python finds it fastest.
-    sets = _calls(component, inputs, memory, setting=True)
-    gets = _calls(component, outputs, memory, setting=False)
-    do_step = (redoing_steps if component.can_redo else single_steps)(component, h)
-    check = component.check
+    sets = [transfer.call for transfer in set_transfers]
+    gets = [transfer.call for transfer in get_transfers]
+    do_step, check = steps.step, component.check
 
     def put() -> None:
         for function, arguments in sets:
@@ -58,58 +138,12 @@ def bind(
             if (status := function(*arguments)) >= DISCARD:
                 check("getting its outputs", status)
 
-    return Access(put, get, step)
+    return Access(put, get, step, direct=_direct(component, set_transfers, get_transfers, steps))
 
 
-def _calls(component: Component, ports: Sequence[Port], memory: Memory, setting: bool) -> list[Call]:
-    """Calls that set or get some variables of one FMU."""
-    calls: list[Call] = []
-    reals = [p for p in ports if p.variable.type == "Real"]
-    if reals:
-        address = memory.address + 8 * reals[0].slot
-        what = "fmi2SetReal" if setting else "fmi2GetReal"
-        calls.append(_vector_call(component, what, reals, address))
-    for kind in _SETTERS:
-        others = [p for p in ports if p.variable.type == kind]
-        if others:
-            calls.append((_buffered_call(component, kind, others, memory, setting), ()))
-    return calls
-
-
-def _vector_call(component: Component, what: str, ports: Sequence[Port], address: int) -> Call:
-    """One vector get or set between an FMU and a memory."""
-    references = (ctypes.c_uint * len(ports))(*[p.variable.reference for p in ports])
-    return component.function(what), (
-        ctypes.c_void_p.from_param(component.pointer),
-        ctypes.byref(references),
-        ctypes.c_size_t.from_param(len(ports)),
-        ctypes.c_void_p.from_param(address),
-    )
-
-
-def _buffered_call(
-    component: Component, kind: str, ports: Sequence[Port], memory: Memory, setting: bool
-) -> Callable[[], int]:
-    """The same for variables that are not Real: integers, converted on the way."""
-    setter, getter, c_type = _SETTERS[kind]
-    buffer = (c_type * len(ports))()
-    slots = [p.slot for p in ports]
-    values = memory.values
-    what = setter if setting else getter
-    function, arguments = _vector_call(component, what, ports, ctypes.addressof(buffer))
-
-    def set_() -> int:
-        for k, slot in enumerate(slots):
-            if not abs(values[slot]) < INT_LIMIT:
-                name = f"{component.name}.{ports[k].variable.name}"
-                raise SimulationError(f"{name} = {values[slot]} is not a 32-bit number")
-            buffer[k] = round(values[slot])
-        return function(*arguments)
-
-    def get() -> int:
-        status = function(*arguments)
-        for k, slot in enumerate(slots):
-            values[slot] = float(buffer[k])
-        return status
-
-    return set_ if setting else get
+def _transfers(
+    component: Component, ports: Sequence[Port], memory: Memory, setting: bool
+) -> list[Transfer]:
+    """What sets or gets some variables of one FMU: a call for each type."""
+    of_kind = {kind: [p for p in ports if p.variable.type == kind] for kind in _SETTERS}
+    return [Transfer(component, kind, some, memory, setting) for kind, some in of_kind.items() if some]

@@ -27,6 +27,7 @@ from .instance import OnMessage
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING, DISCARD, ERROR, FATAL, PENDING = 1, 2, 3, 4, 5  # of fmi2Status
+OWN_TOOL = "cybership"  # generationTool of the FMUs of python -m fmus.build --native
 SLAVE_MODULE = "resources/slavemodule.txt"  # of a Python FMU: the name of its module
 
 # FMPy's logger proxy knows one logger for the whole process: this one finds the instance by its number.
@@ -139,9 +140,13 @@ class Component:
         self.is_python = hasattr(self.slave.dll, PYTHON_SYMBOL)
         if self.is_python and not (folder / SLAVE_MODULE).is_file():
             raise InputError(f"'{model.path}' is a Python FMU without its {SLAVE_MODULE}")
-        # A Python FMU saves its state in many small pieces, and does not report how far it got.
+        # A Python FMU saves its state in many small pieces, and does not report how far it got; those of
+        # this project's tool discard no step, so that there is no state to save before each.
         self.can_redo = bool(
-            not self.is_python and cs.canGetAndSetFMUstate and cs.canHandleVariableCommunicationStepSize
+            not self.is_python
+            and model.description.generationTool != OWN_TOOL
+            and cs.canGetAndSetFMUstate
+            and cs.canHandleVariableCommunicationStepSize
         )
         self.saved_state = ctypes.c_void_p()
         self.complaint = ""
@@ -208,15 +213,19 @@ class Component:
             why = f": {self.complaint}" if self.complaint else ""
             raise SimulationError(f"{self.name}: {what} returned {STATUS[min(status, 5)]}{note}{why}")
 
-    def function(self, name: str) -> Callable[..., int]:
-        """An FMI function of the library; its arguments must be ctypes values."""
-        kind = ctypes.PYFUNCTYPE if self.is_python else ctypes.CFUNCTYPE
+    def address(self, name: str) -> int:
+        """Address of an FMI function of the library."""
         try:
             address = ctypes.cast(getattr(self.slave.dll, name), ctypes.c_void_p).value
         except AttributeError:
             raise InputError(f"'{self.model.path}' does not export {name}") from None
         assert address is not None
-        return kind(ctypes.c_int)(address)
+        return address
+
+    def function(self, name: str) -> Callable[..., int]:
+        """An FMI function of the library; its arguments must be ctypes values."""
+        kind = ctypes.PYFUNCTYPE if self.is_python else ctypes.CFUNCTYPE
+        return kind(ctypes.c_int)(self.address(name))
 
     def free(self) -> None:
         """Free the instance and its library; after a fatal error no function of it may be called."""

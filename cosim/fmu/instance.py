@@ -3,13 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from .fmu_model import Model, Value, Variable
 from .memory import Memory, Port
 
 # Receives (instance, status, text) of each message that an FMU logs; the status is that of FMI.
 OnMessage = Callable[[str, int, str], None]
+
+
+class DirectTransfer(NamedTuple):
+    """One vector get or set between an FMU and a memory, for a loop in C.
+
+    Attributes:
+        function: address of the FMI function.
+        references: value references, an array of C.
+        address: of the values that the function takes or gives.
+        slots: places in the memory of the values of a buffer of integers; None for Reals, which need
+            none.
+    """
+
+    function: int
+    references: Any
+    address: int
+    slots: Sequence[int] | None
+
+
+class DirectCalls(NamedTuple):
+    """What a loop in C needs in order to make the calls of an FMU itself.
+
+    Attributes:
+        pointer: the ``fmi2Component``.
+        is_python: whether the FMU takes the interpreter's lock at every call.
+        do_step: address of fmi2DoStep.
+        save: address of fmi2GetFMUstate if the state is to be saved before each step, else None.
+        state: address of the ``fmi2FMUstate``.
+        sets, gets: of its inputs and outputs, in their order.
+        settle: see :class:`cosim.fmu.stepping.Steps`.
+        check: ``check(what, status)`` ends the run if a call returned more than a warning.
+        kept: what must live as long as these calls.
+    """
+
+    pointer: int
+    is_python: bool
+    do_step: int
+    save: int | None
+    state: int
+    sets: Sequence[DirectTransfer]
+    gets: Sequence[DirectTransfer]
+    settle: Callable[[float, int, bool], None]
+    check: Callable[[str, int], None]
+    kept: Sequence[Any]
 
 
 class Access(NamedTuple):
@@ -21,12 +65,14 @@ class Access(NamedTuple):
         step: ``step(t)`` steps from t [s] and gets the outputs.
         begin: ``begin(t)`` starts a step from t [s] that runs beside those of other FMUs, and
             ``step(t)`` waits for its end; None if the FMU cannot.
+        direct: the same calls for a loop in C; None for an FMU in a process of its own.
     """
 
     put: Callable[[], None]
     get: Callable[[], None]
     step: Callable[[float], None]
     begin: Callable[[float], None] | None = None
+    direct: DirectCalls | None = None
 
 
 class Instance(Protocol):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from .component import DISCARD, PENDING, Component
 
@@ -19,11 +20,24 @@ POLL_INTERVAL = 1e-4
 MOST_TRIES = 60
 
 
-def single_steps(component: Component, h: float) -> Callable[[float], None]:
-    """Steps of length h [s]: a function of the time t [s] at which a step begins.
+class Steps(NamedTuple):
+    """Steps of an FMU.
 
-    A step that does not succeed ends the run.
+    Attributes:
+        step: ``step(t)`` steps from t [s].
+        settle: ``settle(t, status, saved)`` brings the step from t to its end after the first call of
+            fmi2DoStep has returned ``status``, worse than a warning; ``saved`` tells whether the state
+            of before has been saved.
+        saves: whether the state is saved before each step.
     """
+
+    step: Callable[[float], None]
+    settle: Callable[[float, int, bool], None]
+    saves: bool
+
+
+def single_steps(component: Component, h: float) -> Steps:
+    """Steps of length h [s]; one that does not succeed ends the run."""
     do_step, now = component.function("fmi2DoStep"), ctypes.c_double()
     arguments = (
         ctypes.c_void_p.from_param(component.pointer),
@@ -34,32 +48,46 @@ def single_steps(component: Component, h: float) -> Callable[[float], None]:
 
     def step(t: float) -> None:
         now.value = t
-        status = do_step(*arguments)
-        if status >= DISCARD and (status := _awaited(component, status)) >= DISCARD:
+        if (status := do_step(*arguments)) >= DISCARD:
+            settle(t, status, False)
+
+    def settle(t: float, status: int, saved: bool) -> None:
+        if (status := _awaited(component, status)) >= DISCARD:
             _refuse(component, t, status)
 
-    return step
+    return Steps(step, settle, False)
 
 
-def redoing_steps(component: Component, h: float) -> Callable[[float], None]:
+def redoing_steps(component: Component, h: float) -> Steps:
     """The same for an FMU whose state can be restored: a discarded step is repeated in shorter ones."""
     do_step = component.function("fmi2DoStep")
     save, restore = component.function("fmi2GetFMUstate"), component.function("fmi2SetFMUstate")
     pointer, state = ctypes.c_void_p(component.pointer), component.saved_state
 
-    def step(t: float) -> None:
-        end = goal = t + h
-        length, tries = h, 0
+    def begin(t: float, length: float) -> tuple[int, bool]:
+        """Save the state and call fmi2DoStep; its status, and whether the state is saved."""
         saved = save(pointer, ctypes.byref(state)) < DISCARD
+        return attempt(t, length, saved), saved
+
+    def attempt(t: float, length: float, saved: bool) -> int:
+        # The last argument promises that the state will not be restored.
+        return do_step(pointer, ctypes.c_double(t), ctypes.c_double(length), int(not saved))
+
+    def step(t: float) -> None:
+        status, saved = begin(t, h)
+        if status >= DISCARD:
+            settle(t, status, saved)
+
+    def settle(t: float, status: int, saved: bool) -> None:
+        end = goal = t + h
+        tries = 0
         while True:
-            # The last argument promises that the state will not be restored.
-            status = do_step(pointer, ctypes.c_double(t), ctypes.c_double(length), int(not saved))
             status = _awaited(component, status)
             if status < DISCARD:
                 if goal == end:
                     return
                 t, goal = goal, end
-                saved = save(pointer, ctypes.byref(state)) < DISCARD
+                status, saved = begin(t, goal - t)
             else:
                 last, done = _progress(component) if status == DISCARD else (None, False)
                 tries += 1
@@ -68,9 +96,9 @@ def redoing_steps(component: Component, h: float) -> Callable[[float], None]:
                 if not can_go_on or tries > MOST_TRIES or restore(pointer, state) >= DISCARD:
                     _refuse(component, t, status)
                 goal = shorter
-            length = goal - t
+                status = attempt(t, goal - t, saved)
 
-    return step
+    return Steps(step, settle, True)
 
 
 def _awaited(component: Component, status: int) -> int:

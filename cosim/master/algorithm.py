@@ -59,7 +59,7 @@ class Master:
             for name in system.order:
                 self._instances[name] = self._instantiate(name)
                 self._leave_if_interrupted()
-            self._steppers = [
+            self.steppers = [
                 Stepper(system, k, self._instances[name], self.table, settable)
                 for k, name in enumerate(system.order)
             ]
@@ -79,7 +79,7 @@ class Master:
             raise KeyboardInterrupt
 
     def _stepper(self, name: str) -> Stepper:
-        return self._steppers[self.system.order.index(name)]
+        return self.steppers[self.system.order.index(name)]
 
     def _bind_faults(self) -> None:
         """Attach each fault to the inputs or outputs it acts on, with random numbers of its own."""
@@ -95,7 +95,7 @@ class Master:
 
     def _initialise(self) -> None:
         system = self.system
-        for stepper in self._steppers:
+        for stepper in self.steppers:
             instance = stepper.instance
             instance.set_up(system.scenario.stop)
             for variable, value in system.parameters[instance.name]:
@@ -104,17 +104,17 @@ class Master:
             stepper.read_inputs()
             self._leave_if_interrupted()
         # Values converge in as many sweeps as there are FMUs in a chain; faults act only afterwards.
-        for _ in self._steppers:
+        for _ in self.steppers:
             before = self.table.row.copy()
-            for stepper in self._steppers:
+            for stepper in self.steppers:
                 self._initial_exchange(stepper)
             if np.array_equal(before, self.table.row, equal_nan=True):
                 break
         self._bind_faults()
-        self._begin_events(0.0)
-        for stepper in self._steppers:
+        self.begin_events(0.0)
+        for stepper in self.steppers:
             self._initial_exchange(stepper)
-        for stepper in self._steppers:
+        for stepper in self.steppers:
             stepper.instance.exit_initialization()
             STATE.calls(stepper.instance.name, "getting its outputs")
             stepper.read(0.0)
@@ -129,7 +129,8 @@ class Master:
         stepper.read(0.0)
         self._leave_if_interrupted()
 
-    def _begin_events(self, t: float) -> None:
+    def begin_events(self, t: float) -> None:
+        """Begin the events that are due at t [s]."""
         while self._events and self._events[0].time <= t + TIME_TOLERANCE:
             event = self._events.pop(0)
             signal = self.system.find(f"{event.model}.{event.variable}", "events")
@@ -154,9 +155,29 @@ class Master:
         is_integer = variable.type in ("Integer", "Enumeration")
         instance.set_value(variable, round(value) if is_integer else value)
 
+    @property
+    def next_event(self) -> Event | None:
+        """The next event that has not begun."""
+        return self._events[0] if self._events else None
+
+    @property
+    def is_jacobi(self) -> bool:
+        """Whether all FMUs step at once, with the values of before."""
+        return self.system.scenario.algorithm == "jacobi"
+
     def time(self, k: int) -> float:
         """Time of base step k [s]: counted, never accumulated."""
         return round(k * self.system.scenario.step, 12)
+
+    def times(self, first: int, last: int) -> np.ndarray:
+        """Times of base steps from ``first`` to ``last`` [s], each as :meth:`time` has it."""
+        found = np.arange(first, last + 1) * self.system.scenario.step
+        whole = np.rint(found * 1e12)
+        # Below 2**52 the product is at most 0.25 wrong, so these are the whole numbers that are meant;
+        # and a quotient of two exact numbers is rounded once, as a decimal number that is read.
+        if whole[-1] < 2.0**52 and np.abs(found * 1e12 - whole).max() < 0.2:
+            return whole / 1e12
+        return np.array([self.time(k) for k in range(first, last + 1)])
 
     def run(self) -> Iterator[float]:
         """Step to the end; yields the time [s] after each base step.
@@ -164,8 +185,8 @@ class Master:
         Raises:
             SimulationError: an FMU returned an error, or an output is not finite.
         """
-        steppers, advance_all = self._steppers, self._one_after_the_other
-        if self.system.scenario.algorithm == "jacobi":
+        steppers, advance_all = self.steppers, self._one_after_the_other
+        if self.is_jacobi:
             # Instances that step beside the others start first and are awaited last.
             steppers = sorted(steppers, key=lambda s: s.begin is not None)
             advance_all = self._all_at_once
@@ -175,7 +196,7 @@ class Master:
         t = 0.0
         for k in range(1, self.system.steps + 1):
             if events and events[0].time <= t + TIME_TOLERANCE:
-                self._begin_events(t)
+                self.begin_events(t)
             t_next = self.time(k)
             if multirate:
                 # An FMU with a longer step steps at the end of it, with the inputs of that instant.
@@ -183,6 +204,24 @@ class Master:
             advance_all(due, k, t, t_next)
             t = t_next
             yield t
+
+    def finish_step(self, k: int, stepper: Stepper, status: int, saved: bool) -> None:
+        """Do what remains of base step k where the compiled loop has stopped at a call of fmi2DoStep.
+
+        Args:
+            k: the base step.
+            stepper: the FMU that was called.
+            status: what fmi2DoStep returned.
+            saved: whether its state of before has been saved.
+        """
+        t, t_next = self.time(k - 1), self.time(k)
+        stepper.settle(self.time(k - stepper.every), status, saved)
+        rest = [s for s in self.steppers[stepper.number + 1 :] if k % s.every == 0]
+        if not self.is_jacobi:
+            self._one_after_the_other(rest, k, t, t_next)
+        for other in rest if self.is_jacobi else ():
+            STATE.numbers[INSTANCE] = other.number
+            other.advance(self.time(k - other.every))
 
     def _one_after_the_other(self, due: Sequence[Stepper], k: int, t: float, t_next: float) -> None:
         called = STATE.numbers
@@ -206,7 +245,7 @@ class Master:
     @property
     def outputs(self) -> list[str]:
         """Names of the Real signals that FMUs write: values that must stay finite."""
-        return [s.name for stepper in self._steppers for s in stepper.got if s.variable.type == "Real"]
+        return [s.name for stepper in self.steppers for s in stepper.got if s.variable.type == "Real"]
 
     def close(self) -> None:
         """Terminate all instances, and free those that are not kept for another run."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..scenario.faults import Effect, Values
+from ..scenario.operations import Add, Operation, Replace
 from ..scenario.schema import Event
 
 
@@ -19,16 +20,21 @@ class Changes:
         self._effects = effects
         self._fixed: dict[int, float] = {}
         self._added: dict[int, float] = {}
+        self._operations: list[Operation] = []
 
-    def _apply(self, values: Values, t: float) -> None:
-        for slot, value in self._added.items():
-            values[slot] += value
-        for slot, value in self._fixed.items():
-            values[slot] = value
+    def __call__(self, values: Values, t: float) -> None:
+        """Act on the values of time t [s]."""
+        for operation in self._operations:
+            operation(values, t)
+
+    def operations(self) -> list[Operation]:
+        """What they do until the next event."""
+        return self._operations
 
     def begin(self, slot: int, event: Event) -> None:
-        if self._apply not in self._effects:
-            self._effects.append(self._apply)
+        """An event begins."""
+        if self not in self._effects:
+            self._effects.append(self)
         if event.action == "reset":
             self._fixed.pop(slot, None)
             self._added.pop(slot, None)
@@ -37,3 +43,7 @@ class Changes:
         else:
             held = self._values[slot] if event.action == "hold" else float(event.value or 0.0)
             self._fixed[slot] = held
+        self._operations = [
+            Add([*self._added], [*self._added.values()]),
+            Replace([*self._fixed], [*self._fixed.values()]),
+        ]

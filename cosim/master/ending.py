@@ -25,6 +25,8 @@ class Result:
         metrics: as in metrics.json; empty if the system lacks the signals for them.
         warnings: oddities that were no reason to refuse.
         pace: with ``realtime``: lateness and missed deadlines.
+        loop: which step loop ran, ``compiled`` or ``plain``; empty if none did.
+        loop_reason: why it was the plain one.
     """
 
     status: str
@@ -34,6 +36,8 @@ class Result:
     metrics: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     pace: dict[str, float] = field(default_factory=dict)
+    loop: str = ""
+    loop_reason: str = ""
 
 
 @contextmanager

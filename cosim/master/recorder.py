@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
-from ..results.log import CSV, LogWriter
+from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
 from ..results.performance import needed
 from ..system.system import System
@@ -21,23 +22,32 @@ class Recorder:
         system: what runs.
         master: its master.
         folder: for the log; None writes none.
+        memory: gets the log in place of a folder.
 
     Attributes:
+        pending: the rows that are not written yet.
         take: ``take(t)`` takes the table as it is at t [s]; returns whether :meth:`flush` is due.
     """
 
-    def __init__(self, system: System, master: Master, folder: Path | None) -> None:
+    def __init__(
+        self, system: System, master: Master, folder: Path | None, memory: LogInMemory | None = None
+    ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
-        self._writer = None if folder is None else LogWriter(folder / CSV, self.columns)
+        self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
-        self._kept: list[np.ndarray] = []
+        self._kept: list[np.ndarray] = []  # blocks, shape (1 + names, rows)
         logged = self._slots(table, system.logged)
-        self._pending = PendingRows(table.row, logged, system.scenario.log.every)
-        self.take = self._pending.take
+        self.pending = PendingRows(table.row, logged, system.scenario.log.every)
+        self.take = self.pending.take
+
+    def _log_writer(self, path: Path, system: System) -> LogWriter:
+        native = system.scenario.native
+        compiled = native is not False and not asks_for_plain_loop()
+        return LogWriter(path, self.columns, compiled, with_zig=bool(native))
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:
@@ -55,18 +65,18 @@ class Recorder:
             SimulationError: an output is not finite; the rows up to there are written.
             OSError: not all could be written; then none can follow.
         """
-        times, taken = self._pending.all()
-        wrong = ~np.isfinite(taken[:, self._outputs])
+        times, taken = self.pending.all()
         message = ""
-        if wrong.any():
+        # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
+        if not np.isfinite(taken).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
             k = int(np.argmax(wrong.any(axis=1)))
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
-            self._writer.write(self._pending.logged(len(times)))
-        self._kept.append(np.column_stack([times, taken[:, self._kept_slots]]))
-        self._pending.clear()
+            self._writer.write(self.pending.logged(len(times)))
+        self._kept.append(np.vstack([times, taken.T[self._kept_slots]]))
+        self.pending.clear()
         if message:
             raise SimulationError(message)
 
@@ -76,5 +86,6 @@ class Recorder:
 
     def kept(self) -> dict[str, np.ndarray]:
         """The columns for metrics and pictures, at every step."""
-        table = np.concatenate(self._kept) if self._kept else np.empty((0, 1 + len(self._kept_names)))
-        return {name: table[:, k] for k, name in enumerate(["time", *self._kept_names])}
+        names = ["time", *self._kept_names]
+        table = np.concatenate(self._kept, axis=1) if self._kept else np.empty((len(names), 0))
+        return dict(zip(names, table, strict=True))

@@ -17,6 +17,7 @@ from ..process.run_state import LOGGING, STATE, Owner
 from ..process.scratch import sweep
 from ..results import log as logs
 from ..results.result_files import clear_results
+from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
@@ -24,6 +25,7 @@ from ..system.system import System
 from .algorithm import Master
 from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
+from .loops.chosen_loop import ChosenLoop, choose_loop
 from .real_time import Pace
 from .recorder import Recorder
 from .run_record import describe
@@ -42,6 +44,7 @@ def simulate(
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
     pool: InstancePool | None = None,
+    native: bool | None = None,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
@@ -55,6 +58,8 @@ def simulate(
         show: receives warnings and messages, a line each.
         progress: receives the simulated time [s] several times a second.
         pool: FMUs that serve several runs, for a scenario whose paths are all files.
+        native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
+            nothing; None leaves it to the scenario, which by default compiles the loop.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -65,6 +70,8 @@ def simulate(
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
+    if native is not None:
+        scenario = with_settings(scenario, [("native", native)], Path.cwd())
     # FMUs may change the working directory.
     here = os.getcwd()
     given = Path(out) if out is not None else Path("results") / scenario.name
@@ -164,6 +171,8 @@ def _record(
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     STATE.numbers[LOGGING] = 1
+    steps = choose_loop(master, recorder.pending, realtime is not None, UPDATE_INTERVAL)
+    result.loop, result.loop_reason = steps.loop, steps.reason
     pace: Pace | None = None
     result.status = "failed"  # until the loop has ended otherwise
     try:
@@ -171,7 +180,7 @@ def _record(
             with quiet_collector():
                 # Starts here: the collection before takes the time of several steps.
                 pace = None if realtime is None else Pace(realtime, system.scenario.step, interrupted)
-                stopped = _loop(system, master, recorder, pace, interrupted, progress)
+                stopped = _loop(system, steps, recorder, pace, interrupted, progress)
             result.status = "interrupted" if stopped else "done"
         except (SimulationError, OSError, KeyboardInterrupt) as error:
             # A second request may interrupt an FMU in the middle of its step.
@@ -188,7 +197,9 @@ def _record(
             result.message = not_written(folder, error)
         recorder.close()
         result.rows = recorder.rows
-        told: dict[str, Any] = {"rows": result.rows}
+        told: dict[str, Any] = {"rows": result.rows, "loop": result.loop}
+        if result.loop_reason:
+            told["loop_reason"] = result.loop_reason
         if pace is not None:
             result.pace = told["realtime"] = pace.summary()
         told["messages"] = [
@@ -204,7 +215,7 @@ def _record(
 
 def _loop(
     system: System,
-    master: Master,
+    steps: ChosenLoop,
     recorder: Recorder,
     pace: Pace | None,
     interrupted: Callable[[], bool],
@@ -212,19 +223,20 @@ def _loop(
 ) -> bool:
     """Step and record, with updates of progress and log; returns whether the user stopped it."""
     recorder.take(0.0)
-    take, clock = recorder.take, time.perf_counter
+    clock = time.perf_counter
     due = clock() + UPDATE_INTERVAL
-    for t in master.run():
-        full = take(t)
+    for t, full in steps.run():
         if pace is not None:
             pace.wait(t)
         if interrupted():
             recorder.flush()
             return True
         # At every step: the next may be a slow one, and the last of its process.
-        if full or clock() > due:
+        is_due = clock() > due
+        if full or is_due:
             STATE.calls_nothing()
             recorder.flush()
+        if is_due:
             gc.collect()
             progress(t)
             due = clock() + UPDATE_INTERVAL

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from ..fmu.instance import Instance
 from ..fmu.memory import Port
-from ..scenario.faults import Effect, Values
-from ..system.recordings import Recorded
+from ..scenario.faults import Effect
+from ..scenario.operations import Convert, Replace
 from ..system.system import Connection, System
 from .changes import Changes
 from .value_table import ValueTable
@@ -26,7 +25,11 @@ class Stepper:
         read: ``read(t)`` copies its outputs to the table.
         begin: ``begin(t)`` starts a step from t that runs beside those of others; None if it cannot.
         advance: ``advance(t)`` steps from t, and reads the outputs.
+        settle: ``settle(t, status, saved)`` does the rest of :attr:`advance` where another loop has
+            called fmi2DoStep and stopped at what it returned; see :class:`cosim.fmu.stepping.Steps`.
         input_effects, output_effects: act on the values on their way, in this order.
+        copies: connections without conversion: first target, first source, how many.
+        access: the calls of the FMU.
     """
 
     def __init__(
@@ -53,14 +56,19 @@ class Stepper:
         self._inputs = [s for s in own if s.variable.causality == "input"]
         # Inputs without a source that events may change.
         self._free = [s for s in own if s.name in settable and s.name not in sourced]
-        self._access = instance.bind(
+        self.access = instance.bind(
             [Port(s.variable, table.slots[s.name]) for s in own if s.name in settable],
             [Port(s.variable, table.slots[s.name]) for s in self.got],
             table,
             self.step_size,
         )
-        self.begin = self._access.begin
-        self.exchange = self._make_exchange(incoming, system.recordings.get(instance.name, ()))
+        self.begin = self.access.begin
+        self.copies, conversions = _transfers(incoming, table)
+        if conversions:
+            self.input_effects.append(conversions)
+        for part in system.recordings.get(instance.name, ()):
+            self.input_effects.append(part.bind([table.slots[name] for name in part.names]))
+        self.exchange = self._make_exchange()
         self.read = self._make_read()
         self.advance = self._make_advance()
 
@@ -70,22 +78,21 @@ class Stepper:
         for signal in self._inputs:
             values[slots[signal.name]] = self.instance.get_value(signal.variable)
         if self._free:
-            constants = [(slots[s.name], values[slots[s.name]]) for s in self._free]
-            self.input_effects.insert(0, partial(_restore, constants))
+            # They return to their start values, from which events change them.
+            places = [slots[s.name] for s in self._free]
+            self.input_effects.insert(0, Replace(places, [values[slot] for slot in places]))
 
     # The three functions that run every step keep what they need in their own scope, where Python finds
     # it fastest.
 
-    def _make_exchange(
-        self, incoming: Sequence[Connection], recordings: Sequence[Recorded]
-    ) -> Callable[[float], None]:
-        values, effects, put = self._table.values, self.input_effects, self._access.put
-        copies, runs, conversions = _transfers(incoming, self._table)
-        if conversions:
-            effects.append(partial(_convert, conversions))
-        slots = self._table.slots
-        for part in recordings:
-            effects.append(part.bind([slots[name] for name in part.names]))
+    def _make_exchange(self) -> Callable[[float], None]:
+        values, effects, put = self._table.values, self.input_effects, self.access.put
+        copies = [(target, source) for target, source, count in self.copies if count == 1]
+        runs = [
+            (target, target + count, source, source + count)
+            for target, source, count in self.copies
+            if count > 1
+        ]
 
         def exchange(t: float) -> None:
             for target, source in copies:
@@ -99,7 +106,7 @@ class Stepper:
         return exchange
 
     def _make_read(self) -> Callable[[float], None]:
-        values, effects, get = self._table.values, self.output_effects, self._access.get
+        values, effects, get = self._table.values, self.output_effects, self.access.get
 
         def read(t: float) -> None:
             get()
@@ -112,7 +119,7 @@ class Stepper:
         values, effects, step, h = (
             self._table.values,
             self.output_effects,
-            self._access.step,
+            self.access.step,
             self.step_size,
         )
 
@@ -123,41 +130,33 @@ class Stepper:
 
         return advance
 
-
-def _restore(constants: Sequence[tuple[int, float]], values: Values, t: float) -> None:
-    """Inputs without a source return to their start values, from which events change them."""
-    for target, value in constants:
-        values[target] = value
-
-
-def _convert(conversions: Sequence[tuple[int, int, float, float]], values: Values, t: float) -> None:
-    """Connections between different units."""
-    for target, source, factor, offset in conversions:
-        values[target] = factor * values[source] + offset
+    def settle(self, t: float, status: int, saved: bool) -> None:
+        assert self.access.direct is not None
+        self.access.direct.settle(t, status, saved)
+        self.access.get()
+        for effect in self.output_effects:
+            effect(self._table.values, t + self.step_size)
 
 
 def _transfers(
     connections: Sequence[Connection], table: ValueTable
-) -> tuple[list[tuple[int, int]], list[tuple[int, int, int, int]], list[tuple[int, int, float, float]]]:
-    """Connections as single copies, copies of slices, and conversions."""
-    conversions: list[tuple[int, int, float, float]] = []
+) -> tuple[list[tuple[int, int, int]], Convert | None]:
+    """Connections as copies (first target, first source, how many), and those between units."""
+    converted: list[Connection] = []
     plain: list[tuple[int, int]] = []
     for c in connections:
-        pair = (table.slots[c.target.name], table.slots[c.source.name])
         if (c.conversion.factor, c.conversion.offset) == (1.0, 0.0):
-            plain.append(pair)
+            plain.append((table.slots[c.target.name], table.slots[c.source.name]))
         else:
-            conversions.append((*pair, c.conversion.factor, c.conversion.offset))
-    copies: list[tuple[int, int]] = []
-    runs: list[tuple[int, int, int, int]] = []
+            converted.append(c)
+    copies: list[tuple[int, int, int]] = []
     block: list[tuple[int, int]] = []
 
     def finish() -> None:
         if len(block) < SHORTEST_SLICE:
-            copies.extend(block)
+            copies.extend((target, source, 1) for target, source in block)
         else:
-            (target, source), n = block[0], len(block)
-            runs.append((target, target + n, source, source + n))
+            copies.append((*block[0], len(block)))
         block.clear()
 
     for target, source in sorted(plain):
@@ -165,4 +164,10 @@ def _transfers(
             finish()
         block.append((target, source))
     finish()
-    return copies, runs, conversions
+    if not converted:
+        return copies, None
+    return copies, Convert(
+        [table.slots[c.target.name] for c in converted],
+        [table.slots[c.source.name] for c in converted],
+        [(c.conversion.factor, c.conversion.offset) for c in converted],
+    )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import orjson
 
+from ..compiled.row_text import Lines, Rows, compiled_lines
 from ..errors import InputError, nearest
 from ..files import atomic_write, write_all
 from ..process.run_state import Owner
@@ -33,6 +34,8 @@ class LogWriter:
     Args:
         path: file to write; an older one is replaced.
         columns: names for the header line, ``time`` first.
+        compiled: whether the text may come from C; it is the same.
+        with_zig: whether zig may compile that; see :func:`cosim.compiled.library.library`.
 
     Attributes:
         rows: number of rows in the file.
@@ -41,8 +44,11 @@ class LogWriter:
         OSError: the file cannot be made; then there is none.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+    def __init__(
+        self, path: Path, columns: Sequence[str], compiled: bool = False, with_zig: bool = False
+    ) -> None:
         self.rows = 0
+        self._lines = (compiled_lines(with_zig) if compiled else None) or _lines
         self._owner = Owner()
         self._failure: OSError | None = None
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
@@ -59,11 +65,8 @@ class LogWriter:
         info = os.fstat(self._file.fileno())
         return info.st_dev, info.st_ino
 
-    def write(self, block: np.ndarray) -> None:
+    def write(self, rows: Rows) -> None:
         """Append rows.
-
-        Args:
-            block: (rows, columns), float64, C-contiguous.
 
         Raises:
             OSError: not all could be written; ``rows`` tells how many were, and none can follow.
@@ -71,31 +74,30 @@ class LogWriter:
         self._owner.leave_copies()
         if self._failure:
             raise self._failure
-        if not len(block):
+        if not len(rows.times):
             return
-        lines = format_rows(block)
+        lines, ends = self._lines(rows)
         try:
             if self._identify() != self._identity:
                 raise OSError(errno.EBADF, "its file was closed by something else")
             begun = self._file.tell()
             try:
-                write_all(self._file, b"\n".join(lines) + b"\n")
+                write_all(self._file, lines)
             except OSError:
-                self._cut(begun, lines)
+                self._cut(begun, begun + ends)
                 raise
         except OSError as error:
             self._failure = error
             raise
-        self.rows += len(lines)
+        self.rows += len(ends)
 
-    def _cut(self, begun: int, lines: Sequence[bytes]) -> None:
+    def _cut(self, begun: int, ends: np.ndarray) -> None:
         """Keep the rows of a block that are whole.
 
         Args:
             begun: position at which the block begins [bytes].
-            lines: its rows.
+            ends: positions behind its rows [bytes].
         """
-        ends = begun + np.cumsum([len(line) + 1 for line in lines])
         whole = int(np.searchsorted(ends, self._file.tell(), side="right"))
         self._file.truncate(int(ends[whole - 1]) if whole else begun)
         self.rows += whole
@@ -103,6 +105,41 @@ class LogWriter:
     def close(self) -> None:
         with suppress(OSError):  # closed by something else
             self._file.close()
+
+
+class LogInMemory:
+    """A log that is kept in memory, in place of a file.
+
+    Args:
+        columns: names, ``time`` first.
+
+    Attributes:
+        rows: number of rows so far.
+    """
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        self.rows = 0
+        self._names = list(columns)
+        self._blocks: list[np.ndarray] = []
+
+    def write(self, rows: Rows) -> None:
+        """Append rows."""
+        self._blocks.append(rows.block())
+        self.rows += len(rows.times)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def read(self) -> dict[str, np.ndarray]:
+        """What :func:`read_log` reads from the file of the same run, to the bit."""
+        table = np.concatenate(self._blocks) if self._blocks else np.empty((0, len(self._names)))
+        return {name: table[:, k] for k, name in enumerate(self._names)}
+
+
+def _lines(rows: Rows) -> Lines:
+    """Lines, and the bytes up to the end of each."""
+    found = format_rows(rows.block())
+    return memoryview(b"\n".join(found) + b"\n"), np.cumsum([len(line) + 1 for line in found])
 
 
 def format_rows(block: np.ndarray) -> list[bytes]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled.row_text import Rows
 from ..files import write_all
 from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
 from .log import cut_to_rows, format_rows
@@ -28,13 +29,19 @@ class PendingRows:
 
     Attributes:
         take: ``take(t)`` copies the table as it is at t [s]; returns whether there is room for no more.
+        instants, taken: memory of their times [s], shape (rows,), and of the rows, shape (rows,
+            signals).
+        count: how many there are, shape (1,).
+        room: how many there may be.
     """
 
     def __init__(self, row: np.ndarray, slots: np.ndarray, every: int) -> None:
         width = len(row)
         memory, self._counts = STATE.pending(8 * BLOCK * (1 + width))
-        self._times, self._taken = _parts(memory, width)
-        self._instants = memory[: 8 * BLOCK].cast("d")
+        self.instants, self.taken = _parts(memory, width)
+        self.count = np.frombuffer(self._counts, np.int32)[TAKEN : TAKEN + 1]
+        self.room = BLOCK
+        self._doubles = memory[: 8 * BLOCK].cast("d")
         self._slots, self._every = slots, every
         layout = {"width": width, "slots": slots.tolist(), "every": every}
         STATE.write(LAYOUT, json.dumps(layout))
@@ -42,7 +49,7 @@ class PendingRows:
 
     def _make_take(self, row: np.ndarray) -> Callable[[float], bool]:
         # What runs every step keeps what it needs in its own scope, where Python finds it fastest.
-        times, taken, counts = self._instants, self._taken, self._counts
+        times, taken, counts = self._doubles, self.taken, self._counts
 
         def take(t: float) -> bool:
             count = counts[TAKEN]
@@ -56,12 +63,12 @@ class PendingRows:
     def all(self) -> tuple[np.ndarray, np.ndarray]:
         """The times [s] of the rows, and the rows, shape (rows, signals)."""
         count = self._counts[TAKEN]
-        return self._times[:count], self._taken[:count]
+        return self.instants[:count], self.taken[:count]
 
-    def logged(self, count: int) -> np.ndarray:
-        """What belongs into the log of the first rows: times and logged signals."""
+    def logged(self, count: int) -> Rows:
+        """What belongs into the log of the first rows."""
         return _logged(
-            self._times[:count], self._taken[:count], self._slots, self._every, self._counts[STEPS]
+            self.instants[:count], self.taken[:count], self._slots, self._every, self._counts[STEPS]
         )
 
     def clear(self) -> None:
@@ -76,10 +83,8 @@ def _parts(memory: memoryview, width: int) -> tuple[np.ndarray, np.ndarray]:
     return numbers[:BLOCK], numbers[BLOCK:].reshape(BLOCK, width)
 
 
-def _logged(
-    times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int
-) -> np.ndarray:
-    """What belongs into the log: shape (rows, 1 + slots), C-contiguous.
+def _logged(times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int) -> Rows:
+    """What belongs into the log.
 
     Args:
         times: of the rows [s].
@@ -89,10 +94,7 @@ def _logged(
         before: steps before the first row.
     """
     chosen = slice(-before % every, None, every)
-    block = np.empty((len(times[chosen]), 1 + len(slots)))
-    block[:, 0] = times[chosen]
-    block[:, 1:] = taken[chosen, slots]
-    return block
+    return Rows(times[chosen], taken[chosen], slots)
 
 
 def rescue(path: Path) -> int:
@@ -111,9 +113,9 @@ def rescue(path: Path) -> int:
         return rows
     times, taken = _parts(memory, layout["width"])
     count, before, every = counts[TAKEN], counts[STEPS], layout["every"]
-    block = _logged(times[:count], taken[:count], np.array(layout["slots"], np.intp), every, before)
+    logged = _logged(times[:count], taken[:count], np.array(layout["slots"], np.intp), every, before)
     # It may have died while it wrote them.
-    block = block[rows + before // -every :]
+    block = logged.block()[rows + before // -every :]
     try:
         with open(path, "ab", buffering=0) as file:
             write_all(file, b"".join(line + b"\n" for line in format_rows(block)))

@@ -100,11 +100,14 @@ def _window(log: Log, start: float | None, stop: float | None, roles: Roles) -> 
             f" to {time[-1] if stop is None else stop:g} s"
             f" (the log covers {time[0]:g} s to {time[-1]:g} s)"
         )
-    part = {name: np.asarray(log[name], float)[chosen] for name in names}
+    places = np.flatnonzero(chosen)
+    if places[-1] - places[0] == places.size - 1:
+        chosen = slice(places[0], places[-1] + 1)
+    part = {name: np.ascontiguousarray(np.asarray(log[name], float)[chosen]) for name in names}
     time = part["time"]
     for name, values in part.items():
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
+        if not (finite := np.isfinite(values)).all():
+            bad = np.flatnonzero(~finite)
             raise MetricsError(f"{name} is not finite at {time[bad[0]]:g} s")
     still = np.flatnonzero(np.diff(time) <= 0.0)
     if still.size:

@@ -2,28 +2,22 @@
 
 A fault is a class that declares its options; bound to slots of the value table, it returns a function
 that is called each time the values have been set. A new fault is a new class, here or in a module of the
-user: it registers itself by its ``kind``. Faults on the same signal act in the order of their ``stage``,
-as along a real measurement chain, whatever their order in the scenario.
+user: it registers itself by its ``kind``. Where the function is an operation
+(:mod:`cosim.scenario.operations`), as it is for all faults here, the run can take the compiled step
+loop. Faults on the same signal act in the order of their ``stage``, as along a real measurement chain,
+whatever their order in the scenario.
 """
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
+from . import operations
+from .operations import Add, Hold, Replace, Values
 from .strict import Strict
-
-
-class Values(Protocol):
-    """The value table: a number at each slot."""
-
-    def __getitem__(self, slot: int, /) -> float: ...
-
-    def __setitem__(self, slot: int, value: float, /) -> None: ...
-
 
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]
@@ -132,13 +126,7 @@ class Bias(Fault):
         return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        pairs = list(zip(slots, _each(self.value, len(slots)), strict=True))
-
-        def effect(values: Values, t: float) -> None:
-            for slot, value in pairs:
-                values[slot] += value
-
-        return effect
+        return Add(slots, _each(self.value, len(slots)))
 
 
 class Noise(Fault):
@@ -159,13 +147,12 @@ class Noise(Fault):
         std = np.array(_each(self.std, len(slots)))
         drawn: list[list[float]] = []
 
-        def effect(values: Values, t: float) -> None:
+        def sample(t: float) -> list[float]:
             if not drawn:
                 drawn.extend((std * rng.standard_normal((DRAWN, len(slots)))).tolist())
-            for slot, error in zip(slots, drawn.pop(), strict=True):
-                values[slot] += error
+            return drawn.pop()
 
-        return effect
+        return Add(slots, sample)
 
 
 class Spikes(Timed):
@@ -181,15 +168,15 @@ class Spikes(Timed):
         return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        pairs = list(zip(slots, _each(self.size, len(slots)), strict=True))
+        sizes = _each(self.size, len(slots))
         active = self.windows(step, rng)
 
-        def effect(values: Values, t: float) -> None:
-            if active(t):
-                for slot, size in pairs:
-                    values[slot] += size if rng.random() < 0.5 else -size
+        def sample(t: float) -> list[float] | None:
+            if not active(t):
+                return None
+            return [size if rng.random() < 0.5 else -size for size in sizes]
 
-        return effect
+        return Add(slots, sample)
 
 
 class Wrap(Fault):
@@ -199,12 +186,7 @@ class Wrap(Fault):
     stage = 4
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        def effect(values: Values, t: float) -> None:
-            for slot in slots:
-                angle = values[slot]
-                values[slot] = angle + 2.0 * math.pi * ((math.pi - angle) / (2.0 * math.pi) // 1.0)
-
-        return effect
+        return operations.Wrap(slots)
 
 
 class Delay(Fault):
@@ -215,16 +197,7 @@ class Delay(Fault):
     time: float = Field(ge=0.0, le=1e6, description="how late [s], rounded to samples")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        samples = int(self.time / step + 0.5)
-        queue: deque[list[float]] = deque()
-
-        def effect(values: Values, t: float) -> None:
-            queue.append([values[slot] for slot in slots])
-            late = queue.popleft() if len(queue) > samples else queue[0]
-            for slot, value in zip(slots, late, strict=True):
-                values[slot] = value
-
-        return effect
+        return operations.Delay(slots, int(self.time / step + 0.5))
 
 
 class Freeze(Timed):
@@ -234,17 +207,7 @@ class Freeze(Timed):
     stage = 6
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        active = self.windows(step, rng)
-        held: list[float] = []
-
-        def effect(values: Values, t: float) -> None:
-            if active(t) and held:
-                for slot, value in zip(slots, held, strict=True):
-                    values[slot] = value
-            else:
-                held[:] = [values[slot] for slot in slots]
-
-        return effect
+        return Hold(slots, self.windows(step, rng))
 
 
 class Dropout(Timed):
@@ -256,11 +219,5 @@ class Dropout(Timed):
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         active = self.windows(step, rng)
-        lost = math.nan if self.value == "nan" else 0.0
-
-        def effect(values: Values, t: float) -> None:
-            if active(t):
-                for slot in slots:
-                    values[slot] = lost
-
-        return effect
+        lost = [math.nan if self.value == "nan" else 0.0] * len(slots)
+        return Replace(slots, lambda t: lost if active(t) else None)

@@ -152,8 +152,10 @@ class Scenario(Strict):
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
-    native: bool = Field(
-        False, description="compile the project's own FMUs, those with a bare name: no Python in them"
+    native: bool | None = Field(
+        None,
+        description="true: compile the project's own FMUs, those with a bare name, and the step loop; "
+        "false: neither; without it the loop, where the system has a C compiler",
     )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import InputError
-from ..fmu.fmu_model import NUMERIC, Model
+from ..fmu.fmu_model import NUMERIC, Model, Variable
 from ..scenario.schema import Scenario
 from .checks import (
     check_events,
@@ -103,13 +103,8 @@ def _count_steps(system: System) -> None:
 
 def _choose_signals(system: System) -> None:
     """Choose the signals of the value table: connected, logged, or used by metrics, faults or events."""
-    available = {
-        f"{name}.{v.name}": Signal(name, v)
-        for name, model in system.models.items()
-        for v in model.variables.values()
-        if v.type in NUMERIC
-    }
-    flowing = [n for n, s in available.items() if s.variable.causality in ("input", "output")]
+    available = _numbers(system)
+    flowing = [name for name, v in available.items() if v.causality in ("input", "output")]
     wanted = system.scenario.log.signals
     if wanted == "all":
         system.logged = flowing
@@ -128,7 +123,19 @@ def _choose_signals(system: System) -> None:
     for fault in system.scenario.faults:
         needed |= set(fault.signals)
     needed |= {f"{e.model}.{e.variable}" for e in system.scenario.events}.intersection(flowing)
-    system.signals = {name: signal for name, signal in available.items() if name in needed}
+    system.signals = {
+        name: Signal(name.partition(".")[0], v) for name, v in available.items() if name in needed
+    }
+
+
+def _numbers(system: System) -> dict[str, Variable]:
+    """All variables that are numbers, by ``instance.variable``."""
+    return {
+        f"{name}.{v.name}": v
+        for name, model in system.models.items()
+        for v in model.variables.values()
+        if v.type in NUMERIC
+    }
 
 
 def _matching(system: System, pattern: str, names: Sequence[str], where: str) -> list[str]:

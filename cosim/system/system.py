@@ -1,6 +1,7 @@
 """A checked system: models, signals and connections, laid out for running."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from ..conversion import Conversion
 from ..errors import InputError, nearest
@@ -16,8 +17,9 @@ class Signal:
     instance: str
     variable: Variable
 
-    @property
+    @cached_property
     def name(self) -> str:
+        """``instance.variable``."""
         return f"{self.instance}.{self.variable.name}"
 
 

@@ -93,9 +93,10 @@ def _resolve(system: System, output: str, input_: str, where: str) -> list[tuple
         if name not in system.models:
             raise InputError(f"{where}: no instance '{name}'{nearest(name, system.models)}")
     pairs: list[tuple[Signal, Signal]] = []
-    for variable in system.models[source].variables.values():
+    outputs = [v for v in system.models[source].variables.values() if v.causality == "output"]
+    for variable in outputs:
         name = f"{source}.{variable.name}"
-        if variable.causality != "output" or len(name) < len(head) + len(tail):
+        if len(name) < len(head) + len(tail):
             continue
         if name.startswith(head) and name.endswith(tail):
             middle = name[len(head) : len(name) - len(tail)]

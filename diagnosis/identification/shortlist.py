@@ -169,8 +169,10 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
 
     Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
     such would move the nominal coefficients to wherever it becomes a little less. It also lasts: where
-    it is correlated over more windows than overlap, fewer count as independent. On no axis does it
-    count more than the error before, which a wrong winner may have made larger.
+    it is correlated over more windows than overlap, fewer count as independent, by the same factor on
+    all axes (the geometric mean of theirs): that an axis lacks something that lasts is no reason to
+    believe the others more. On no axis does it count more than the error before, which a wrong winner
+    may have made larger.
 
     Args:
         t, at, ranking: all candidates beside a model.
@@ -182,7 +184,8 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
     for _ in range(REWEIGHTINGS):
         left = found.refined[found.scored[0].candidate].left
         spoiled = np.sqrt(np.mean(left**2, axis=0))
-        sigma = np.maximum(least, np.minimum(spoiled, most)) * np.sqrt(independent(t.data, left))
+        lasting = np.exp(np.mean(np.log(independent(t.data, left))))
+        sigma = np.maximum(least, np.minimum(spoiled, most)) * np.sqrt(lasting)
         change = sigma / ranking.table.sigma
         if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
             break

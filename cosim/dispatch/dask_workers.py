@@ -1,37 +1,32 @@
-"""The runs of a campaign on the workers of a Dask scheduler, on this computer or elsewhere."""
+"""Runs on the workers of a Dask scheduler, on this computer or elsewhere."""
 
 from __future__ import annotations
 
 import logging
 import os
 import statistics
-import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable
 from contextlib import suppress
-from importlib.metadata import version
 from itertools import islice
-from pathlib import Path
+from queue import Empty, Queue
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from threading import Thread
+from typing import Any
 
 from distributed import (
     Client,
     Future,
     KilledWorker,
     LocalCluster,
-    Worker,
-    WorkerPlugin,
-    as_completed,
-    get_worker,
 )
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
-from .case_scenarios import Job
-from .single_run import Row, Workplace
-from .travelling_files import Files, put
+from .dask_task import OneFile, Request, run_on_worker
+from .job import Job, Row, own_version
+from .travelling_files import Files
 
 # Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
 # percent of it; chosen: little is lost with a worker.
@@ -40,72 +35,14 @@ TASK_TIME = 1.0
 MOST_IN_TASK = 64
 # Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
 AHEAD = 2
-# Wall time that a worker waits for a file [s], of which it gets all when it starts; between two looks.
-PATIENCE, LOOK = 60.0, 0.05
 # Wall time until a scheduler has to answer [s]; chosen.
 ANSWER = 10.0
+# Wall time for which there may be no worker [s]: one that died here is back within seconds, elsewhere
+# somebody may still start some. Between two looks.
+WITHOUT_WORKERS, GLANCE = 120.0, 1.0
 # How often the workers of a task may die here before it is suspected; chosen: once by chance.
 DEATHS = 1
-FOLDER = "cybership"  # below a worker's own folder
-
-
-class Request(NamedTuple):
-    """What a task of Dask gets.
-
-    Attributes:
-        contents: scenarios with files named by their contents.
-        files: those names.
-        resettable: SHA-256 of the FMUs that may be reset.
-        keep_log: whether the logs come back.
-        version: of the package, without which equal numbers are not certain.
-    """
-
-    contents: list[dict[str, Any]]
-    files: tuple[str, ...]
-    resettable: frozenset[str]
-    keep_log: bool
-    version: str
-
-
-class OneFile(WorkerPlugin):
-    """A file on every worker, also on those that start later.
-
-    Args:
-        file: its name by content.
-        content: of the file.
-    """
-
-    def __init__(self, file: str, content: bytes) -> None:
-        self.name = f"cybership-{file}"
-        self._file, self._content = file, content
-
-    def setup(self, worker: Worker) -> None:
-        put(_folder(worker), self._file, self._content)
-
-
-def _folder(worker: Worker) -> Path:
-    return Path(worker.local_directory) / FOLDER
-
-
-# The workplace of this process, if it is that of a worker.
-_workplaces: dict[Path, Workplace] = {}
-_making = threading.Lock()
-
-
-def _run(request: Request) -> list[Row]:
-    """A task on a worker."""
-    if request.version != (own := version("cybership")):
-        raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
-    folder = _folder(get_worker())
-    with _making:
-        work = _workplaces.setdefault(folder, Workplace(folder))
-    work.pool.resettable |= request.resettable
-    until = time.monotonic() + PATIENCE
-    while missing := [name for name in request.files if not (folder / name).is_file()]:
-        if time.monotonic() > until:
-            raise SimulationError(f"'{missing[0]}' did not reach a worker within {PATIENCE:g} s")
-        time.sleep(LOOK)
-    return [work.run(content, request.keep_log) for content in request.contents]
+LOST, KEPT = "the workers were lost", "finished runs are kept"
 
 
 def _rows_of(future: Future) -> list[Row] | None:
@@ -122,7 +59,7 @@ def _rows_of(future: Future) -> list[Row] | None:
     except InputError:
         raise
     except Exception as error:
-        raise SimulationError(f"the workers were lost: {error!r}; finished runs are kept") from error
+        raise SimulationError(f"{LOST}: {error!r}; {KEPT}") from error
 
 
 class DaskWorkers:
@@ -130,7 +67,6 @@ class DaskWorkers:
 
     Args:
         files: what the runs need; each is sent once to each worker.
-        keep_log: whether the logs come back.
         address: of a scheduler; None starts one with workers on this computer.
         workers: how many, without an address; None is one for each core.
 
@@ -138,11 +74,12 @@ class DaskWorkers:
         InputError: no scheduler answers at the address.
     """
 
-    def __init__(self, files: Files, keep_log: bool, address: str | None, workers: int | None) -> None:
-        self._files, self._keep_log = files, keep_log
+    def __init__(self, files: Files, address: str | None, workers: int | None) -> None:
+        self._files = files
         self._cluster: LocalCluster | None = None
-        self._scratch = TemporaryDirectory(prefix="campaign_")
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        self._scratch = TemporaryDirectory(prefix="campaign_", ignore_cleanup_errors=True)
+        for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
+            logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
             if address is None:
                 # A Ctrl-C is for this process alone; the workers end with it.
@@ -152,11 +89,11 @@ class DaskWorkers:
                         threads_per_worker=1,  # FMUs of one process cannot run side by side
                         processes=True,
                         host="127.0.0.1",
-                        dashboard_address=None,  # pyright: ignore[reportArgumentType]
+                        dashboard_address="127.0.0.1:0",  # where Dask tells of its health
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
                         local_directory=self._scratch.name,
                         silence_logs=logging.CRITICAL,
-                        scheduler_kwargs={"allowed_failures": DEATHS},
+                        scheduler_kwargs={"allowed_failures": DEATHS, "dashboard": False},
                     )
                     self._client = Client(self._cluster, set_as_default=False)
             else:
@@ -169,6 +106,7 @@ class DaskWorkers:
             self._close_cluster()
             raise
         self._walls: deque[float] = deque(maxlen=20)
+        self._sent: set[str] = set()
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         waiting = iter(jobs)
@@ -176,12 +114,12 @@ class DaskWorkers:
         # the end, each alone, to find the one that ends its process.
         suspects: deque[Job] = deque()
         running: dict[Any, tuple[Future, list[Job], bool]] = {}
-        ended = as_completed(loop=self._client.loop)
+        ended: Queue[Future] = Queue()
 
         def start(batch: list[Job], alone: bool) -> None:
             future = self._submit(batch)
             running[future.key] = future, batch, alone
-            ended.add(future)
+            future.add_done_callback(ended.put)
 
         def fill() -> None:
             while len(running) < AHEAD * max(1, self._threads()):
@@ -194,7 +132,7 @@ class DaskWorkers:
         try:
             fill()
             while running:
-                future = next(ended)
+                future = self._next(ended)
                 _, batch, alone = running.pop(future.key)
                 found = _rows_of(future)
                 if found is None and not alone:
@@ -205,8 +143,28 @@ class DaskWorkers:
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()
+        except OSError as error:
+            raise SimulationError(f"{LOST}: {error}; {KEPT}") from None
         finally:
-            self._client.cancel([future for future, *_ in running.values()])
+            with suppress(OSError):
+                self._client.cancel([future for future, *_ in running.values()])
+
+    def _next(self, ended: Queue[Future]) -> Future:
+        """The next task that ends.
+
+        Raises:
+            SimulationError: there is no worker, and none comes.
+        """
+        seen = time.monotonic()
+        while True:
+            try:
+                return ended.get(timeout=GLANCE)
+            except Empty:
+                now = time.monotonic()
+            if self._threads():
+                seen = now
+            elif now - seen > WITHOUT_WORKERS:
+                raise SimulationError(f"there was no worker for {WITHOUT_WORKERS:g} s; {KEPT}")
 
     def _threads(self) -> int:
         """Threads of all workers."""
@@ -224,29 +182,38 @@ class DaskWorkers:
         for name in names:
             self._send(name)
         request = Request(
-            [job.content for job in batch],
+            [(job.content, job.task) for job in batch],
             tuple(names),
             frozenset(self._files.resettable),
-            self._keep_log,
-            version("cybership"),
+            own_version(),
         )
-        return self._client.submit(_run, request, pure=False)
+        return self._client.submit(run_on_worker, request, pure=False)
 
     def _send(self, name: str) -> None:
-        """Have a file on all workers, unless the scheduler has sent it before."""
-        if self._client.get_metadata(["cybership", name], False):
-            return
-        file = OneFile(name, self._files.paths[name].read_bytes())
-        # A worker that dies meanwhile is no reason to end: the scheduler keeps what later ones get.
-        with suppress(OSError):
-            self._client.register_plugin(file)
-        self._client.set_metadata(["cybership", name], True)
+        """Have a file on all workers, unless it was sent before.
+
+        Beside the rest, and without waiting: for a worker that has just died the scheduler tries half a
+        minute, in which the others have the file and work.
+        """
+        if name not in self._sent:
+            self._sent.add(name)
+            Thread(target=self._deliver, args=(name,), daemon=True).start()
+
+    def _deliver(self, name: str) -> None:
+        key = ["cybership", name]
+        # Where this fails, the scheduler is gone, or keeps what workers get that start later.
+        with suppress(OSError, RuntimeError):
+            if not self._client.get_metadata(key, False):
+                self._client.register_plugin(OneFile(name, self._files.paths[name].read_bytes()))
+                self._client.set_metadata(key, True)
 
     def close(self) -> None:
-        self._client.close()
+        with suppress(OSError):  # on a computer that is busy Dask gives up waiting; all has ended then
+            self._client.close()
         self._close_cluster()
 
     def _close_cluster(self) -> None:
         if self._cluster is not None:
-            self._cluster.close()
+            with suppress(OSError):
+                self._cluster.close()
         self._scratch.cleanup()

@@ -25,7 +25,8 @@ class Files:
         self.paths: dict[str, Path] = {}
         self.resettable: set[str] = set()
         self.origins: dict[str, str] = {}
-        self._models: dict[str, Model] = {}
+        # By path and whether the project's own FMUs are compiled.
+        self._models: dict[tuple[str, bool], Model] = {}
         self._tables: dict[Path, str] = {}
 
     def read(self, scenarios: Sequence[Scenario]) -> list[str]:
@@ -38,26 +39,30 @@ class Files:
             InputError: no such FMU, or one that cannot be read.
         """
         notes: list[str] = []
-        entries = {e.path: e for s in scenarios for e in s.fmus.values() if e.path not in self._models}
-        if not entries:
-            return notes
-        folder = scenarios[0].folder
-        found = read_models(scenarios[0].model_copy(update={"fmus": entries}), notes)
-        for path, model in found.items():
-            self._models[path] = model
-            self.paths[f"{model.sha256}.fmu"] = model.path
-            self.origins[model.sha256] = path
-            if PurePath(path).name == path and model.path.parent != folder:
-                self.resettable.add(model.sha256)
+        for native in (False, True):
+            alike = [s for s in scenarios if bool(s.native) == native]
+            entries = {e.path: e for s in alike for e in s.fmus.values()}
+            new = {path: e for path, e in entries.items() if (path, native) not in self._models}
+            if new:
+                found = read_models(alike[0].model_copy(update={"fmus": new}), notes)
+                for path, model in found.items():
+                    self._add(path, native, model, alike[0].folder)
         return notes
+
+    def _add(self, path: str, native: bool, model: Model, folder: Path) -> None:
+        self._models[path, native] = model
+        self.paths[f"{model.sha256}.fmu"] = model.path
+        self.origins[model.sha256] = path
+        if PurePath(path).name == path and model.path.parent != folder:
+            self.resettable.add(model.sha256)
 
     def models(self, scenario: Scenario) -> dict[str, Model]:
         """The FMU of each instance; :meth:`read` has read them."""
-        return {name: self._models[entry.path] for name, entry in scenario.fmus.items()}
+        return {name: self._models[e.path, bool(scenario.native)] for name, e in scenario.fmus.items()}
 
-    def fmu(self, path: str) -> str:
-        """The name by content of an FMU that :meth:`read` has read."""
-        return f"{self._models[path].sha256}.fmu"
+    def fmu(self, scenario: Scenario, instance: str) -> str:
+        """The name by content of the FMU of an instance; :meth:`read` has read it."""
+        return f"{self._models[scenario.fmus[instance].path, bool(scenario.native)].sha256}.fmu"
 
     def table(self, folder: Path, path: str) -> str:
         """The name by content of a table.

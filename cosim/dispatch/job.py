@@ -1,0 +1,84 @@
+"""One run as it travels to whoever makes it, and what comes back."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable
+from functools import cache
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+from ..scenario.schema import Scenario
+from ..system.instance_pool import InstancePool
+from .travelling_files import Files
+
+# Keys of a scenario that change no number of a run.
+WITHOUT_EFFECT = ("name", "description", "log")
+
+
+class Row(NamedTuple):
+    """What is kept of a run.
+
+    Attributes:
+        status: ``done``, ``failed``, or ``lost`` where it is not the run that failed, but what ran it.
+        message: why it failed, or why there are no metrics; else empty.
+        wall_s: how long it took [s].
+        metrics: as in metrics.json; empty if there are none.
+        log: name -> content of the files of its result folder, where those are kept.
+        value: what an analysis has made of it, or the exception that came in place of it.
+    """
+
+    status: str
+    message: str
+    wall_s: float
+    metrics: dict[str, float]
+    log: dict[str, bytes]
+    value: Any = None
+
+
+# Makes a run on the FMUs of a process; it is pickled on its way there.
+Task = Callable[[InstancePool, Scenario], Row]
+
+
+@cache
+def own_version() -> str:
+    """The version of this package, which takes a while to find."""
+    return version("cybership")
+
+
+class Job:
+    """One run.
+
+    Args:
+        content: of its scenario, with the FMUs and tables named by the hashes of their contents.
+        files: those names.
+        task: makes the run.
+
+    Attributes:
+        hash: of all that its numbers follow from; equal runs have equal ones.
+    """
+
+    def __init__(self, content: dict[str, Any], files: Iterable[str], task: Task) -> None:
+        self.content = content
+        self.files = tuple(files)
+        self.task = task
+        counted = {key: value for key, value in content.items() if key not in WITHOUT_EFFECT}
+        text = json.dumps([counted, own_version()], sort_keys=True)
+        self.hash = hashlib.sha256(text.encode()).hexdigest()
+
+
+def job_of(scenario: Scenario, files: Files, task: Task) -> Job:
+    """What travels of a scenario.
+
+    Raises:
+        InputError: a file that cannot be read.
+    """
+    files.read([scenario])
+    content = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    names: list[str] = []
+    for name, entry in content["fmus"].items():
+        entry["path"] = files.fmu(scenario, name)
+        names.append(entry["path"])
+        if entry.get("table") is not None:
+            entry["table"] = files.table(scenario.folder, entry["table"])
+            names.append(entry["table"])
+    return Job(content, dict.fromkeys(names), task)

@@ -1,0 +1,109 @@
+"""A run of which the metrics are kept, and its log on request."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..errors import SimulationError
+from ..master.algorithm import Master
+from ..master.loop_surroundings import interruptible
+from ..master.recorder import Recorder
+from ..master.simulation import simulate
+from ..process.run_state import STATE
+from ..results import performance
+from ..results.log import LogInMemory
+from ..scenario.schema import Scenario
+from ..system.instance_pool import InstancePool
+from ..system.preparation import prepare
+from .job import Row
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Makes a run, and keeps its metrics.
+
+    Attributes:
+        keep_log: whether all files that ``cosim.run`` writes, but pictures, come back as well.
+    """
+
+    keep_log: bool = False
+
+    def __call__(self, pool: InstancePool, scenario: Scenario) -> Row:
+        if self.keep_log:
+            return _logged(pool, scenario)
+        try:
+            metrics = run_in_memory(pool, scenario)
+        except performance.MetricsError as error:
+            return Row("done", f"no metrics: {error}", 0.0, {}, {})
+        return Row("done", "", 0.0, metrics, {})
+
+
+def run_in_memory(
+    pool: InstancePool, scenario: Scenario, keep: Callable[[LogInMemory], None] | None = None
+) -> dict[str, float]:
+    """Make a run without a file.
+
+    Args:
+        pool: the FMUs.
+        scenario: what to run; its paths are all files.
+        keep: gets the log, also that of a run that failed in its steps.
+
+    Returns:
+        The metrics.
+
+    Raises:
+        InputError: the scenario cannot be run.
+        SimulationError: the run failed.
+        MetricsError: there are no metrics.
+        KeyboardInterrupt: the user has asked for the end.
+    """
+    # Unlike a run in real time this one may stop for garbage: collecting all of it before each run would
+    # cost more than the run.
+    system = prepare(scenario, models=pool.models(scenario))
+    log = LogInMemory(["time", *system.logged]) if keep else None
+    with interruptible() as interrupted:
+        master = Master(system, lambda _: None, interrupted, pool)
+        try:
+            recorder = Recorder(system, master, None, log)
+            _step(master, recorder, interrupted)
+        finally:
+            STATE.calls_nothing()
+            master.close()
+            if keep is not None and log is not None:
+                keep(log)
+    window = scenario.metrics
+    return performance.compute(recorder.kept(), window.start, window.stop, scenario.roles)
+
+
+def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:
+    """Run to the end, looking for an interrupt after each step."""
+    take = recorder.take
+    take(0.0)
+    try:
+        for t in master.run():
+            if take(t):
+                recorder.flush()
+            if interrupted():
+                raise KeyboardInterrupt
+        recorder.flush()
+    except SimulationError:
+        if interrupted():  # an FMU may report the interrupt as an error of its own
+            raise KeyboardInterrupt from None
+        with suppress(SimulationError):  # the first error is the one that counts
+            recorder.flush()
+        raise
+
+
+def _logged(pool: InstancePool, scenario: Scenario) -> Row:
+    notes: list[str] = []
+    with TemporaryDirectory(prefix="campaign_") as scratch:
+        result = simulate(scenario, scratch, show=notes.append, pool=pool)
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        log = {file.name: file.read_bytes() for file in Path(scratch).iterdir()}
+    message = result.message
+    if result.status == "done" and not result.metrics:
+        message = next((n.removeprefix("note: ") for n in notes if "no metrics" in n), "")
+    return Row(result.status, message, 0.0, result.metrics if result.status == "done" else {}, log)

@@ -1,0 +1,59 @@
+"""Where runs are made: in this process, or on the workers of a Dask scheduler."""
+
+from collections.abc import Generator, Iterable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+from .job import Job, Row
+from .travelling_files import Files, copy_all
+from .workplace import Workplace
+
+
+class Place(Protocol):
+    """Where runs are made."""
+
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+        """Make runs; gives each as it ends, in any order. Closing the iterator abandons the others."""
+        ...
+
+    def close(self) -> None:
+        """Free all that was taken."""
+        ...
+
+
+class ThisProcess:
+    """Runs one after the other in this process."""
+
+    def __init__(self, files: Files) -> None:
+        self._files = files
+        self._scratch = TemporaryDirectory(prefix="campaign_")
+        self._work = Workplace(Path(self._scratch.name))
+
+    def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
+        for job in jobs:
+            copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
+            self._work.pool.resettable |= self._files.resettable
+            yield job, self._work.run(job.content, job.task)
+
+    def close(self) -> None:
+        self._work.close()
+        self._scratch.cleanup()
+
+
+def place_for(files: Files, scheduler: str | None, workers: int | None) -> Place:
+    """Where the runs of a campaign are made.
+
+    Args:
+        files: what they need.
+        scheduler: address of a Dask scheduler; None is this computer.
+        workers: processes on this computer; None is one for each core, 0 is this process.
+
+    Raises:
+        InputError: no scheduler answers at the address.
+    """
+    if workers == 0 and scheduler is None:
+        return ThisProcess(files)
+    from .dask_workers import DaskWorkers  # Dask takes a second to import
+
+    return DaskWorkers(files, scheduler, workers)

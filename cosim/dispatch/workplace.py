@@ -1,0 +1,51 @@
+"""Runs one after the other in one process, on FMUs that stay loaded."""
+
+import os
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, SimulationError
+from ..scenario.load import load_scenario
+from ..system.instance_pool import InstancePool
+from .job import Row, Task
+
+
+class Workplace:
+    """The FMUs of one process, and where their files are.
+
+    Args:
+        folder: of files named by their contents.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.pool = InstancePool()
+        # FMUs of one process share its working directory, modules and signals.
+        self._alone = threading.Lock()
+
+    def run(self, content: dict[str, Any], task: Task) -> Row:
+        """Run a scenario whose FMUs and tables are in the folder.
+
+        Raises:
+            KeyboardInterrupt: the user has asked for the end.
+        """
+        with self._alone:
+            started, here = time.perf_counter(), os.getcwd()
+            scenario = load_scenario(content)
+            scenario.set_origin(self.folder)
+            try:
+                row = task(self.pool, scenario)
+            except (InputError, SimulationError) as error:
+                row = Row("failed", str(error), 0.0, {}, {})
+            except Exception as error:  # of this computer, as a full disk, or of this program
+                row = Row("lost", repr(error), 0.0, {}, {})
+            finally:
+                os.chdir(here)
+            return row._replace(wall_s=time.perf_counter() - started)
+
+    def close(self) -> None:
+        """Free the FMUs."""
+        with self._alone:
+            self.pool.close()

@@ -1,0 +1,72 @@
+"""Runs of which an analysis keeps what it needs: the log of a run without files is that of one with them."""
+
+import numpy as np
+import pytest
+
+import cosim
+from cosim.dispatch import analyse_runs
+
+
+@pytest.fixture
+def short(ellipse):
+    """The ellipse of 1 s, with few signals and a row for every second step."""
+    log = {"signals": ["vessel.*", "observer.x_m"], "every": 2}
+    return {**ellipse, "stop": 1.0, "metrics": {}, "log": log}
+
+
+def everything(run):
+    return (
+        run.status,
+        run.message,
+        run.metrics,
+        {name: column.copy() for name, column in run.log.items()},
+    )
+
+
+def test_log_and_metrics_in_memory_are_those_of_a_folder(short, tmp_path):
+    other = {**short, "seed": 8}
+    kept = tmp_path / "kept"
+    finished = []
+    found = analyse_runs(
+        [short, other, other],
+        everything,
+        [None, None, kept],
+        workers=0,
+        advance=lambda: finished.append(1),
+    )
+    assert len(finished) == 3
+    for content, (status, _, metrics, log) in zip([short, other, other], found, strict=True):
+        result = cosim.simulate(cosim.load_scenario(content), tmp_path / "fresh")
+        written = cosim.read_log(tmp_path / "fresh")
+        assert (status, metrics) == ("done", result.metrics)
+        assert list(log) == list(written)
+        assert all(np.array_equal(log[name], written[name], equal_nan=True) for name in log)
+    assert (kept / "log.csv").read_bytes() == (tmp_path / "fresh" / "log.csv").read_bytes()
+
+
+def test_a_failed_run_has_its_message_and_its_log(short, plain_fmu):
+    init = "self.y = 0.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))"
+    step = "self.y += h\nif t > 0.5: raise ValueError('too much')\nreturn True"
+    short["fmus"]["ramp"] = {"path": str(plain_fmu("Breaks", init, step))}
+    short["log"] = {"signals": ["ramp.y"]}
+    [(status, message, _, log)] = analyse_runs([short], everything)
+    assert status == "failed"
+    assert message.startswith("ramp: the step from t = 0.51 s returned")
+    assert log["ramp.y"][-1] == pytest.approx(log["time"][-1])
+    assert log["time"][-1] == 0.51
+
+
+def refuse(run):
+    run.demand()
+    raise RuntimeError("nothing to see")
+
+
+def test_what_an_analysis_raises_arrives(short):
+    with pytest.raises(RuntimeError, match="nothing to see"):
+        analyse_runs([short], refuse)
+
+
+def test_a_mistake_in_a_scenario_is_told(short):
+    short["fmus"]["vessel"]["parameters"]["mm"] = 1.0
+    with pytest.raises(cosim.InputError, match="did you mean 'm'"):
+        analyse_runs([short], everything)
