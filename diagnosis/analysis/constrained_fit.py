@@ -76,7 +76,9 @@ def dissipation_conditions(columns: tuple[str, ...], region: OperatingRegion) ->
     metric, nu = mass(Model()), sampled_motions(region)
     base = as_model(np.zeros(3), np.zeros((3, len(columns))), columns)
     least = least_dissipation(Model(), region)
-    values = dict(zip(REGRESSORS, regressors_at(*nu.T, (0.0, 0.0, 0.0)), strict=True))
+    values = dict(
+        zip(REGRESSORS, regressors_at(nu[:, 0], nu[:, 1], nu[:, 2], (0.0, 0.0, 0.0)), strict=True)
+    )
     x = np.column_stack([np.broadcast_to(values[regressor(c)], len(nu)) for c in columns])
     energy = np.einsum("ij,jk,ik->i", nu, metric, nu)
     G = -(nu[:, :, None] * x[:, None, :]).reshape(len(nu), -1) / energy[:, None]
@@ -151,7 +153,7 @@ def _least_distance(
     parts = G.reshape(-1, 3, m)
     # In coordinates in which the distance is Euclidean: B_k = given_k + size_k root^-1 z_k.
     A = np.concatenate(
-        [size[k] * solve_triangular(root, parts[:, k].T, trans="T").T for k in range(3)], axis=1
+        [size[k] * solve_triangular(root, parts[:, k].T, trans=1).T for k in range(3)], axis=1
     )
     b = h - G @ given.ravel()
     norm = np.linalg.norm(A, axis=1)

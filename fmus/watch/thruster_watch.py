@@ -87,7 +87,7 @@ class Usual(NamedTuple):
         ]
     )
     weights: tuple[tuple[Any, ...], ...] = ((0.0,) * COUNT,) * 3
-    square: Triple = (NOISE * NOISE,) * 3
+    square: Triple = (NOISE * NOISE, NOISE * NOISE, NOISE * NOISE)
     ratios: tuple[Any, Any] = (1.0, 1.0)
     learned: Any = 0.0
     judged: Any = 0.0
