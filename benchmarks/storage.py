@@ -33,9 +33,7 @@ def run(controller, stop, folder):
 
 def inputs_of(component, folder):
     """The controller's inputs, one row for each step."""
-    sources = {"frozen": "observer.frozen"}
-    names = [v.name for v in variables(component.inputs)]
-    columns = [sources.get(n, f"{'observer' if '_hat' in n else 'guidance'}.{n}") for n in names]
+    columns = [f"controller.{v.name}" for v in variables(component.inputs)]
     log = cosim.read_log(folder, columns)
     return [list(map(float, row)) for row in zip(*(log[c] for c in columns), strict=True)]
 

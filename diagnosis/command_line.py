@@ -86,6 +86,29 @@ def analysis_parser(
     return made
 
 
+def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
+    made = argparse.ArgumentParser(
+        prog=f"python -m diagnosis.{name}",
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
+    made.add_argument(
+        "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"
+    )
+    made.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="observer, guidance and controller's parameters, in place of the run's own scenario",
+    )
+    out = Path("results", name)
+    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    return made
+
+
 def folder(text: str) -> Path:
     """The argument of ``--out``."""
     if not text.strip():

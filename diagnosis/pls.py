@@ -29,6 +29,7 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
 
     recipe = recipes.recipe(options.recipe)
     recipe.transformer()  # before any work: a library may be missing
+    from .analysis.constrained_fit import nearest_stable
     from .analysis.document import write_document, write_json
     from .analysis.into_the_plant import as_model, goes_into_the_plant, thrust_of
     from .analysis.partial_least_squares import regressed
@@ -45,13 +46,18 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
         advance(f"regression {recipe.name}")
         found = regressed(samples, recipe)
         possible = goes_into_the_plant(found.columns)
-        written = possible and (options.ssv or thrust_of(found).holds)
+        stable = None
+        if options.stable:
+            advance("nearest stable model")
+            stable = nearest_stable(found.X, samples.omega, found.columns, found.B)
+        written = possible and (options.ssv or stable is not None or thrust_of(found).holds)
         if written:
-            write_model(new / MODEL, as_model(found.c, found.B, found.columns))
-        write_json(new / RESULT, content(found, options.estimates))
+            c, B = (found.c, found.B) if stable is None else (stable.c, stable.B)
+            write_model(new / MODEL, as_model(c, B, found.columns))
+        write_json(new / RESULT, content(found, options.estimates, stable))
         advance("report")
-        write_document(new / REPORT, document(found, options.estimates))
-    shown = [*sentences(found)]
+        write_document(new / REPORT, document(found, options.estimates, stable))
+    shown = [*sentences(found, stable)]
     if not possible:
         shown.append(f"{MODEL} is not written: the plant has no such columns.")
     elif not written:
@@ -65,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
         "pls",
         "Regress the model error on velocity and force by partial least squares, with cross-validation.",
         "examples:  python -m diagnosis.pls results/ellipse\n"
-        "           python -m diagnosis.pls run1.csv run2.csv --recipe PLS2 --out results/pls2\n"
+        "           python -m diagnosis.pls run1.csv run2.csv --recipe PLS2 --stable --out results/2\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters results/pls/model.ssv\n"
         "recipes:   PLS1 to PLS4 of Table 7.2; nominal, continuous: 3.2.2, 3.2.3\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
@@ -74,6 +80,11 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument("--recipe", default="PLS3", metavar="NAME", help="how X is made (PLS3)")
     made.add_argument(
         "--keep-outliers", action="store_true", help="do not remove outliers by PCA beforehand (7.3)"
+    )
+    made.add_argument(
+        "--stable",
+        action="store_true",
+        help=f"{MODEL} holds the model nearest to it that is stable by construction",
     )
     made.add_argument(
         "--ssv",

@@ -261,7 +261,7 @@ class Component:
 
 
 # Folders of this package that hold components, one a module.
-KINDS = ("controller", "guidance", "observer", "thrusters", "vessel")
+KINDS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 
 
 def discover(effects: Any = None) -> Iterator[tuple[str, Component]]:

@@ -14,7 +14,7 @@ from cosim import InputError
 from diagnosis.data import lost, repeated
 from fmus.frames import rotate_to_body
 
-from .replay import SETTLED, Log, rms
+from .estimates_replayed import SETTLED, Log, rms
 
 REACH = 0.5  # s to either side that the smoother looks
 AHEAD = 0.5  # s of prediction

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from .estimates_replayed import OBSERVERS, SIGNALS
 from .monte_carlo import Interval, interval, paired
-from .replay import OBSERVERS, SIGNALS
 from .study_report import Report
 
 Runs = Mapping[str, Sequence[Mapping[str, Mapping[str, float]]]]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .replay import SIGNALS, UNITS, Log, wraps
+from .estimates_replayed import SIGNALS, UNITS, Log, wraps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,6 +15,7 @@ from diagnosis.analysis.samples import Samples, gather_samples, model_error
 from diagnosis.analysis.sysid_report import warnings
 from diagnosis.analysis.table_7_1 import NAMES, TABLE_7_1, row
 from diagnosis.analysis.table_7_1 import plant as plant_of
+from diagnosis.assessment import least_dissipation
 from diagnosis.model import Model, integrals, omega, read_model
 from diagnosis.pca import main as pca
 from diagnosis.pls import main as pls
@@ -237,6 +238,20 @@ def test_pls_writes_its_results_and_a_model_of_the_plant(runs, tmp_path):
     assert model.vessel["map_X_u"] == pytest.approx(u["value"])
     assert model.vessel["delta_Y_r"] == 7.25
     assert "<svg" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_pls_writes_the_nearest_stable_model(runs, tmp_path):
+    done = command(
+        pls, runs / "a.csv", runs / "b.csv", "--recipe", "PLS2", "--stable", "--out", tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "pls.json").read_text())["stable"]
+    model = read_model(tmp_path / "model.ssv")
+    assert model.vessel["map_X_tau_X"] == pytest.approx(found["coefficients"]["X"]["tau_X"])
+    assert least_dissipation(model) >= least_dissipation(Model()) - 1e-9
+    B_tau = np.array([[model.vessel[parameter(a, f"tau_{b}")] for b in AXES] for a in AXES])
+    assert plant.effective_thrust(B_tau).holds
 
 
 def test_sysid_writes_its_results_and_a_model_of_the_plant(runs, tmp_path):

@@ -44,8 +44,9 @@ DIAGNOSIS_LAYERS = (
     ("session",),
     ("report",),
     ("analysis",),
+    ("open_loop",),
     ("command_line",),
-    ("compare", "learn", "pca", "pls", "sysid"),  # commands
+    ("compare", "learn", "pca", "pls", "replay", "sysid", "watch"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.
@@ -54,6 +55,7 @@ FMUS_LAYERS = (
     ("frames", "hull"),
     ("effects",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),
+    ("watch",),
     ("ship",),
     ("fmi",),
     ("native",),
@@ -76,7 +78,7 @@ PUBLIC = (
     "cosim.scenario",
     "cosim.system",
 )
-# diagnosis reads logs and parameter sets; it runs nothing.
+# diagnosis reads logs and parameter sets, and plays a run to FMUs.
 PUBLIC_TO_DIAGNOSIS = (
     "cosim",
     "cosim.command",
@@ -99,7 +101,7 @@ PUBLIC_OF_FMUS = (
     "fmus.thrusters.allocation",
     "fmus.thrusters.chain",
 )
-COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel")
+COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
     "diagnosis.analysis",

@@ -140,7 +140,7 @@ def adapt(model, rows, phi, gamma, steps, dt, omega=STILL, gamma_omega=OFF, rho=
     memory = remembered(sums, None, rho, StoreOptions(**options).store_weight)
     rest = Drive(empty_store(model).last, 0.0, STILL)
     for _ in range(steps):
-        phi, omega = learned(
+        phi, omega, _ = learned(
             model,
             (phi, omega),
             (gamma, gamma_omega),

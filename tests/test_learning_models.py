@@ -7,7 +7,7 @@ from support.loops import acting, closed_loop, multisine_target
 
 from fmus.build import build
 from fmus.controller.models import ALL_UNKNOWN, PARAMETRISATIONS, ROTATIONAL, SCALED, SURGE
-from fmus.declare import Component, variables
+from fmus.declare import Component, packer, variables
 from fmus.hull import Damping, Inertia, RotationalDamping, TowedDamping, motion
 from fmus.signals import Force
 from fmus.vessel import vessel
@@ -68,8 +68,31 @@ def test_factors_of_inertia_and_damping():
     )
     for _ in range(50):
         nu, tau = random_motion(rng)
-        left = nothing_left(SCALED, nu, tau, (0.3, -0.3), plant)
+        left = nothing_left(SCALED, nu, tau, (0.3, -0.3, 0.0), plant)
         assert left == pytest.approx([0.0] * 3, abs=1e-12)
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.6, 1.7])
+def test_factors_of_inertia_damping_and_thrust_are_known_but_for_one(factor):
+    """The ship of the effects (2.20)-(2.23): any multiple of the three factors explains it as well."""
+    rng = np.random.default_rng(6)
+    c = vessel.COMPONENT
+    names = [v.name for v in variables(c.params)]
+    values = {v.name: v.start for v in variables(c.params)} | {
+        "scale_inertia": 0.2,
+        "scale_damping": 0.4,
+    }
+    plant = packer(c.params)([values[name] for name in names])
+    phi = np.multiply(factor, (1.2, 1.4, 0.7)) - 1.0
+    for _ in range(20):
+        nu, tau = random_motion(rng)
+        state = vessel.State(0.0, 0.0, 0.0, *nu)
+        force = acting(state, tau, (0.3, 0.3, 0.3))
+        _, found = c.step(state, Force(*force), plant, 0.0)
+        nu_dot = (found.u_dot, found.v_dot, found.r_dot)
+        y = SCALED.error(nu, nu_dot, tau, SCALED.belief)
+        F = SCALED.regressors(nu, nu_dot, tau, SCALED.belief)
+        assert SCALED.force(F, (phi[0], phi[1], -phi[2])) == pytest.approx(y, abs=1e-12)
 
 
 @every_model

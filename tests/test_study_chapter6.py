@@ -10,10 +10,10 @@ from cosim.dispatch import FinishedRun
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
 from studies import chapter6, lessons, margin, store_contents, sysid4, trials
+from studies.estimates_replayed import parameters
 from studies.found import FAULTY, REGULAR, Found, share
 from studies.monte_carlo import shipped, vary
 from studies.outcome import missing, quick
-from studies.replay import parameters
 
 SLOW = trials.TRIALS[0]
 

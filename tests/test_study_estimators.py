@@ -12,7 +12,7 @@ from support.project import ROOT
 from cosim import InputError
 from studies import basin, estimators
 from studies.claims import ahead
-from studies.replay import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
+from studies.estimates_replayed import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
 
 H = 0.01
 DATA = Path(os.environ.get("CYBERSHIP_DATA", ROOT.parent / "shared" / "data"))

@@ -62,10 +62,22 @@ class Part:
     """
 
     def __init__(self, component: Component, values: Sequence[dict[str, float]], inputs: Any) -> None:
-        p = packer(component.params)([_lanes(v, values) for v in variables(component.params)])
-        self._component, self._prepared = component, _one_way(component.prepared(p))
+        self._component, self._values = component, [dict(v) for v in values]
+        p = self._prepare()
         self._state = component.init(inputs, p)
         _, self.outputs = component.advance(self._state, inputs, self._prepared, 0.0)
+
+    def _prepare(self) -> Any:
+        """The parameters, and what follows from them alone."""
+        declared = variables(self._component.params)
+        p = packer(self._component.params)([_lanes(v, self._values) for v in declared])
+        self._prepared = _one_way(self._component.prepared(p))
+        return p
+
+    def change(self, lane: int, values: dict[str, float]) -> None:
+        """Other parameters for one run from now on."""
+        self._values[lane] |= values
+        self._prepare()
 
     def advance(self, inputs: Any, h: float) -> Any:
         """The outputs after a step of h [s]."""
@@ -95,7 +107,7 @@ class Fleet:
         self.parts = round(STEP / FINE) if orders[0].hidden.other else 1
         self.h = STEP / self.parts
         self._faults = [_faults(c) for c in content]
-        self._targets = np.array([target(o.manoeuvre) for o in orders])  # (runs, steps + 1, signals)
+        self.targets = np.array([target(o.manoeuvre) for o in orders])  # (runs, steps + 1, signals)
         given = {
             n: [dict(c["fmus"][n].get("parameters", {})) for c in content] for n in content[0]["fmus"]
         }
@@ -119,7 +131,7 @@ class Fleet:
     def _seen(self, k: int) -> Any:
         """What the controller gets at step k."""
         return controller.COMPONENT.inputs(
-            Estimate(*flatten(self.observer.outputs)), Target(*self._targets[:, k].T)
+            Estimate(*flatten(self.observer.outputs)), Target(*self.targets[:, k].T)
         )
 
     def _request(self) -> chain.Inputs:

@@ -116,6 +116,8 @@ def _check_shape(system: System, target: Format) -> None:
                 f"fmus.{name}: {target.name} cannot hold a step of {every * system.scenario.step:g} s "
                 f"beside that of {system.scenario.step:g} s"
             )
+    if system.recordings:
+        raise InputError(f"recordings: {target.name} cannot hold inputs that are given by files")
     for c in system.connections:
         ends = f"{c.source.name} -> {c.target.name}"
         kinds = (c.source.variable.type, c.target.variable.type)

@@ -50,7 +50,7 @@ class Master:
         self._instances: dict[str, Instance] = {}
         self._initialised = False
         changeable = {f"{e.model}.{e.variable}" for e in system.scenario.events}
-        settable = {c.target.name for c in system.connections}
+        settable = system.fed
         settable |= {
             n for n, s in system.signals.items() if n in changeable and s.variable.causality == "input"
         }

@@ -66,6 +66,8 @@ class Stepper:
         self.copies, conversions = _transfers(incoming, table)
         if conversions:
             self.input_effects.append(conversions)
+        for part in system.recordings.get(instance.name, ()):
+            self.input_effects.append(part.bind([table.slots[name] for name in part.names]))
         self.exchange = self._make_exchange()
         self.read = self._make_read()
         self.advance = self._make_advance()

@@ -11,7 +11,7 @@ from ..errors import InputError, nearest
 from ..formats.systems import is_system, read_system
 from . import faults
 from .roles import Roles
-from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Scenario, Transformation
+from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Recording, Scenario, Transformation
 from .setting import set_value
 
 # Parts of pydantic's error locations that name a validator or a type, not a place in the file.
@@ -135,6 +135,7 @@ def _keys(location: tuple[int | str, ...]) -> list[str]:
         "events": Event,
         "log": LogOptions,
         "metrics": MetricsOptions,
+        "recordings": Recording,
         "roles": Roles,
         "transformations": Transformation,
         "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),

@@ -111,6 +111,19 @@ class Transformation(Strict):
     offset: float = 0.0
 
 
+class Recording(Strict):
+    """Inputs that get their values from a file over time."""
+
+    path: Annotated[str, AfterValidator(_table_path)] = Field(
+        description="CSV file with a column 'time' [s], relative to the scenario; rows hold over time"
+    )
+    inputs: dict[str, str] = Field(
+        min_length=1,
+        description="input as instance.variable -> column; where a cell is empty, the input has the "
+        "value of its connection, or its start value",
+    )
+
+
 class MetricsOptions(Strict):
     """The part of the run that the metrics cover."""
 
@@ -153,6 +166,9 @@ class Scenario(Strict):
         default_factory=dict,
         description="connected input -> what becomes of values on their way there, in place of a "
         "conversion of units",
+    )
+    recordings: list[Recording] = Field(
+        default_factory=list, description="inputs that are given by files, before faults act on them"
     )
     faults: list[AnyFault] = Field(default_factory=list)
     events: list[Event] = Field(default_factory=list)

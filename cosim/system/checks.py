@@ -1,8 +1,9 @@
-"""Checks of a scenario against its FMUs: processes, the metrics' window and roles, faults, events."""
+"""Checks of a scenario against its FMUs: processes, metrics, recordings, faults, events."""
 
 from ..errors import InputError
 from ..fmu.fmu_model import NUMERIC
 from ..scenario.schema import Event, Scenario
+from .recordings import Recorded, read_recording
 from .start_values import check_value
 from .system import Signal, System, causality_of
 
@@ -37,8 +38,42 @@ def check_roles(system: System) -> None:
             raise InputError(f"roles.{role}: {name} is of type {signal.variable.type}, not a number")
 
 
+def check_recordings(system: System) -> dict[str, list[Recorded]]:
+    """Read the recordings of a scenario.
+
+    Returns:
+        Instance -> what its inputs are given.
+
+    Raises:
+        InputError: no such input, or one that is given twice; no such file or column; a cell that is not
+            a number, or times that do not grow.
+    """
+    found: dict[str, list[Recorded]] = {}
+    taken: set[str] = set()
+    for k, recording in enumerate(system.scenario.recordings):
+        where = f"recordings[{k}]"
+        for name in recording.inputs:
+            signal = system.find(name, where)
+            if signal.variable.causality != "input":
+                raise InputError(f"{where}: {name} is {causality_of(signal)}, not an input")
+            if signal.variable.type != "Real":
+                raise InputError(f"{where}: {name} is of type {signal.variable.type}, not Real")
+            if name in taken:
+                raise InputError(f"{where}: {name} is given by two recordings")
+            taken.add(name)
+        time, columns = read_recording(
+            system.scenario.folder / recording.path, dict.fromkeys(recording.inputs.values())
+        )
+        instances = dict.fromkeys(name.partition(".")[0] for name in recording.inputs)
+        for instance in instances:
+            own = {n: c for n, c in recording.inputs.items() if n.partition(".")[0] == instance}
+            rows = list(zip(*(columns[c] for c in own.values()), strict=True))
+            found.setdefault(instance, []).append(Recorded(list(own), time, rows))
+    return found
+
+
 def check_faults(system: System) -> None:
-    connected = {c.target.name for c in system.connections}
+    fed = system.fed
     for k, fault in enumerate(system.scenario.faults):
         where = f"faults[{k}] ({type(fault).__name__.lower()})"
         found = [system.find(name, where) for name in fault.signals]
@@ -47,7 +82,7 @@ def check_faults(system: System) -> None:
                 raise InputError(
                     f"{where}: {signal.name} is {causality_of(signal)}, not an input or output"
                 )
-            if signal.variable.causality == "input" and signal.name not in connected:
+            if signal.variable.causality == "input" and signal.name not in fed:
                 raise InputError(
                     f"{where}: {signal.name} is not connected, so nothing can go wrong there"
                 )

@@ -7,12 +7,19 @@ from fnmatch import fnmatchcase
 from ..errors import InputError
 from ..fmu.fmu_model import NUMERIC, Model, Variable
 from ..scenario.schema import Scenario
-from .checks import check_events, check_faults, check_processes, check_roles, check_window
+from .checks import (
+    check_events,
+    check_faults,
+    check_processes,
+    check_recordings,
+    check_roles,
+    check_window,
+)
 from .order import Link, execution_order
 from .own_fmus import read_models, run_builder
 from .start_values import Overrides, check_parameters
 from .system import Signal, System
-from .wiring import connect
+from .wiring import connect, find_free_inputs
 
 # Relative deviation of a ratio of times from an integer that counts as rounding.
 RATIO_TOLERANCE = 1e-6
@@ -45,6 +52,8 @@ def prepare(
     _count_steps(system)
     check_parameters(system, overrides)
     connect(system)
+    system.recordings = check_recordings(system)
+    find_free_inputs(system)
     check_faults(system)
     check_events(system)
     check_roles(system)
@@ -110,6 +119,7 @@ def _choose_signals(system: System) -> None:
     needed |= set(system.scenario.roles.metric_inputs).intersection(available)
     for c in system.connections:
         needed |= {c.source.name, c.target.name}
+    needed |= system.fed
     for fault in system.scenario.faults:
         needed |= set(fault.signals)
     needed |= {f"{e.model}.{e.variable}" for e in system.scenario.events}.intersection(flowing)

@@ -7,6 +7,7 @@ from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import Model, Value, Variable
 from ..scenario.schema import Scenario
+from .recordings import Recorded
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class System:
         every: base steps in one step of each instance.
         steps: number of base steps.
         connections: all connections, groups resolved.
+        recordings: what files give to the inputs of an instance, by instance.
         signals: signals of the value table, by name.
         logged: names of the logged signals, in the order of the log's columns.
         parameters: start values to set, by instance.
@@ -54,10 +56,17 @@ class System:
     steps: int = 0
     order: list[str] = field(default_factory=list)
     connections: list[Connection] = field(default_factory=list)
+    recordings: dict[str, list[Recorded]] = field(default_factory=dict)
     signals: dict[str, Signal] = field(default_factory=dict)
     logged: list[str] = field(default_factory=list)
     parameters: dict[str, list[tuple[Variable, Value]]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+
+    @property
+    def fed(self) -> set[str]:
+        """Names of the inputs that get values during the run, from outputs or files."""
+        recorded = {n for parts in self.recordings.values() for part in parts for n in part.names}
+        return recorded | {c.target.name for c in self.connections}
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 from ..conversion import SAME, Conversion, conversion
 from ..errors import InputError, nearest
 from .system import Connection, Signal, System, causality_of
 
+# What the description of an input begins with that an FMU can do without.
+OPTIONAL = "optional"
 # Types of output that an input of a type accepts.
 ACCEPTS = {
     "Real": ("Real", "Integer", "Enumeration"),
@@ -18,7 +18,7 @@ ACCEPTS = {
 
 
 def connect(system: System) -> None:
-    """Fill in the connections of a system, groups resolved, and warn of inputs that nothing feeds.
+    """Fill in the connections of a system, groups resolved.
 
     Raises:
         InputError: a missing end, two sources for one input, types or units that do not fit.
@@ -43,17 +43,18 @@ def connect(system: System) -> None:
     for name in system.scenario.transformations:
         if name not in taken:
             raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
-    _find_free_inputs(system, taken)
 
 
-def _find_free_inputs(system: System, taken: Collection[str]) -> None:
-    """Warn of inputs that nothing feeds and the scenario does not mention."""
+def find_free_inputs(system: System) -> None:
+    """Warn of inputs that nothing feeds and the scenario does not mention, but for optional ones."""
+    fed = system.fed
     for name, model in system.models.items():
         free = [
             v.name
             for v in model.variables.values()
             if v.causality == "input"
-            and f"{name}.{v.name}" not in taken
+            and f"{name}.{v.name}" not in fed
+            and not v.description.startswith(OPTIONAL)
             and v.name not in system.scenario.fmus[name].parameters
         ]
         if free:

@@ -9,6 +9,7 @@ of the model error goes back into the ship by the effect ``linear_map``::
 """
 
 from .concurrent_passes import Identified, explained, identify
+from .constrained_fit import Stable, nearest_stable
 from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
 from .partial_least_squares import Regressed, regressed
 from .principal_components import PrincipalComponents, fit_components, outliers, removals
@@ -26,6 +27,7 @@ __all__ = [
     "Recipe",
     "Regressed",
     "Samples",
+    "Stable",
     "as_model",
     "effective_thrust",
     "explained",
@@ -35,6 +37,7 @@ __all__ = [
     "identify",
     "joined",
     "model_error",
+    "nearest_stable",
     "outliers",
     "plant",
     "recipe",

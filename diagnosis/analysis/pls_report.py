@@ -7,13 +7,14 @@ import numpy as np
 
 from ..report.formatting import number, percent
 from . import analysis_figures as pictures
+from .constrained_fit import Stable
 from .document import Document, Plot, Section, Table, numbers
 from .into_the_plant import goes_into_the_plant, thrust_of
 from .partial_least_squares import AXES, Fitted, Regressed
 from .principal_components import BLOCKS
 
 
-def content(r: Regressed, estimates: str) -> dict[str, Any]:
+def content(r: Regressed, estimates: str, stable: Stable | None = None) -> dict[str, Any]:
     """The content of ``pls.json``."""
     axes = list(AXES)
     std, signs = (np.vstack([getattr(p, name) for p in r.parts]) for name in ("std", "sign_changes"))
@@ -42,10 +43,22 @@ def content(r: Regressed, estimates: str) -> dict[str, Any]:
             "holds": thrust.holds,
         },
         "model": goes_into_the_plant(r.columns),
+        "stable": None if stable is None else _stable(stable),
     }
 
 
-def sentences(r: Regressed) -> Iterator[str]:
+def _stable(s: Stable) -> dict[str, Any]:
+    """The stable model nearest to the regression."""
+    rows = zip(AXES, s.B, strict=True)
+    return {
+        "changed": s.changed,
+        "r2": dict(zip(AXES, s.r2, strict=True)),
+        "constant": dict(zip(AXES, s.c, strict=True)),
+        "coefficients": {axis: dict(zip(s.columns, b, strict=True)) for axis, b in rows},
+    }
+
+
+def sentences(r: Regressed, stable: Stable | None = None) -> Iterator[str]:
     """What was found, a line each."""
     factors, r2, q2 = (r.by_axis(name) for name in ("factors", "r2", "q2"))
     each = "; ".join(f"{a}: {number(r2[a])} / {number(q2[a])} by {factors[a]} factors" for a in AXES)
@@ -59,6 +72,13 @@ def sentences(r: Regressed) -> Iterator[str]:
         yield f"Outside of the ranges of Table 1, and clipped: {told}."
     if goes_into_the_plant(r.columns):
         yield thrust_of(r).sentence
+    if stable is not None:
+        yield (
+            f"The nearest stable model explains R² {', '.join(numbers(list(stable.r2)))}, this one "
+            f"{', '.join(numbers(list(stable.given_r2)))}."
+            if stable.changed
+            else "The model is stable as it is."
+        )
 
 
 def insignificant(r: Regressed) -> str:
@@ -75,9 +95,9 @@ def insignificant(r: Regressed) -> str:
     return "; ".join(found)
 
 
-def document(r: Regressed, estimates: str) -> Document:
+def document(r: Regressed, estimates: str, stable: Stable | None = None) -> Document:
     """The page."""
-    first, *rest = sentences(r)
+    first, *rest = sentences(r, stable)
     parts = [_part(r, part) for part in r.parts]
     shown = pictures.model_error_over_time(r.samples.omega, {r.recipe.name: r.predicted}, r.samples.time)
     fit = Section("Model error", rest, (), [Plot(shown, "Model error and what the model makes of it.")])

@@ -8,7 +8,7 @@ from ..model.uncertainty import omega_std
 from .evaluation import Evaluation, PredictionError, evaluate_run
 from .regions import ErrorRegions, Profile, Region, find_regions
 from .remainder import AxisRemainder, Remainder
-from .stability import OperatingRegion, Stability, check_stability
+from .stability import OperatingRegion, Stability, check_stability, least_dissipation
 from .windows import WindowErrors, Windows
 
 __all__ = [
@@ -26,5 +26,6 @@ __all__ = [
     "check_stability",
     "evaluate_run",
     "find_regions",
+    "least_dissipation",
     "omega_std",
 ]

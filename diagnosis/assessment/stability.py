@@ -167,6 +167,11 @@ def dissipation(model: Model, nu: np.ndarray, metric: np.ndarray) -> np.ndarray:
     return power / np.einsum("ij,jk,ik->i", nu, metric, nu)
 
 
+def least_dissipation(model: Model, region: OperatingRegion = OPERATING) -> float:
+    """The smallest dissipation [1/s] of a hull over a region, relative to the nominal mass."""
+    return float(dissipation(model, sampled_motions(region), mass(Model())).min())
+
+
 def sampled_motions(region: OperatingRegion) -> np.ndarray:
     """Velocities (n, 3) [m/s, m/s, rad/s] in all directions of a region, from slow to its border."""
     edge = np.linspace(-1.0, 1.0, DIRECTIONS)

@@ -1,7 +1,19 @@
 """Measured runs: read from files of any form, their samples judged."""
 
 from .beside import line_beside
-from .cleaning import Counts, Track, clean, lost, repeated
+from .cleaning import Counts, Track, clean, in_order, lost, repeated
+from .other_columns import other_columns
 from .reading import Run, read
 
-__all__ = ["Counts", "Run", "Track", "clean", "line_beside", "lost", "read", "repeated"]
+__all__ = [
+    "Counts",
+    "Run",
+    "Track",
+    "clean",
+    "in_order",
+    "line_beside",
+    "lost",
+    "other_columns",
+    "read",
+    "repeated",
+]

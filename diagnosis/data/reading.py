@@ -51,6 +51,7 @@ class Run:
         five: (n, 5), commands of VSP 1 surge, sway, VSP 2 surge, sway, bow [1]; None if not known.
         power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
         notes: what was found that is not as it should be, a line each.
+        held: (n,), rows whose commands are missing in the file, and held; None if none is.
     """
 
     name: str
@@ -61,13 +62,14 @@ class Run:
     five: np.ndarray | None = None
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+    held: np.ndarray | None = None
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
-        parts = (self.u, self.five, self.power)
-        u, five, power = (None if part is None else part[keep] for part in parts)
+        parts = (self.u, self.five, self.power, self.held)
+        u, five, power, held = (None if part is None else part[keep] for part in parts)
         always = self.time[keep], self.pose[keep], self.tau_cmd[keep]
-        return Run(self.name, *always, u, five, power, self.notes)
+        return Run(self.name, *always, u, five, power, self.notes, held)
 
 
 def propellers(five: np.ndarray) -> np.ndarray:
@@ -123,7 +125,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
     if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
         raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
-    lost = sum(not np.isfinite(columns[s]).all() for s in ALL if s in columns)
+    missing = [~np.isfinite(columns[s]) for s in ALL if s in columns]
+    lost = sum(gaps.any() for gaps in missing)
     if tau is None:
         if five is not None:
             tau = force(five, power)
@@ -133,7 +136,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
             tau = np.column_stack(thrust(x, y, bow, Allocation()))
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     pose = np.column_stack([columns[s] for s in POSE])
-    return Run(name, columns["time"], pose, tau, u, five, power, notes)
+    held = np.any(missing, axis=0) if lost else None
+    return Run(name, columns["time"], pose, tau, u, five, power, notes, held)
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:

@@ -14,10 +14,12 @@ from ..hull import Triple
 from ..ops import Number, choose, not_, where
 from ..signals import Estimate, Force
 from .backstepping import (
+    HELD,
     Energy,
     Errors,
     Gains,
     Inputs,
+    acting,
     control,
     control_errors,
     outputs,
@@ -119,7 +121,7 @@ def adaptive(name: str, description: str, model: Parametrisation) -> Component:
         e = i.estimate
         nu = (e.u_hat, e.v_hat, e.r_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
-        F = model.regressors(nu, alpha_dot, s.tau, p.belief)
+        F = model.regressors(nu, alpha_dot, acting(i.applied, s.tau), p.belief)
         dt = where(attentive(e, p.hold_frozen), h, 0.0)
         z2 = (z.z2_u, z.z2_v, z.z2_r)
         phi = model.hat._make(climb(s.phi_hat, p.gamma, model.project(F, z2), dt))
@@ -139,4 +141,5 @@ def adaptive(name: str, description: str, model: Parametrisation) -> Component:
         outputs=Outputs,
         init=init,
         step=step,
+        held=HELD,
     )

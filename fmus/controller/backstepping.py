@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import bundle
 from ..frames import rotate_to_body
 from ..hull import Inertia, Triple, inertia_force
-from ..ops import wrap
+from ..ops import choose, wrap
 from ..signals import Estimate, Force, Nothing, Target
 from .parametrisation import GAIN, Parametrisation, Regressors
 
@@ -27,9 +27,33 @@ class Gains(NamedTuple):
     K_d_r: Annotated[float, "N.m.s/rad", "velocity gain, yaw", GAIN] = 1.0
 
 
+# N, N m; the start value of an input that nobody tells: a force above half of it is none.
+UNTOLD = 1e9
+
+
+class Applied(NamedTuple):
+    """The force that acts: what was asked for, as the thrusters clipped it."""
+
+    tau_cmd_X: Annotated[float, "N", "optional: surge force that acts; 1e9: not told"] = UNTOLD
+    tau_cmd_Y: Annotated[float, "N", "optional: sway force that acts; 1e9: not told"] = UNTOLD
+    tau_cmd_N: Annotated[float, "N.m", "optional: yaw moment that acts; 1e9: not told"] = UNTOLD
+
+
 class Inputs(NamedTuple):
     estimate: Estimate = Estimate()
     target: Target = Target()
+    applied: Applied = Applied()
+
+
+# A ship was moved by the force of the step that ended now, not by the one that is asked for now.
+HELD = Applied._fields
+
+
+def acting(told: Applied, asked: Force) -> Force:
+    """The force that acted in the step before: the one that is told, or else the one asked for."""
+    X, Y, N = told
+    known = (X < 0.5 * UNTOLD) & (Y < 0.5 * UNTOLD) & (N < 0.5 * UNTOLD)
+    return choose(known, Force(X, Y, N), asked)
 
 
 class Errors(NamedTuple):

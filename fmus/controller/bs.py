@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from ..declare import Component
 from ..ops import Number
-from .backstepping import Energy, Gains, Inputs, control, control_errors, outputs, tracking_energy
+from .backstepping import HELD, Energy, Gains, Inputs, control, control_errors, outputs, tracking_energy
 from .models import ROTATIONAL
 from .parametrisation import Belief
 
@@ -48,4 +48,5 @@ COMPONENT = Component(
     outputs=Outputs,
     init=init,
     step=step,
+    held=HELD,
 )

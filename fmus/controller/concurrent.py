@@ -1,7 +1,8 @@
 """Concurrent learning, 4.1.2-4.1.5: any parametrisation, any store, driven by z2 or by eps.
 
-y = M nu_dot - known - tau and eps = y - F phi_hat - R^T omega_hat, where tau is the force that the
-controller itself asked for last: the one that acted while nu_dot was measured. An input that is NaN or
+y = M nu_dot - known - tau and eps = y - F phi_hat - R^T omega_hat, where tau is the force that acted
+while nu_dot was measured: that of the inputs ``tau_cmd``, or where they are not connected the force that
+the controller itself asked for last, which may be more than thrusters give. An input that is NaN or
 infinite keeps its last finite value.
 """
 
@@ -12,7 +13,7 @@ from ..hull import Triple
 from ..ops import Number, choose, sqrt, when, where
 from ..signals import Force
 from .adaptive import Disturbance, DisturbanceByError, attentive, energy, parameters, to_body
-from .backstepping import Inputs, control, control_errors, outputs, starting
+from .backstepping import HELD, Inputs, acting, control, control_errors, outputs, starting
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
 from .learning import Drive, Memory, integrated, learned, remembered
@@ -35,6 +36,9 @@ class Learning(NamedTuple):
     sigma_min: Annotated[float, "1", "smallest singular value of the stored regressors"] = 0.0
     rank_met: Annotated[float, "1", "1 where sigma_min is above rank_tolerance, else 0"] = 0.0
     beta: Annotated[float, "1", "1 where learning is allowed, 0 where it is blocked"] = 1.0
+    stored_at: Annotated[float, "s", "time of the newest sample in the store"] = 0.0
+    by_store: Annotated[float, "1", "norm of the rate of phi_hat by the store"] = 0.0
+    by_now: Annotated[float, "1", "norm of the rate of phi_hat by the present error"] = 0.0
 
 
 class State(NamedTuple):
@@ -121,13 +125,14 @@ def concurrent(
         e = i.estimate
         nu, nu_dot = (e.u_hat, e.v_hat, e.r_hat), (e.u_dot_hat, e.v_dot_hat, e.r_dot_hat)
         z, alpha_dot = errors = control_errors(e, i.target, p.gains)
-        F = model.regressors(nu, alpha_dot, s.tau, p.belief)
+        acted = acting(i.applied, s.tau)
+        F = model.regressors(nu, alpha_dot, acted, p.belief)
 
-        gate = blocked(s.blocker, exceeds(nu, nu_dot, s.tau, p.blocker), p.blocker.block_time, h)
+        gate = blocked(s.blocker, exceeds(nu, nu_dot, acted, p.blocker), p.blocker.block_time, h)
         learns = (h > 0.0) & (gate.beta > 0.5) & attentive(e, p.hold_frozen)
         dt = where(learns, h, 0.0)
         time = s.time + h
-        now = Sample(time, e.psi_hat, nu, nu_dot, s.tau)
+        now = Sample(time, e.psi_hat, nu, nu_dot, acted)
         register, sample, counts, fresh = when(
             h > 0.0,
             lambda: present(s.register, now, p.samples.smoothing, learns),
@@ -154,7 +159,7 @@ def concurrent(
             drive = Drive(F_sample, sample.psi, times(counts, eps))
         else:
             drive = Drive(F, e.psi_hat, (z.z2_u, z.z2_v, z.z2_r))
-        phi, omega = learned(
+        phi, omega, rates = learned(
             model,
             (s.phi_hat, s.omega),
             (p.gamma, p.disturbance),
@@ -173,7 +178,12 @@ def concurrent(
         tau = choose(h > 0.0, demand.tau, s.tau)
         return (
             State(phi, omega, tau, time, kept, gate, register, integral),
-            Outputs(*demand, phi, energy(z, p, phi, omega), Learning(count, sigma, met, gate.beta)),
+            Outputs(
+                *demand,
+                phi,
+                energy(z, p, phi, omega),
+                Learning(count, sigma, met, gate.beta, kept.sums.newest, *rates),
+            ),
         )
 
     return Component(
@@ -185,4 +195,5 @@ def concurrent(
         outputs=Outputs,
         init=init,
         step=step,
+        held=HELD,
     )

@@ -15,7 +15,7 @@ With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n 
 from typing import Any, NamedTuple
 
 from ..hull import Triple
-from ..ops import Number, fmax, when, where
+from ..ops import Number, fmax, sqrt, when, where
 from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
 from .eigen import dot
 from .parametrisation import Parametrisation, Regressors
@@ -107,7 +107,7 @@ def learned(
     memory: Memory,
     options: StoreOptions,
     dt: Number,
-) -> tuple[Any, Triple]:
+) -> tuple[Any, Triple, tuple[Any, Any]]:
     """The estimates after dt [s].
 
     Args:
@@ -122,7 +122,8 @@ def learned(
         dt: 0 where nothing is learned.
 
     Returns:
-        phi_hat and omega_n_hat.
+        phi_hat, omega_n_hat, and the norms of the rates of phi_hat by the store and by the present
+        error.
     """
     phi, omega = estimates
     gamma, gamma_omega = gains
@@ -137,8 +138,16 @@ def learned(
         lambda: earth_slopes(memory, phi, omega, stale),
         lambda: (0.0, 0.0, 0.0),
     )
-    phi = climb(climb(phi, gamma, slopes, guarded), gamma, model.project(drive.F, drive.error), pace)
+    pull = model.project(drive.F, drive.error)
+    phi = climb(climb(phi, gamma, slopes, guarded), gamma, pull, pace)
+    rates = _norm(gamma, slopes, guarded, dt), _norm(gamma, pull, pace, dt)
     a, b, c = climb(
         climb(omega, gamma_omega, earth, guarded), gamma_omega, to_earth(drive.psi, drive.error), pace
     )
-    return model.hat._make(phi), (a, b, c)
+    return model.hat._make(phi), (a, b, c), rates
+
+
+def _norm(gamma: Any, slopes: Any, pace: Number, dt: Number) -> Any:
+    """The norm of Gamma times slopes, as much slower as the step ``pace`` is shorter than dt [s]."""
+    moves = [g * f for g, f in zip(gamma, slopes, strict=True)]
+    return sqrt(dot(moves, moves)) * (pace / fmax(dt, 1e-300))

@@ -167,20 +167,24 @@ def _scaled(nu: Triple, nu_dot: Triple, tau: Triple, b: FullBelief) -> Regressor
     MX, MY, MN = inertia_force(*nu_dot, b.inertia)
     CX, CY, CN = coriolis_force(*nu, b.inertia)
     X, Y, N = _damping(*nu, b)
-    return (-MX - CX, X), (-MY - CY, Y), (-MN - CN, N)
+    return (-MX - CX, X, -tau[0]), (-MY - CY, Y, -tau[1]), (-MN - CN, N, -tau[2])
 
 
-# (2.20)-(2.22): phi is what the factors of inertia and damping exceed 1 by.
+# (2.20)-(2.23): phi is what the factors of inertia and damping exceed 1 by, and what the thrust's factor
+# lacks to 1. All three factors times one number are the same ship, so that one must be known: the
+# thrust's, as its gain is zero. To learn it, set the gain of the inertia to zero: a balance tells that.
 SCALED = Parametrisation(
     coefficients=(
         Coefficient("delta_M - 1", "1", "excess of the inertia's factor", 0.0, 1.0),
         Coefficient("delta_D - 1", "1", "excess of the damping's factor", 0.0, 1.0),
+        Coefficient("1 - delta_tau", "1", "loss of thrust; 0 gain: known", 0.0, 0.0),
     ),
-    pattern=((0, 1), (0, 1), (0, 1)),
+    pattern=((0, 1, 2), (0, 1, 2), (0, 1, 2)),
     regressors=_scaled,
     known=everything,
     blocks=((0, 1, 2),),
     belief=FullBelief(),
+    loss=(2, 2, 2),
     by_acceleration=True,
 )
 

@@ -41,12 +41,13 @@ class Row(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Over all rows: count, smallest eigenvalue of sum F^T F, time of the oldest row, sum F^T target,
-    f f^T of each axis, sum R target, and sum F^T R^T (zero while omega_n is not learned)."""
+    """Over all rows: count, smallest eigenvalue of sum F^T F, times of the oldest and the newest row,
+    sum F^T target, f f^T of each axis, sum R target, and sum F^T R^T (zero while omega_n is off)."""
 
     count: Any
     least: Any
     oldest: Any
+    newest: Any
     projected: tuple[Any, ...]
     grams: tuple[Any, ...]
     turned: Triple
@@ -115,11 +116,12 @@ def empty_store(model: Parametrisation) -> Store:
 @kernel
 def summed(omega_on: Number, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
-    count, oldest = 0.0, NEVER
+    count, oldest, newest = 0.0, NEVER, 0.0
     projected: tuple[Any, ...] = (0.0,) * len(model.coefficients)
     for row in rows:
         count = count + row.filled
         oldest = fmin(oldest, where(row.filled > 0.5, row.time, NEVER))
+        newest = fmax(newest, row.time)
         projected = plus(projected, model.project(row.F, row.target))
     grams = tuple([_gram([row.F[axis] for row in rows]) for axis in range(3)])
     least = smallest([tridiagonal(m) for m in model.matrices(grams)])
@@ -129,7 +131,7 @@ def summed(omega_on: Number, rows: tuple[Row, ...], model: Parametrisation) -> S
         lambda: _earth_fixed(model, rows),
         lambda: ((0.0, 0.0, 0.0), cross),
     )
-    return Sums(count, fmax(least, 0.0), oldest, projected, grams, turned, cross)
+    return Sums(count, fmax(least, 0.0), oldest, newest, projected, grams, turned, cross)
 
 
 def plus(a: Any, b: Any) -> Any:

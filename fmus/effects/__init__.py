@@ -8,6 +8,7 @@ from . import (
     linear_map,
     measurement,
     outages,
+    scaling,
     single_propellers,
     thrust_curves,
     thruster_dynamics,
@@ -56,6 +57,7 @@ STANDARD = EffectSet(
         environment,
         force,
         linear_map,
+        scaling,
         inertia,
         measurement,
     )

@@ -31,7 +31,7 @@ def _parameters(e: Effect) -> str:
     if e.search.intervals:
         first, *_, last = e.parameters
         return f"`{first.name}`, `{e.parameters[1].name}` … `{last.name}` [{first.unit}]"
-    if e.search.by == "given":
+    if e.search.by == "given" and len(e.parameters) > 8:
         first, *_, last = e.parameters
         return f"`{first.name}` … `{last.name}`, their units in the FMU"
     if len(e.parameters) > 8:

@@ -1,0 +1,67 @@
+"""A run through observer and controller FMUs open loop: ``python -m diagnosis.replay RUN``, 7.1."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+
+from cosim.command import run_command
+
+from .command_line import Done, open_loop_parser, run
+from .progress import Advance
+from .result_folder import together
+
+FILES = ("replay.json", "replay.csv", "report.html")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(partial(replay, _parser().parse_args(arguments)))
+
+
+def replay(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from .analysis.document import write_document, write_json  # only now: it takes a second to import
+    from .open_loop import gather_source, loop_of, play
+    from .open_loop.replay_report import content, document, sentences, write_series
+    from .open_loop.replayed import replayed
+
+    with together(options.out, FILES) as new:
+        advance("reading")
+        source = gather_source(options.run)
+        loop = loop_of(options.run, options.controller, options.observer, options.scenario)
+        played = play(source, loop, advance)
+        advance("spikes")
+        found = replayed(played)
+        write_json(new / FILES[0], content(found))
+        write_series(new / FILES[1], found)
+        advance("report")
+        write_document(new / FILES[2], document(found))
+    return Done(0, [*sentences(found), f"in {options.out}: {', '.join(FILES)}"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = open_loop_parser(
+        "replay",
+        "Feed a measured run to an observer and a controller open loop: what they made of it, with the "
+        "signals that were lost in transmission.",
+        "examples:  python -m diagnosis.replay results/ellipse --controller abs\n"
+        "           python -m diagnosis.replay run.csv --controller cl_win_eps --scenario "
+        "scenarios/eight.json\n"
+        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
+    )
+    made.add_argument(
+        "--controller",
+        required=True,
+        metavar="NAME",
+        help="a controller of this project, as abs, cl_win_eps, cl_improved, or a path of an FMU",
+    )
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)

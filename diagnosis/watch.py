@@ -1,0 +1,56 @@
+"""Thrusters that fail during a run: ``python -m diagnosis.watch RUN``, 7.2.5."""
+
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
+import argparse
+from collections.abc import Sequence
+from functools import partial
+
+from cosim.command import run_command
+
+from .command_line import Done, open_loop_parser, run
+from .progress import Advance
+from .result_folder import together
+
+FILES = ("watch.json", "report.html")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(partial(watch, _parser().parse_args(arguments)))
+
+
+def watch(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from .analysis.document import write_document, write_json  # only now: it takes a second to import
+    from .open_loop import gather_source, play, watch_loop
+    from .open_loop.thruster_report import WATCH, content, document, sentences
+
+    with together(options.out, FILES) as new:
+        advance("reading")
+        source = gather_source(options.run)
+        loop = watch_loop(options.run, WATCH, options.observer, options.scenario)
+        played = play(source, loop, advance)
+        write_json(new / FILES[0], content(played))
+        advance("report")
+        write_document(new / FILES[1], document(played))
+    return Done(0, [*sentences(played), f"in {options.out}: {', '.join(FILES)}"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    return open_loop_parser(
+        "watch",
+        "Tell whether a thruster has lost force during a measured run: which, when, how sure.",
+        "examples:  python -m diagnosis.watch results/ellipse\n"
+        "           python -m diagnosis.watch run.csv --observer kalman --out results/thrusters\n"
+        "The same in a closed loop: watch_thrusters.fmu, fed like a controller, and with the force by\n"
+        '["thrusters.tau_cmd_*", "watch.tau_cmd_*"].\n'
+        "exit codes: 0 done (also where none fails), 2 bad input, 130 interrupted (nothing is written)",
+    )
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,1 @@
+"""Detectors that watch a closed loop, one file for each FMU."""

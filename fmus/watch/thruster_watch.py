@@ -1,0 +1,252 @@
+"""Tells that a thruster has lost force: which, since when, how sure; 7.2.5 and Fig. 7.3.
+
+The model error omega = M nu' + C(nu)nu + D(nu)nu - tau of the whole hull, low-passed so that no
+acceleration is needed, is written as the forces g that the thrusters seem to give too much. What of g is
+usual for a velocity and a command is learned by recursive least squares from samples that are older than
+a window. In the window, a thruster that lost a share s of its force f leaves g = -s f of its own: its
+likelihood ratio, the largest over s and over the time of the failure, is divided by its mean so far
+(which is 1 for white noise) and held against the odds of a failure. While one is told, nothing is
+learned.
+
+The inputs are those of a controller; ``tau_cmd`` must be connected. The target is not used.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..controller.backstepping import HELD, Inputs, acting
+from ..controller.eigen import dot
+from ..controller.models import FullBelief, everything
+from ..declare import POSITIVE, Component, Range
+from ..hull import inertia_force
+from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
+from ..signals import Force
+from ..thrusters.allocation import Allocation, allocate
+
+Triple = tuple[Any, Any, Any]
+
+ROWS = 20  # of the window
+LEAST_ROWS = 4  # since the failure, before it is told
+COUNT = 7  # regressors of what is usual: 1, u, v, r, and the forces of the three thrusters
+STILL: Triple = (0.0, 0.0, 0.0)
+# Prior standard deviations of what is usual [N per 1, m/s, m/s, rad/s, N, N, N]; chosen: a hull and
+# thrusters that differ from their model by as much as Table 7.1 says.
+SPREAD = (0.3, 3.0, 3.0, 2.0, 0.4, 0.4, 0.4)
+START = 5.0  # s of judging that the first values of mean square and ratios count for (chosen)
+HUBER = 3.0  # standard deviations that a single sample counts for at the most (chosen)
+NOISE = 0.05  # N; of g before anything is known; chosen: what a millimetre of noise gives
+NEVER_SURE = 40.0  # largest logarithm of odds, so that no exponential overflows
+
+
+class Params(NamedTuple):
+    belief: FullBelief = FullBelief()
+    allocation: Allocation = Allocation()
+    filter_time: Annotated[float, "s", "time constant of the low pass", Range(0.01)] = 1.0
+    sample_time: Annotated[float, "s", "between samples of the window of 20", Range(0.01)] = 0.5
+    memory: Annotated[float, "s", "over which the usual is learned", Range(1.0)] = 120.0
+    first: Annotated[float, "s", "of judging before anything is told", POSITIVE] = 30.0
+    least_loss: Annotated[float, "1", "share of thrust below which no loss is told", Range(0.0, 1.0)] = (
+        0.15
+    )
+    # One in ten hours: chosen.
+    failure_rate: Annotated[float, "1/s", "how often a failure is to be expected", Range(1e-12)] = 2.8e-5
+
+
+class Outputs(NamedTuple):
+    failed_vsp: Annotated[float, "1", "probability that the VSP has failed, 0...1"] = 0.0
+    failed_bow: Annotated[float, "1", "probability that the bow thruster has failed, 0...1"] = 0.0
+    since: Annotated[float, "s", "when the failure that is told began; 0: none is"] = 0.0
+    lost_vsp: Annotated[float, "1", "share of the VSP's force that seems lost"] = 0.0
+    lost_bow: Annotated[float, "1", "share of the bow thruster's force that seems lost"] = 0.0
+
+
+class Row(NamedTuple):
+    """A sample of the window: time [s], velocity, commanded forces of the thrusters [N], what they seem
+    to give too much [N], how far that was from the usual, its variance over that of the noise (what is
+    usual is not sure where the ship has never been), the likelihood ratios then, and whether enough had
+    been learned for these to count."""
+
+    filled: Any = 0.0
+    time: Any = 0.0
+    nu: Triple = STILL
+    f: Triple = STILL
+    g: Triple = STILL
+    error: Triple = STILL
+    unsure: Any = 1.0
+    ratios: tuple[Any, Any] = (1.0, 1.0)
+    fair: Any = 0.0
+
+
+class Usual(NamedTuple):
+    """What is usual: covariance of the regressors' weights over the noise, weights of each g, mean
+    square error of the prediction, mean likelihood ratios, how long was learned, and judged [s]."""
+
+    P: tuple[tuple[Any, ...], ...] = tuple(
+        [
+            tuple([(SPREAD[i] / NOISE) ** 2 if i == j else 0.0 for j in range(COUNT)])
+            for i in range(COUNT)
+        ]
+    )
+    weights: tuple[tuple[Any, ...], ...] = ((0.0,) * COUNT,) * 3
+    square: Triple = (NOISE * NOISE, NOISE * NOISE, NOISE * NOISE)
+    ratios: tuple[Any, Any] = (1.0, 1.0)
+    learned: Any = 0.0
+    judged: Any = 0.0
+
+
+class State(NamedTuple):
+    time: Any
+    quiet: Any  # s since the last frozen measurement
+    waited: Any  # s since the last sample
+    nu: Triple
+    rest: Triple
+    f: Triple
+    rows: tuple[Row, ...]
+    usual: Usual
+    told: Outputs
+
+
+def init(i: Inputs, p: Params) -> State:
+    e = i.estimate
+    nu = (e.u_hat, e.v_hat, e.r_hat)
+    return State(0.0, 0.0, 0.0, nu, STILL, STILL, (Row(),) * ROWS, Usual(), Outputs())
+
+
+def forces(tau: Any, p: Allocation) -> Triple:
+    """The thrusters' forces [N] that give a force: VSP in surge and sway, bow."""
+    s_x, s_y, s_bow = allocate(tau[0], tau[1], tau[2], p)
+    return p.F_vsp * s_x, p.F_vsp * s_y, p.F_bow * s_bow
+
+
+def low_pass(before: Triple, now: Triple, share: Number) -> Triple:
+    a, b, c = [x + share * (y - x) for x, y in zip(before, now, strict=True)]
+    return a, b, c
+
+
+def regressors(nu: Triple, f: Triple) -> tuple[Any, ...]:
+    return (1.0, *nu, *f)
+
+
+def unusual(row: Row, usual: Usual) -> Triple:
+    """g less what is usual [N]."""
+    z = regressors(row.nu, row.f)
+    a, b, c = [g - dot(w, z) for g, w in zip(row.g, usual.weights, strict=True)]
+    return a, b, c
+
+
+def learned(usual: Usual, old: Row, p: Params) -> Usual:
+    """What is usual, with one more sample, by recursive least squares that forgets."""
+    z = regressors(old.nu, old.f)
+    keep = exp(-p.sample_time / p.memory)
+    Pz = [dot(line, z) for line in usual.P]
+    total = keep + dot(z, Pz)
+    gain = [x / total for x in Pz]
+    # Weights that nothing is learned of become no less certain than they were at first.
+    spread = sum([usual.P[k][k] for k in range(COUNT)])
+    grow = where(spread < sum([(s / NOISE) ** 2 for s in SPREAD]), 1.0 / keep, 1.0)
+    P = tuple(
+        [tuple([(usual.P[i][j] - gain[i] * Pz[j]) * grow for j in range(COUNT)]) for i in range(COUNT)]
+    )
+    errors = unusual(old, usual)
+    weights = tuple(
+        [
+            tuple([w + k * e for w, k in zip(line, gain, strict=True)])
+            for line, e in zip(usual.weights, errors, strict=True)
+        ]
+    )
+    judged = usual.judged + old.fair * p.sample_time
+    share = old.fair * fmax(1.0 - keep, p.sample_time / (judged + START))
+    # An error or a ratio that stands out counts as three standard deviations.
+    a, b, c = [
+        s + share * (fmin(e * e / old.unsure, 9.0 * s) - s)
+        for s, e in zip(usual.square, old.error, strict=True)
+    ]
+    x, y = [m + share * (fmin(n, 9.0 * m) - m) for m, n in zip(usual.ratios, old.ratios, strict=True)]
+    return Usual(P, weights, (a, b, c), (x, y), usual.learned + p.sample_time, judged)
+
+
+def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: Number) -> Any:
+    """Likelihood ratio of a loss on some of the axes of g: of the whole window, and the largest over the
+    time of the failure, with the share lost and that time."""
+    up, full, down, best, share, since = 0.0, 0.0, 1e-12, 0.0, 0.0, 0.0
+    for k, row in enumerate(rows):
+        error = unusual(row, usual)
+        for axis in axes:
+            deviation = sqrt(usual.square[axis] * row.unsure)
+            e, f = error[axis] / deviation, row.filled * row.f[axis] / deviation
+            up = up - f * clip(e, -HUBER, HUBER)
+            full = full - f * e
+            down = down + f * f
+        if k + 1 >= LEAST_ROWS:
+            ratio = where((full > least * down) & (up > 0.0), up * up / down, 0.0)
+            better = ratio > best
+            share = where(better, full / down, share)
+            since = where(better, row.time, since)
+            best = fmax(best, ratio)
+    return up * up / down, best, share, since
+
+
+def judged(rows: tuple[Row, ...], usual: Usual, p: Params) -> tuple[tuple[Any, Any], Outputs]:
+    """The likelihood ratios of the window, and what is told."""
+    whole_v, best_v, lost_v, since_v = evidence(rows, usual, (0, 1), p.least_loss)
+    whole_b, best_b, lost_b, since_b = evidence(rows, usual, (2,), p.least_loss)
+    # A failure somewhere in the window, at any of its times.
+    expected = p.failure_rate * p.sample_time
+    against = -log(expected)
+    odds = [
+        exp(clip(0.5 * best / fmax(mean, 1.0) - against, -NEVER_SURE, NEVER_SURE))
+        for best, mean in ((best_v, usual.ratios[0]), (best_b, usual.ratios[1]))
+    ]
+    ready = where(usual.judged >= p.first, 1.0, 0.0)
+    vsp, bow = [ready * x / (1.0 + odds[0] + odds[1]) for x in odds]
+    since = where(vsp > bow, since_v, since_b)
+    told = fmax(vsp, bow) > 0.5
+    return (whole_v, whole_b), Outputs(vsp, bow, where(told, since, 0.0), lost_v, lost_b)
+
+
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
+    e = i.estimate
+    nu = (e.u_hat, e.v_hat, e.r_hat)
+    tau = acting(i.applied, Force())
+    share = h / (h + p.filter_time)
+    slow = low_pass(s.nu, nu, share)
+    a, b, c = [(x - y) / p.filter_time for x, y in zip(nu, slow, strict=True)]
+    moved = inertia_force(a, b, c, p.belief.inertia)
+    known = everything(*nu, p.belief)
+    rest = low_pass(s.rest, (known[0] + tau[0], known[1] + tau[1], known[2] + tau[2]), share)
+    f = low_pass(s.f, forces(tau, p.allocation), share)
+    quiet = where(e.frozen > 0.5, 0.0, s.quiet + h)
+    waited = s.waited + h
+    time = s.time + h
+    # The low pass forgets a jump at the end of a freeze in a few time constants; times within rounding.
+    ready = (waited > p.sample_time * (1.0 - 1e-9)) & (quiet > 2.0 * p.filter_time * (1.0 - 1e-9))
+    due = (h > 0.0) & ready
+
+    def sampled() -> tuple[tuple[Row, ...], Usual, Outputs]:
+        omega = (moved[0] - rest[0], moved[1] - rest[1], moved[2] - rest[2])
+        old = s.rows[-1]
+        calm = (s.told.failed_vsp < 0.5) & (s.told.failed_bow < 0.5)
+        usual = when((old.filled > 0.5) & calm, lambda: learned(s.usual, old, p), lambda: s.usual)
+        row = Row(1.0, time, slow, f, forces(omega, p.allocation))
+        z = regressors(slow, f)
+        unsure = 1.0 + fmax(dot(z, [dot(line, z) for line in usual.P]), 0.0)
+        row = row._replace(error=unusual(row, usual), unsure=unsure)
+        ratios, told = judged((row, *s.rows[:-1]), usual, p)
+        fair = where(usual.learned > 0.5 * p.first, 1.0, 0.0)
+        return (row._replace(ratios=ratios, fair=fair), *s.rows[:-1]), usual, told
+
+    rows, usual, told = when(due, sampled, lambda: (s.rows, s.usual, s.told))
+    after = State(time, quiet, where(due, 0.0, waited), slow, rest, f, rows, usual, told)
+    return choose(h > 0.0, after, s), told
+
+
+COMPONENT = Component(
+    name="watch_thrusters",
+    description="Detector of thrusters that lose force, by the model error",
+    params=Params,
+    state=State,
+    inputs=Inputs,
+    outputs=Outputs,
+    init=init,
+    step=step,
+    held=HELD,
+)

@@ -1,0 +1,116 @@
+"""The detector of failing thrusters: its statistic, in a closed loop, and on a file of the same run."""
+
+import json
+
+import numpy as np
+import pytest
+from support.project import ROOT
+
+import cosim
+from benchmarks.watch_delay import Told, outcome
+from benchmarks.watched_runs import cases
+from diagnosis.watch import main
+from fmus.controller.backstepping import Applied, Inputs
+from fmus.watch import thruster_watch as watch
+
+F = np.random.default_rng(0).normal(size=(watch.ROWS, 3))
+
+
+def window(share, axes, since=watch.ROWS):
+    """A window in which thrusters lost a share of their force ``since`` so many samples, no noise."""
+    rows = []
+    for k, f in enumerate(F.tolist()):
+        g = [-share * x if axis in axes and k < since else 0.0 for axis, x in enumerate(f)]
+        rows.append(watch.Row(1.0, 100.0 - 0.5 * k, f=tuple(f), g=tuple(g)))
+    return tuple(rows)
+
+
+@pytest.mark.parametrize("axes", [(0, 1), (2,)])
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_share_and_time_of_a_loss_are_found(axes, share):
+    rows = window(share, axes, since=8)
+    _, best, lost, since = watch.evidence(rows, watch.Usual(), axes, 0.15)
+    assert best > 30.0
+    assert lost == pytest.approx(share)
+    assert since == pytest.approx(100.0 - 0.5 * 7)
+    other = (2,) if axes == (0, 1) else (0, 1)
+    assert watch.evidence(rows, watch.Usual(), other, 0.15)[1] == 0.0
+
+
+@pytest.mark.parametrize("share", [-0.5, 0.1])
+def test_more_force_or_a_small_loss_is_no_failure(share):
+    assert watch.evidence(window(share, (2,)), watch.Usual(), (2,), 0.15)[1] == 0.0
+
+
+def test_one_bad_sample_counts_little():
+    rows = list(window(0.0, (2,)))
+    rows[2] = rows[2]._replace(g=(0.0, 0.0, -100.0 * rows[2].f[2]))
+    assert watch.evidence(tuple(rows), watch.Usual(), (2,), 0.0)[1] < watch.HUBER**2
+
+
+def test_usual_is_what_least_squares_with_its_prior_finds():
+    p = watch.Params(memory=1e12)
+    rng = np.random.default_rng(1)
+    true = rng.normal(size=(3, watch.COUNT))
+    usual, z, g = watch.Usual(), rng.normal(size=(40, watch.COUNT)), []
+    z[:, 0] = 1.0
+    for x in z.tolist():
+        g.append(true @ x)
+        row = watch.Row(1.0, nu=tuple(x[1:4]), f=tuple(x[4:]), g=tuple(g[-1].tolist()))
+        usual = watch.learned(usual, row, p)
+    prior = np.diag((watch.NOISE / np.array(watch.SPREAD)) ** 2)
+    expected = np.linalg.solve(z.T @ z + prior, z.T @ np.array(g)).T
+    assert np.array(usual.weights) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_nothing_is_told_without_the_applied_force():
+    c = watch.COMPONENT
+    p, inputs = c.params(), Inputs(applied=Applied())
+    state = c.init(inputs, p)
+    for k in range(120):
+        e = inputs.estimate._replace(u_hat=0.1 * np.sin(k), v_hat=0.05 * np.cos(k))
+        state, out = c.step(state, inputs._replace(estimate=e), p, 0.5)
+        assert max(out.failed_vsp, out.failed_bow) < 0.5
+
+
+def test_outcome_counts_alarms_delays_and_thrusters():
+    (bow,) = [c for c in cases(6, 0, 1) if (c.thruster, c.share) == ("bow", 1.0)]
+    time = 0.1 * np.arange(1, 2401)
+    score = np.zeros((time.size, 2))
+    score[(time > 60.0) & (time < 65.0), 0] = 0.9  # a false one
+    score[time > bow.time + 4.0, 1] = 0.9
+    found = outcome([Told(bow, time, score)], 0.5, 1.0)
+    assert found.per_hour == pytest.approx(3600.0 / bow.time, rel=0.01)
+    assert (found.found, found.right) == (1.0, 1.0)
+    assert found.delay == pytest.approx(4.05, abs=0.1)
+
+
+@pytest.mark.slow
+def test_dead_bow_thruster_is_told_in_the_loop_and_from_its_log(tmp_path):
+    content = json.loads((ROOT / "scenarios" / "ellipse.json").read_text())
+    content["fmus"]["watch"] = {"path": "watch_thrusters.fmu"}
+    content["connections"] += [
+        ["observer.*", "watch.*"],
+        ["thrusters.tau_cmd_*", "watch.tau_cmd_*"],
+    ]
+    content["events"] = [
+        {
+            "time": 90.0,
+            "model": "thrusters",
+            "variable": "loss_bow",
+            "action": "override",
+            "value": 1.0,
+        }
+    ]
+    cosim.simulate(cosim.load_scenario(content | {"stop": 110.0}), tmp_path / "run")
+    log = cosim.read_log(tmp_path / "run")
+    told = np.flatnonzero(np.maximum(log["watch.failed_bow"], log["watch.failed_vsp"]) > 0.5)
+    assert 90.0 < log["time"][told[0]] < 100.0
+    assert (log["watch.failed_bow"][told] > 0.5).all()
+    assert main([str(tmp_path / "run"), "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "watch.json").read_text())
+    assert found["thruster"] == "bow"
+    assert found["noticed"] == pytest.approx(log["time"][told[0]], abs=0.02)
+    assert found["time"] == pytest.approx(90.0, abs=3.0)
+    assert found["confidence"] == pytest.approx(log["watch.failed_bow"].max())
+    assert "<svg" in (tmp_path / "out" / "report.html").read_text()
