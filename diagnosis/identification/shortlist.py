@@ -32,8 +32,9 @@ LENGTH = 8  # of the shortlist
 SEPARATION = 0.05
 REWEIGHTINGS = 4  # at the most
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
-# A curve that can do what an effect with this many parameters fewer does is no other explanation of it.
-FREE_SHAPE = 5
+# A curve that can do what an effect with this many parameters fewer does is no other explanation of it:
+# it has three nodes at the least, a law one parameter.
+FREE_SHAPE = 2
 # Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
 # own: as much as its score must fall to be accepted.
 NEW = 10.0
@@ -210,13 +211,17 @@ def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
 
 
 def alike(t: GramTable, best: Scored, other: Scored) -> bool:
-    """Whether another candidate is within two paired standard errors, or can do what the best does."""
+    """Whether another candidate is within two paired standard errors, or can do what the best does.
+
+    A free curve of which the best is a special case is no rival of it: it could always do the same.
+    """
+    mine, its = (regression(t, s.candidate, s.shape) for s in (best, other))
+    inseparable = separation(t, mine, its) < SEPARATION
+    if inseparable and its.free >= mine.free + FREE_SHAPE:
+        return False
     d = other.blocks - best.blocks
     behind = float(d.sum()) + other.penalty - best.penalty
-    if behind <= TIE * float(np.sqrt(len(d)) * d.std()):
-        return True
-    mine, its = (regression(t, s.candidate, s.shape) for s in (best, other))
-    return its.free < mine.free + FREE_SHAPE and separation(t, mine, its) < SEPARATION
+    return inseparable or behind <= TIE * float(np.sqrt(len(d)) * d.std())
 
 
 def separation(t: GramTable, mine: Regression, its: Regression) -> float:
