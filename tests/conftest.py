@@ -13,6 +13,7 @@ from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
 from support.shared import keep_in, once, shared_folder
+from support.slow_tests import slow_tests
 
 from cosim.dispatch import analyse_runs
 from cosim.fmu import LocalInstance, Model, archive_check
@@ -45,9 +46,14 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.hookimpl(trylast=True)
+@pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
-    """Slow tests first, so that no worker process is left alone with one at the end."""
+    """Tests that took long are marked slow; slow ones go first, so that none is left alone at the end."""
+    listed = slow_tests()
+    for item in items:
+        if item.nodeid in listed and not item.get_closest_marker("numerical"):
+            item.add_marker("slow")
+    yield
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 

@@ -1,0 +1,33 @@
+"""Tests that took long when they were measured: ``python tests/support/slow_tests.py junit.xml``.
+
+Reads the times of ``python -m pytest -n auto --junitxml junit.xml`` and writes ``slow_tests.txt``, whose
+tests are marked slow besides those that say so themselves. Numerical ones stay in the quick part, which
+the gate runs as on several processors.
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+LIST = Path(__file__).parents[1] / "slow_tests.txt"
+LONG = 1.5  # s
+
+
+def slow_tests() -> frozenset[str]:
+    """Node ids of the list."""
+    lines = LIST.read_text(encoding="utf-8").splitlines()
+    return frozenset(line for line in lines if line and not line.startswith("#"))
+
+
+def long_ones(report: Path) -> Iterator[str]:
+    """Node ids of the tests of a report that took longer than LONG."""
+    for case in ElementTree.parse(report).iter("testcase"):
+        if float(case.get("time", "0")) > LONG:
+            module, *classes = case.get("classname", "").removeprefix("tests.").split(".")
+            yield "::".join([f"tests/{module}.py", *classes, case.get("name", "")])
+
+
+if __name__ == "__main__":
+    header = f"# Took longer than {LONG} s, with --junitxml; written by support/slow_tests.py."
+    LIST.write_text("\n".join([header, *sorted(long_ones(Path(sys.argv[1])))]) + "\n", encoding="utf-8")
