@@ -2,7 +2,7 @@
 
 The closed loop of the ellipse without faults, with nothing, one FMU and all FMUs isolated, one after the
 other (Gauss-Seidel) and at once (Jacobi); then two FMUs that compute for a millisecond each, which
-processes can do side by side. Repeats are interleaved, all signals are logged, and all logs of a system
+processes can do side by side. All take the step loop in Python, as isolated FMUs need it. Repeats are interleaved, all signals are logged, and all logs of a system
 must be the same bytes.
 """
 
@@ -104,6 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = list(ellipse["fmus"])
     for algorithm, kind in (("gauss_seidel", "one after the other"), ("jacobi", "at once")):
         content = ellipse | {"algorithm": algorithm, "name": algorithm, "faults": [], "metrics": {}}
+        content["native"] = False
         content["stop"] = options.steps * content["step"]
         for label, isolated in (("none", []), ("observer", ["observer"]), ("all five", names)):
             cases[f"ellipse, {kind}: {label} isolated"] = (content, isolated)
@@ -114,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         script.write_text(BUSY)
         fmu = str(FmuBuilder.build_FMU(script, dest=folder))
         busy = {
-            "name": "busy", "algorithm": "jacobi", "step": 0.01, "stop": options.steps // 10 * 0.01,
+            "name": "busy", "native": False, "algorithm": "jacobi", "step": 0.01, "stop": options.steps // 10 * 0.01,
             "fmus": {name: {"path": fmu} for name in "ab"},
         }  # fmt: skip
         cases["two FMUs of 1 ms, at once: none isolated"] = (busy, [])
