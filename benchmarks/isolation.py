@@ -2,8 +2,8 @@
 
 The closed loop of the ellipse without faults, with nothing, one FMU and all FMUs isolated, one after the
 other (Gauss-Seidel) and at once (Jacobi); then two FMUs that compute for a millisecond each, which
-processes can do side by side. All take the step loop in Python, as isolated FMUs need it. Repeats are interleaved, all signals are logged, and all logs of a system
-must be the same bytes.
+processes can do side by side. All take the step loop in Python, as isolated FMUs need it. Repeats are
+interleaved, all signals are logged, and all logs of a system must be the same bytes.
 """
 
 import argparse
@@ -115,8 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         script.write_text(BUSY)
         fmu = str(FmuBuilder.build_FMU(script, dest=folder))
         busy = {
-            "name": "busy", "native": False, "algorithm": "jacobi", "step": 0.01, "stop": options.steps // 10 * 0.01,
-            "fmus": {name: {"path": fmu} for name in "ab"},
+            "name": "busy", "algorithm": "jacobi", "step": 0.01, "stop": options.steps // 10 * 0.01,
+            "native": False, "fmus": {name: {"path": fmu} for name in "ab"},
         }  # fmt: skip
         cases["two FMUs of 1 ms, at once: none isolated"] = (busy, [])
         cases["two FMUs of 1 ms, at once: one isolated"] = (busy, ["b"])
