@@ -132,6 +132,13 @@ def raise_if_interrupted() -> None:
         raise KeyboardInterrupt
 
 
+def was_lost() -> bool:
+    """Whether an interrupt has raised, though the program goes on; asked once, then forgotten."""
+    global _interrupted
+    lost, _interrupted = _interrupted, False
+    return lost
+
+
 def ignore_interrupts() -> None:
     """From now on Ctrl-C does nothing: the command has ended but for its exit code."""
     for number in SIGNALS:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ..interrupts import on_interrupt, raise_on_interrupt, restore
+from ..interrupts import on_interrupt, raise_on_interrupt, restore, was_lost
 
 
 @contextmanager
@@ -26,10 +26,13 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         yield lambda: False
         return
     previous = on_interrupt(ask)
+    if was_lost():  # while this was prepared
+        ask()
     try:
         yield lambda: asked
     finally:
         restore(previous)
+        was_lost()  # the next run in this process has not been asked to end
 
 
 @contextmanager
