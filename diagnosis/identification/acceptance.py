@@ -1,4 +1,4 @@
-"""What a candidate must show to be accepted: more than chance, in runs that its fit has not seen."""
+"""What a candidate must show to be accepted: more than chance, no harm to runs that it has not seen."""
 
 import numpy as np
 
@@ -15,10 +15,8 @@ LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explain
 LEAST_OF_AXIS = 0.02
 
 
-def accepted(nothing: Scored, best: Scored, total: float) -> bool:
-    """Whether a candidate is beyond chance, and does no harm in runs that it was not fitted to.
-
-    What the prior charges for nominal coefficients that moved is counted on both sides.
+def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
+    """Whether a candidate explains more than chance does, by cross-validation over blocks.
 
     Args:
         nothing: the score without it.
@@ -26,11 +24,16 @@ def accepted(nothing: Scored, best: Scored, total: float) -> bool:
         total: sum of squares of the first model error, in units of the noise.
     """
     fall = nothing.score - best.score
-    return (
-        fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
-        and float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
-        and not worse(best.runs, nothing.runs, best.prior - nothing.prior)
-    )
+    explains = float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
+    return explains and fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
+
+
+def harmful(nothing: Scored, best: Scored) -> bool:
+    """Whether a candidate makes runs worse that it was not fitted to.
+
+    What the prior charges for nominal coefficients that moved is counted on both sides.
+    """
+    return worse(best.runs, nothing.runs, best.prior - nothing.prior)
 
 
 def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:

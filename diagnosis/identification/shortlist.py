@@ -94,6 +94,13 @@ def weighted(
     return Ranking(base, along, table, found, order, score(table, -1, 1))
 
 
+def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
+    """The score of a model without any candidate."""
+    base = t.error(at)
+    along = nuisance(t, at, base)
+    return score(gram_table(base, t.blocks, [], along, np.asarray(t.sigma)), -1, 1)
+
+
 def novelty(t: GramTable, candidate: int, free: int) -> float:
     """Share of a linear candidate's force that what was found cannot give, set freely; else 1.
 
