@@ -103,13 +103,15 @@ def search(
         ranked = ranked or in_one_order(ranking, best)
         first = best.scored[0]
         left = best.refined[first.candidate].left
-        if not (beyond_chance(ranking.nothing, first, total) and matters(lacking, ranking.base, left)):
+        # As well fitted as the candidates are: what other coefficients give is not an effect's.
+        alone = refit(t, at, ranking.nuisance).estimate
+        nothing = scored_alone(t, alone)
+        if not (beyond_chance(nothing, first, total) and matters(lacking, t.error(alone), left)):
             break
-        against = ranking.nothing if before is None else scored_alone(t, before[1])
-        harms = harmful(against, first)
+        harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
         if harms and before is not None:
             break
-        before = (t, at) if harms else None
+        before = (t, alone) if harms else None
         places.append(place(best, rng))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
