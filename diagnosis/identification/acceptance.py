@@ -4,6 +4,7 @@ import numpy as np
 
 from fmus.ship import Ship
 
+from ..model.uncertainty import SHARE_OF_COMMAND
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 
@@ -47,15 +48,18 @@ def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
     return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
 
 
-def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray) -> bool:
-    """Whether an effect takes away a share of the first sum of squares of some axis that shows.
+def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
+    """Whether an effect takes away a force that shows, on some axis.
 
     Args:
         first: (K, 3), the first model error.
         without, left: (K, 3), the model error without the effect and with it.
+        command: (K, 3), the commanded force.
     """
     fall = np.sum(without**2 - left**2, axis=0)
-    return bool(np.any(fall >= LEAST_OF_AXIS * np.sum(first**2, axis=0)))
+    of_error = LEAST_OF_AXIS * np.sum(first**2, axis=0)
+    of_command = SHARE_OF_COMMAND**2 * np.sum(command**2, axis=0)
+    return bool(np.any(fall >= np.maximum(of_error, of_command)))
 
 
 def better(present: str, best: Shortlist, ship: Ship) -> int | None:

@@ -17,6 +17,7 @@ import numpy as np
 from fmus.effects import Effect
 
 from ..model import Integrals, Model
+from ..model.weak_form import commanded
 from .acceptance import better, beyond_chance, harmful, matters
 from .conclusion import Place, Search
 from .findings import Finding, Findings, Ranked
@@ -92,7 +93,7 @@ def search(
     t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())
-    lacking = ranking.base
+    lacking, command = ranking.base, commanded(data)
     ranked: list[Ranked] = []
     places: list[Place] = []
     before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
@@ -106,7 +107,8 @@ def search(
         # As well fitted as the candidates are: what other coefficients give is not an effect's.
         alone = refit(t, at, ranking.nuisance).estimate
         nothing = scored_alone(t, alone)
-        if not (beyond_chance(nothing, first, total) and matters(lacking, t.error(alone), left)):
+        shows = matters(lacking, t.error(alone), left, command)
+        if not (shows and beyond_chance(nothing, first, total)):
             break
         harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
         if harms and before is not None:
