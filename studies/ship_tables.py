@@ -111,22 +111,30 @@ def write_windows(report: Report, folds: Sequence[Fold]) -> None:
             report.text(
                 f"The {what} is predicted worse than by the nominal model in {', '.join(names)}."
             )
-    seen = [f.seen for f in folds if f.seen is not None]
-    if seen:
-        headings = [(e.before.heading, e.after.heading) for e in (*(f.evaluation for f in folds), *seen)]
-        out, learned = np.exp(np.mean(np.log(headings).reshape(2, -1, 2), axis=1))
-        out, learned = out[0] / out[1], learned[0] / learned[1]
-        report.text(
-            f"Geometric mean of the heading's fall: {out:.2f}× left out, {learned:.2f}× with the run among "
-            f"those learned from; the target is {HEADING:g}×."
-        )
-        if learned < HEADING:
-            report.text(
-                "So no candidate has what turns the ship over 8 s: the yaw moment that falls above is quick."
-            )
+    write_heading(report, folds)
     away = [f.name for f in folds if np.isinf(f.evaluation.after.position)]
     if away:
         report.text(f"In {', '.join(away)} the learned model runs away in one window or more.")
+
+
+def write_heading(report: Report, folds: Sequence[Fold]) -> None:
+    """How far the heading's error falls over 8 s, beside the target and with the run learned from."""
+    seen = [f.seen for f in folds if f.seen is not None]
+    if not seen:
+        return
+
+    def mean_fall(evaluations: Sequence[Evaluation]) -> float:
+        return float(np.exp(np.mean([np.log(e.before.heading / e.after.heading) for e in evaluations])))
+
+    out, learned = mean_fall([f.evaluation for f in folds]), mean_fall(seen)
+    report.text(
+        f"Geometric mean of the heading's fall: {out:.2f}× left out, {learned:.2f}× with the run among "
+        f"those learned from; the target is {HEADING:g}×."
+    )
+    if learned < HEADING:
+        report.text(
+            "So no candidate has what turns the ship over 8 s; the yaw moment that falls above is quick."
+        )
 
 
 def write_expected(report: Report, folds: Sequence[Fold]) -> None:
