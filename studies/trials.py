@@ -66,8 +66,9 @@ def scenario(
     faulty: bool = False,
     spikes: bool = True,
     parameters: Mapping[str, float] | None = None,
+    plant: Mapping[str, float] | None = None,
 ) -> Content:
-    """A trial with SYSID4 hidden in the plant and the gains of Table 6.4.
+    """A trial with something hidden in the plant and the gains of Table 6.4.
 
     Args:
         trial: path and true speed of the target.
@@ -75,13 +76,15 @@ def scenario(
         faulty: guidance is set to a quarter of the speed and called four times as often.
         spikes: whether the pose has spikes, beside the noise and freezes of the shipped scenario.
         parameters: further ``instance.parameter`` -> value; they win.
+        plant: what is hidden, ``instance.parameter`` -> value; SYSID4 by default.
     """
     base = shipped(trial.path)
     calls = 4.0 if faulty else 1.0
+    hidden = sysid4.parameters() if plant is None else dict(plant)
     return vary(
         base,
         {"controller": f"{controller}.fmu"},
-        sysid4.parameters()
+        hidden
         | gains(HARD)
         | {"guidance.u_t": trial.u_t / calls, "guidance.calls": calls}
         | dict(parameters or {}),
@@ -102,6 +105,7 @@ class Sailed(NamedTuple):
         first, lag: z1_x [m], mean over the first and the second half.
         inside: how far inside of the path the ship is, mean over the second half [m].
         omega_X: model error in surge with the lost thrust, mean magnitude [N].
+        omega_Y: the same in sway, mean [N]; positive pushes to starboard.
         omega_hat_X: its estimate, largest magnitude [N].
         iae, work, iaew, iaewwt: metrics of 4.4.
         swing: true yaw rate faster than 0.1 Hz, RMS [rad/s].
@@ -116,6 +120,7 @@ class Sailed(NamedTuple):
     lag: float
     inside: float
     omega_X: float
+    omega_Y: float
     omega_hat_X: float
     iae: float
     work: float
@@ -125,7 +130,7 @@ class Sailed(NamedTuple):
     frequency: float
 
 
-BROKEN = Sailed(1.0, *[float("nan")] * 14)
+BROKEN = Sailed(1.0, *[float("nan")] * 15)
 
 
 def inside(log: Log, part: np.ndarray) -> float:
@@ -159,6 +164,7 @@ def sailed(run: FinishedRun) -> Sailed:
         lag=float(z1_x[half].mean()),
         inside=inside(log, half),
         omega_X=float(np.abs(missing(log, "X")[settled]).mean()),
+        omega_Y=float(missing(log, "Y")[settled].mean()),
         omega_hat_X=float(np.abs(log["controller.omega_hat_X"]).max()),
         iae=m["IAE"],
         work=m["W"],

@@ -160,7 +160,7 @@ def test_swift_gains_bear_less_delay():
 
 
 def sailed(**values):
-    zero = trials.Sailed(*[0.0] * 15)
+    zero = trials.Sailed(*[0.0] * 16)
     return zero._replace(**{"position": 0.25, "lag": -0.25, "first": -0.25, "swing": 0.01} | values)
 
 
@@ -243,7 +243,7 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
         )
 
     monkeypatch.setattr(chapter6, "draw", one_set)
-    report = chapter6.study(tmp_path, range(1), 0.02, None)
+    report = chapter6.study(tmp_path, range(1), 0.02, None, None)
     text = report.read_text()
     results = json.loads((tmp_path / "results.json").read_text())
     assert len(results["lessons"]) == 10
