@@ -92,7 +92,9 @@ def storing(trial: Trial, plant: Plant) -> dict[str, Content]:
     }
 
 
-def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, plant: Plant) -> Found:
+def run(
+    out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, plant: Plant, causes: bool
+) -> Found:
     """Everything; the logs of the first seed of each trial stay in ``logs``.
 
     Args:
@@ -101,24 +103,27 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, plant
         shorter: factor on the time of every run.
         jobs: runs at a time.
         plant: what is hidden.
+        causes: whether the experiments on spikes, stores and delay are made as well.
     """
     every = [t._replace(seconds=shorter * t.seconds) for t in TRIALS]
     few, slow = seeds[:FEW], every[0]
     sailing = trials(every, plant)
     groups = [
-        (sailing, seeds),
         (spiked(slow, plant), few),
         (slow_eight(every[1], plant), seeds),
         (delayed(slow, plant), few),
     ]
     stores = storing(slow, plant)
-    total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(stores) * len(few)
+    if not causes:
+        groups, stores = [({}, few)] * 3, {}
+    every_group = [(sailing, seeds), *groups, ({"": stores}, few)]
+    total = sum(len(c) * len(s) for group, s in every_group for c in group.values())
     with progress(total, "chapter 6") as advance:
         logs = out / "logs"
         first = together(sailing, seeds[:1], logs, jobs, advance)
         rest = together(sailing, seeds[1:], None, jobs, advance)
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
-        others = [together(group, some, None, jobs, advance) for group, some in groups[1:]]
+        others = [together(group, some, None, jobs, advance) for group, some in groups]
         kept = run_all(stores, few, store_contents, None, jobs, advance)
     return Found(sailed_all, others[0], others[1], others[2], kept)
 
@@ -188,10 +193,17 @@ def hidden(model: Path | None) -> tuple[str, Plant]:
     return f"Table 2.1 (corrected) with what `{model.name}` adds to it: {listed}.", values
 
 
-def study(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, model: Path | None) -> Path:
+def study(
+    out: Path,
+    seeds: Sequence[int],
+    shorter: float,
+    jobs: int | None,
+    model: Path | None = None,
+    causes: bool = True,
+) -> Path:
     """Run everything and write the report; returns its path."""
     text, plant = hidden(model)
-    found = run(out, seeds, shorter, jobs, plant)
+    found = run(out, seeds, shorter, jobs, plant, causes)
     name = "SYSID4" if model is None else "the ship that was learned"
     report = Report(out, f"Chapter 6 in simulation, {name}: which lessons come out again?", seeds)
     report.text(
@@ -199,8 +211,8 @@ def study(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, mod
         "0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a single sample that is 0.1 m "
         "and 0.1 rad off. `fault`: guidance set to a quarter of the speed, and called four times as "
         "often. The eight at 0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms "
-        "stored errors anew, unless it says `as printed`. Experiments on delay and stores: "
-        f"{len(seeds[:FEW])} seeds."
+        "stored errors anew, unless it says `as printed`. "
+        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else "")
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
     seen = observations(found)
@@ -240,9 +252,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         metavar="FILE",
         help="parameter set of the ship, as diagnosis.learn writes it (SYSID4)",
     )
+    parser.add_argument(
+        "--trials", action="store_true", help="the trials alone, without the experiments on causes"
+    )
     options = parser.parse_args(arguments)
     seeds, shorter = range(2 if options.quick else options.seeds), 0.25 if options.quick else 1.0
-    run_study(partial(study, options.out, seeds, shorter, options.jobs, options.model))
+    run_study(
+        partial(study, options.out, seeds, shorter, options.jobs, options.model, not options.trials)
+    )
 
 
 if __name__ == "__main__":
