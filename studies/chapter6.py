@@ -19,6 +19,7 @@ from . import sysid4
 from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found, Runs, label, lost, mean
 from .lessons import DELAYS, lessons
 from .margin import SETTINGS
+from .model_loops import parameters_of
 from .monte_carlo import Content, run_all, vary
 from .observations import observations
 from .store_contents import logged, store_contents
@@ -154,19 +155,15 @@ def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
 
 
 def pictures(report: Report, seed: int) -> None:
-    """The pictures of 6.4 for every trial, with the fault as in the basin and without."""
+    """The pictures of 6.4 for every trial, with the fault as in the basin (Figs. 6.10 to 6.25)."""
     for trial in TRIALS:
-        for faulty in (FAULTY, REGULAR):
-            name = label(trial.name, faulty)
-            place = folder((trial.name, faulty))
-            logs = report.folder / "logs" / place
-            draw(
-                {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS},
-                report.folder / place,
-            )
-            for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
-                caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
-                report.picture(f"{place}/{file}.png", caption)
+        name, place = label(trial.name, FAULTY), folder((trial.name, FAULTY))
+        logs = report.folder / "logs" / place
+        shown = {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS}
+        draw(shown, report.folder / place)
+        for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
+            caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
+            report.picture(f"{place}/{file}.png", caption)
 
 
 def hidden(model: Path | None) -> tuple[str, Plant]:
@@ -181,12 +178,7 @@ def hidden(model: Path | None) -> tuple[str, Plant]:
             "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment lost."
         )
         return text, sysid4.parameters()
-    found = read_model(model)
-    values = {
-        f"{part}.{name}": value
-        for part, given in (("vessel", found.vessel), ("thrusters", found.thrusters))
-        for name, value in given.items()
-    }
+    values = parameters_of(read_model(model))
     if not values:
         raise cosim.InputError(f"'{model}' holds no parameter of vessel or thrusters")
     listed = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())

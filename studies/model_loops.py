@@ -54,7 +54,7 @@ def eigenvalues(found: Regressed) -> str:
     return values if analysis.goes_into_the_plant(found.columns) else "–"
 
 
-def hidden(model: Model) -> dict[str, float]:
+def parameters_of(model: Model) -> dict[str, float]:
     """The model as ``instance.parameter`` -> value."""
     parts = (("vessel", model.vessel), ("thrusters", model.thrusters))
     return {f"{part}.{name}": x for part, given in parts for name, x in given.items()}
@@ -78,7 +78,7 @@ def contents(models: Mapping[str, Model], seconds: float | None) -> dict[str, Co
     for name, model in models.items():
         for run, (trial, controller, faulty) in RUNS.items():
             t = trial if seconds is None else trial._replace(seconds=seconds)
-            content = scenario(t, controller, faulty, spikes=False, plant=hidden(model))
+            content = scenario(t, controller, faulty, spikes=False, plant=parameters_of(model))
             made[f"{name}|{run}"] = vary(content, log={"signals": TRACK})
     return made
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Component, DeclarationError
 from ..hull import Triple
-from ..ops import Number, choose, sqrt, when, where
+from ..ops import Number, choose, not_, sqrt, when, where
 from ..signals import Force
 from .adaptive import Disturbance, DisturbanceByError, attentive, energy, parameters, to_body
 from .backstepping import HELD, Inputs, acting, control, control_errors, outputs, starting
@@ -151,10 +151,9 @@ def concurrent(
 
         def smoothed_row() -> tuple[FixedPoint, Row, Any]:
             pose = (e.x_hat, e.y_hat, e.psi_hat)
-            new = Now(time, pose, nu, acted, where(e.frozen > 0.5, 0.0, 1.0))
-            point, past, ready = advanced(
-                model, p.belief, s.point, new, p.samples.fixed_point, h, learns
-            )
+            seen = learns & not_(e.frozen > 0.5)
+            new = Now(time, pose, nu, acted)
+            point, past, ready = advanced(model, p.belief, s.point, new, p.samples.fixed_point, h, seen)
             F_past, y_past, eps_past = explained(model, past, s, p.belief)
             aim = choose(p.store.stale > 0.5, eps_past, y_past)
             return point, Row(1.0, past.time, past.psi, aim, F_past), ready

@@ -1,7 +1,8 @@
 """An optimal fixed-point smoother of stored samples, 8.1 and 6.5 (after Chowdhary et al., 2012).
 
-A sample need not be stored at once: what is measured after its instant j tells more of it. On each axis
-of the earth-fixed pose runs a steady Kalman filter of position p, velocity v and a slow disturbance d, in
+A sample need not be stored at once: what is measured after its instant j tells more of it. On each
+axis of the earth-fixed pose runs a steady Kalman filter of position p, velocity v and a slow disturbance
+d, in
 
     p' = v,   v' = R(psi) (M^-1 (tau + known) + S(r) nu) + d,   d' = white noise,
 
@@ -52,13 +53,12 @@ class FixedPoint(NamedTuple):
 
 
 class Now(NamedTuple):
-    """What a step brings: time [s], estimated pose and velocity, force that acted, 1 where measured."""
+    """What a step brings: time [s], estimated pose and velocity, force that acted."""
 
     time: Any
     pose: Triple
     nu: Triple
     tau: Triple
-    seen: Any
 
 
 def covariance(w: Number) -> tuple[Triple, Triple, Triple]:
@@ -116,14 +116,15 @@ def advanced(
         now: what the step brought.
         span: how long a sample is smoothed [s].
         h: the step [s].
-        usable: False where nothing may be learned: everything begins anew.
+        usable: False where nothing may be learned, or nothing is measured: everything begins anew. An
+            observer that finds the ship again after a freeze is wrong for longer than the freeze.
 
     Returns:
         The smoother, a sample, and True where that is final and to be stored.
     """
     w = SETTLES / fmax(span, SETTLES / FAST * h)
     P = covariance(w)
-    K = (P[0][0] * now.seen, P[0][1] * now.seen, P[0][2] * now.seen)
+    K = P[0]
 
     def stepped() -> tuple[FixedPoint, Sample, Number]:
         turn = s.axes[2]
@@ -135,10 +136,8 @@ def advanced(
             ahead = axis.p + h * (axis.v + 0.5 * h * rate)
             e = h * (measured - ahead)
             axes.append(Axis(ahead + K[0] * e, axis.v + h * rate + K[1] * e, axis.d + K[2] * e))
-            g = now.seen * e
-            smooth.append(
-                Axis(old.p + s.sigma[0][0] * g, old.v + s.sigma[1][0] * g, old.d + s.sigma[2][0] * g)
-            )
+            (a, _, _), (b, _, _), (c, _, _) = s.sigma
+            smooth.append(Axis(old.p + a * e, old.v + b * e, old.d + c * e))
         going: Any = tuple(axes)
         fixed: Any = tuple(smooth)
         age, ran = s.age + h, s.ran + h
