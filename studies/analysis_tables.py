@@ -7,11 +7,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from diagnosis import analysis
-from diagnosis.analysis import Regressed, Samples, analysis_figures
-from diagnosis.analysis.partial_least_squares import AXES as PLACES
-from diagnosis.analysis.pls_report import correlations
-from diagnosis.analysis.samples import NU, OMEGA, TAU
-from diagnosis.report.panels import figure_of
+from diagnosis.analysis import (
+    NU,
+    OMEGA,
+    TAU,
+    Regressed,
+    Samples,
+    analysis_figures,
+    correlations,
+)
 
 from .outcome import AXES
 from .study_report import Report
@@ -43,7 +47,7 @@ def write_components(report: Report, s: Samples, name: str) -> None:
 
 def scatter(s: Samples) -> Figure:
     """Each component of the model error against each of the velocity."""
-    figure = figure_of(5.0)
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     panels = figure.subplots(3, 3)
     rows = analysis_figures.thinned(s.time.size)
     for k, line in enumerate(panels):
@@ -75,7 +79,7 @@ def write_regressions(report: Report, found: Mapping[str, Regressed], name: str)
         report.figure(f"{name}_{recipe}_loadings", shown, f"{recipe}: loadings (Fig. {figure}).")
     r = found["PLS2"]
     part, scale = r.parts[0], r.X.std(axis=0, ddof=1)
-    for k, axis in enumerate(PLACES):
+    for k, axis in enumerate(AXES):
         bars = analysis_figures.coefficient_bars(part.B[k] * scale, part.std[k] * scale, r.columns, axis)
         caption = f"PLS2: force by one standard deviation of each column, {axis} (Fig. 7.7)."
         report.figure(f"{name}_PLS2_{axis}", bars, caption)
@@ -145,7 +149,7 @@ def write_shapes(report: Report, s: Samples, name: str) -> None:
     """The bases of 3.2 (Figs. 3.2 to 3.5), and the shapes that PLS finds over each state (Fig. 3.1)."""
     kept = analysis.without_outliers(s)
     found = analysis.regressed(kept, analysis.recipe("continuous"))
-    figure = figure_of(6.0)
+    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     panels = figure.subplots(3, 2)
     for panel, state in zip(panels.ravel(), [*NU, *TAU], strict=True):
         places = [k for k, n in enumerate(found.columns) if n.partition("=")[0] == state]
@@ -154,7 +158,7 @@ def write_shapes(report: Report, s: Samples, name: str) -> None:
         panel.set(xlabel=f"node of {state}", ylabel="force")
     panels[0, 0].legend()
     report.figure(f"{name}_shapes", figure, "Continuous nominal PLS: force over each state (Fig. 3.1).")
-    pictured = figure_of(5.0)
+    pictured = Figure(figsize=(8.0, 5.0), layout="constrained")
     top, bottom = pictured.subplots(2, 1)
     rows = slice(0, min(4000, kept.time.size))
     for panel, kind in ((top, "nominal"), (bottom, "continuous")):
