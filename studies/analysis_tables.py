@@ -13,7 +13,6 @@ from diagnosis.analysis import (
     TAU,
     Regressed,
     Samples,
-    analysis_figures,
     correlations,
 )
 
@@ -21,6 +20,7 @@ from .outcome import AXES
 from .study_report import Report
 
 RECIPES = ("PLS1", "PLS2", "PLS3", "PLS4")
+POINTS = 2000  # at most in a scatter plot; chosen
 MOST = 8  # factors of the curve of Fig. 7.6a; chosen
 NAMES = [*OMEGA, *NU, *TAU]
 
@@ -41,7 +41,7 @@ def write_components(report: Report, s: Samples, name: str) -> None:
         f"{100.0 * bad.mean():.1f} % of the samples are beyond one and are removed."
     )
     report.figure(f"{name}_scatter", scatter(s), "ω against ν (Fig. 7.4).")
-    shown = analysis_figures.before_and_after(s.nu, ~bad)
+    shown = analysis.before_and_after(s.nu, ~bad)
     report.figure(f"{name}_outliers", shown, "ν before and after the outliers went (Fig. 7.5).")
 
 
@@ -49,7 +49,7 @@ def scatter(s: Samples) -> Figure:
     """Each component of the model error against each of the velocity."""
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     panels = figure.subplots(3, 3)
-    rows = analysis_figures.thinned(s.time.size)
+    rows = slice(None, None, max(1, s.time.size // POINTS))
     for k, line in enumerate(panels):
         for j, panel in enumerate(line):
             panel.plot(s.nu[rows, j], s.omega[rows, k], ".", markersize=1.5)
@@ -75,17 +75,17 @@ def write_regressions(report: Report, found: Mapping[str, Regressed], name: str)
         r = found[recipe]
         part = r.parts[0]
         points, labels = correlations(r, part)
-        shown = analysis_figures.loadings(points, labels, "factor")
+        shown = analysis.loadings(points, labels, "factor")
         report.figure(f"{name}_{recipe}_loadings", shown, f"{recipe}: loadings (Fig. {figure}).")
     r = found["PLS2"]
     part, scale = r.parts[0], r.X.std(axis=0, ddof=1)
     for k, axis in enumerate(AXES):
-        bars = analysis_figures.coefficient_bars(part.B[k] * scale, part.std[k] * scale, r.columns, axis)
+        bars = analysis.coefficient_bars(part.B[k] * scale, part.std[k] * scale, r.columns, axis)
         caption = f"PLS2: force by one standard deviation of each column, {axis} (Fig. 7.7)."
         report.figure(f"{name}_PLS2_{axis}", bars, caption)
     predicted = {n: found[n].predicted for n in ("PLS1", "PLS3", "PLS4")}
     lap = slice(0, r.samples.time.size // 4)
-    shown = analysis_figures.model_error_over_time(
+    shown = analysis.model_error_over_time(
         r.samples.omega[lap], {n: x[lap] for n, x in predicted.items()}, r.samples.time[lap]
     )
     report.figure(f"{name}_PLS", shown, "ω and what the regressions make of it (Fig. 7.10).")

@@ -8,7 +8,7 @@ of the model error goes back into the ship by the effect ``linear_map``::
     diagnosis.model.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
 """
 
-from . import analysis_figures
+from .analysis_figures import before_and_after, coefficient_bars, loadings, model_error_over_time
 from .concurrent_passes import Identified, explained, identify
 from .constrained_fit import Stable, nearest_stable
 from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
@@ -33,8 +33,9 @@ __all__ = [
     "Regressed",
     "Samples",
     "Stable",
-    "analysis_figures",
     "as_model",
+    "before_and_after",
+    "coefficient_bars",
     "correlations",
     "effective_thrust",
     "explained",
@@ -43,7 +44,9 @@ __all__ = [
     "goes_into_the_plant",
     "identify",
     "joined",
+    "loadings",
     "model_error",
+    "model_error_over_time",
     "nearest_stable",
     "outliers",
     "plant",
