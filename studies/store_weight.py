@@ -46,7 +46,7 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
             found[f"{name}|{PLAIN}|1"] = own
             continue
         for form, changes in (FORMS | UNTOLD).items():
-            told = {} if form in FORMS else {"optional_connections": []}
+            told: Content = {} if form in FORMS else {"optional_connections": []}
             for weight in WEIGHTS:
                 values = {**changes, "controller.store_weight": weight}
                 found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values, **told)
