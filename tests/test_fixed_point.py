@@ -10,13 +10,13 @@ from support.project import COMPONENTS
 
 from fmus.controller.fixed_point import SETTLES, SOON, FixedPoint, Now, advanced, body, covariance, later
 from fmus.controller.models import ROTATIONAL
-from fmus.hull import motion
+from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
 from fmus.signals import Force
 from fmus.vessel import vessel
 
 H = 0.02
 SPAN = 1.0
-HULL = vessel.COMPONENT.prepare(vessel.COMPONENT.params()).hull
+HULL = Hull(Inertia(), inverse_mass(Inertia()), Damping())
 
 
 def voyage(seconds=40.0):
