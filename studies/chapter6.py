@@ -1,22 +1,27 @@
 """The basin trials of chapter 6 in simulation: ``python -m studies.chapter6``.
 
 Four controllers follow both paths at two speeds with the gains of Table 6.4, through noise, freezes and
-spikes, while the plant hides what the thesis identified of the real ship (SYSID4 of Table 7.1), with and
-without the fault of its guidance. Each lesson of 6.5 is held against the result.
+spikes, with and without the fault of the guidance. The plant hides what the thesis identified of the
+real ship (SYSID4 of Table 7.1), or with ``--model`` what ``diagnosis.learn`` found of it. Each lesson
+of 6.5 and each observation of 6.4.4 is held against the result.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import cosim
 from cosim.results import draw
+from diagnosis.model import read_model
 
+from . import sysid4
 from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found, Runs, label, lost, mean
 from .lessons import DELAYS, lessons
 from .margin import SETTINGS
+from .model_loops import parameters_of
 from .monte_carlo import Content, run_all, vary
+from .observations import observations
 from .store_contents import logged, store_contents
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
@@ -37,40 +42,42 @@ STORES = {
 }
 
 Jobs = dict[Any, dict[str, Content]]
+# What is hidden in the plant: ``instance.parameter`` -> value.
+Plant = Mapping[str, float]
 
 
-def trials(all_trials: Sequence[Trial]) -> Jobs:
+def trials(all_trials: Sequence[Trial], plant: Plant) -> Jobs:
     """(trial, with the guidance fault) -> controller -> scenario."""
     return {
-        (t.name, faulty): {c: scenario(t, c, faulty) for c in CONTROLLERS}
+        (t.name, faulty): {c: scenario(t, c, faulty, plant=plant) for c in CONTROLLERS}
         for t in all_trials
         for faulty in (REGULAR, FAULTY)
     }
 
 
-def spiked(trial: Trial) -> Jobs:
+def spiked(trial: Trial, plant: Plant) -> Jobs:
     """(store, with spikes) -> controller -> scenario."""
     return {
-        (store, spikes): {c: scenario(trial, c, spikes=spikes, parameters=p) for c in CL}
+        (store, spikes): {c: scenario(trial, c, spikes=spikes, parameters=p, plant=plant) for c in CL}
         for store, p in STORES.items()
         for spikes in (False, True)
     }
 
 
-def slow_eight(trial: Trial) -> Jobs:
+def slow_eight(trial: Trial, plant: Plant) -> Jobs:
     """(blocker, with spikes) -> controller -> scenario: what is not among the trials."""
     return {
-        (OPENED, False): {c: scenario(trial, c, spikes=False) for c in (CLZ, CLE)},
-        (BLOCKED, True): {c: scenario(trial, c, parameters=BLOCKER) for c in (CLZ, CLE)},
+        (OPENED, False): {c: scenario(trial, c, spikes=False, plant=plant) for c in (CLZ, CLE)},
+        (BLOCKED, True): {c: scenario(trial, c, parameters=BLOCKER, plant=plant) for c in (CLZ, CLE)},
     }
 
 
-def delayed(trial: Trial) -> Jobs:
+def delayed(trial: Trial, plant: Plant) -> Jobs:
     """(gains, delay of the thrusters [s]) -> controller -> scenario; half a run."""
-    half = trial._replace(seconds=0.5 * trial.seconds)
+    half, own = trial._replace(seconds=0.5 * trial.seconds), plant.get("thrusters.delay", 0.0)
     return {
         (name, delay): {
-            c: scenario(half, c, spikes=False, parameters=gains(*k) | {"thrusters.delay": delay})
+            c: scenario(half, c, False, False, gains(*k) | {"thrusters.delay": own + delay}, plant)
             for c in (ABS, CLZ)
         }
         for name, k in SETTINGS.items()
@@ -78,14 +85,17 @@ def delayed(trial: Trial) -> Jobs:
     }
 
 
-def storing(trial: Trial) -> dict[str, Content]:
+def storing(trial: Trial, plant: Plant) -> dict[str, Content]:
     """Controller -> scenario with spikes and no blocker, of which all is logged that its store needs."""
     return {
-        c: vary(scenario(trial, c, parameters=OPEN), log={"signals": logged(f"{c}.fmu")}) for c in CL
+        c: vary(scenario(trial, c, parameters=OPEN, plant=plant), log={"signals": logged(f"{c}.fmu")})
+        for c in CL
     }
 
 
-def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Found:
+def run(
+    out: Path, seeds: Sequence[int], shorter: float, jobs: int | None, plant: Plant, causes: bool
+) -> Found:
     """Everything; the logs of the first seed of each trial stay in ``logs``.
 
     Args:
@@ -93,24 +103,28 @@ def run(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Fo
         seeds: of noise, freezes and spikes.
         shorter: factor on the time of every run.
         jobs: runs at a time.
+        plant: what is hidden.
+        causes: whether the experiments on spikes, stores and delay are made as well.
     """
     every = [t._replace(seconds=shorter * t.seconds) for t in TRIALS]
     few, slow = seeds[:FEW], every[0]
-    sailing = trials(every)
+    sailing = trials(every, plant)
     groups = [
-        (sailing, seeds),
-        (spiked(slow), seeds),
-        (slow_eight(every[1]), seeds),
-        (delayed(slow), few),
+        (spiked(slow, plant), few),
+        (slow_eight(every[1], plant), seeds),
+        (delayed(slow, plant), few),
     ]
-    stores = storing(slow)
-    total = sum(len(c) * len(s) for group, s in groups for c in group.values()) + len(stores) * len(few)
+    stores = storing(slow, plant)
+    if not causes:
+        groups, stores = [({}, few)] * 3, {}
+    every_group = [(sailing, seeds), *groups, ({"": stores}, few)]
+    total = sum(len(c) * len(s) for group, s in every_group for c in group.values())
     with progress(total, "chapter 6") as advance:
         logs = out / "logs"
         first = together(sailing, seeds[:1], logs, jobs, advance)
         rest = together(sailing, seeds[1:], None, jobs, advance)
         sailed_all = {k: {c: first[k][c] + rest[k][c] for c in runs} for k, runs in first.items()}
-        others = [together(group, some, None, jobs, advance) for group, some in groups[1:]]
+        others = [together(group, some, None, jobs, advance) for group, some in groups]
         kept = run_all(stores, few, store_contents, None, jobs, advance)
     return Found(sailed_all, others[0], others[1], others[2], kept)
 
@@ -141,34 +155,61 @@ def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
 
 
 def pictures(report: Report, seed: int) -> None:
-    """The pictures of 6.4 for every trial, with the fault as in the basin and without."""
+    """The pictures of 6.4 for every trial, with the fault as in the basin (Figs. 6.10 to 6.25)."""
     for trial in TRIALS:
-        for faulty in (FAULTY, REGULAR):
-            name = label(trial.name, faulty)
-            place = folder((trial.name, faulty))
-            logs = report.folder / "logs" / place
-            draw(
-                {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS},
-                report.folder / place,
-            )
-            for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
-                caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
-                report.picture(f"{place}/{file}.png", caption)
+        name, place = label(trial.name, FAULTY), folder((trial.name, FAULTY))
+        logs = report.folder / "logs" / place
+        shown = {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS}
+        draw(shown, report.folder / place)
+        for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
+            caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
+            report.picture(f"{place}/{file}.png", caption)
 
 
-def study(out: Path, seeds: Sequence[int], shorter: float, jobs: int | None) -> Path:
+def hidden(model: Path | None) -> tuple[str, Plant]:
+    """What is hidden in the plant, in words and as parameters.
+
+    Raises:
+        InputError: a file that is no parameter set of vessel and thrusters.
+    """
+    if model is None:
+        text = (
+            "Table 2.1 (corrected) with SYSID4 of Table 7.1 in it: X_|u|u, X_u and X_|u|r added, the "
+            "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment lost."
+        )
+        return text, sysid4.parameters()
+    values = parameters_of(read_model(model))
+    if not values:
+        raise cosim.InputError(f"'{model}' holds no parameter of vessel or thrusters")
+    listed = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+    return f"Table 2.1 (corrected) with what `{model.name}` adds to it: {listed}.", values
+
+
+def study(
+    out: Path,
+    seeds: Sequence[int],
+    shorter: float,
+    jobs: int | None,
+    model: Path | None = None,
+    causes: bool = True,
+) -> Path:
     """Run everything and write the report; returns its path."""
-    found = run(out, seeds, shorter, jobs)
-    report = Report(out, "Chapter 6 in simulation: which lessons come out again?", seeds)
+    text, plant = hidden(model)
+    found = run(out, seeds, shorter, jobs, plant, causes)
+    name = "SYSID4" if model is None else "the ship that was learned"
+    report = Report(out, f"Chapter 6 in simulation, {name}: which lessons come out again?", seeds)
     report.text(
-        "Plant: Table 2.1 (corrected) with SYSID4 of Table 7.1 in it: X_|u|u, X_u and X_|u|r added, the "
-        "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment lost. "
-        "Controllers: gains of Table 6.4, ignorant of all that. Noise 0.2 mm and 0.3 mrad, freezes of "
-        "0.1 to 1 s once in 20 s, and once a minute a single sample that is 0.1 m and 0.1 rad off. "
-        "`fault`: guidance set to a quarter of the speed, and called four times as often. The eight at "
-        "0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms stored errors anew, "
-        "unless it says `as printed`."
+        f"Plant: {text} Controllers: gains of Table 6.4, ignorant of all that. Noise 0.2 mm and "
+        "0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a single sample that is 0.1 m "
+        "and 0.1 rad off. `fault`: guidance set to a quarter of the speed, and called four times as "
+        "often. The eight at 0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms "
+        "stored errors anew, unless it says `as printed`. "
+        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else "")
     )
+    report.heading("The ellipse at 0.16 m/s (6.4.4)")
+    seen = observations(found)
+    report.table(["thesis", "here", "numbers"], [list(row) for row in seen], words=True)
+    report.result("observations", [row._asdict() for row in seen])
     report.heading("Lessons learned (6.5)")
     rows = lessons(found)
     report.table(["thesis", "here", "numbers and cause"], [list(row) for row in rows], words=True)
@@ -193,11 +234,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = study_parser(
         "chapter6",
         "Run the basin trials of chapter 6 in simulation and check the lessons learned (6.5).",
-        "  python -m studies.chapter6\n  python -m studies.chapter6 --quick --out results/first_look",
+        "  python -m studies.chapter6 --seeds 3\n"
+        "  python -m studies.chapter6 --model results/learn/model.ssv --out results/chapter6_learned\n"
+        "  python -m studies.chapter6 --quick --out results/first_look",
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="parameter set of the ship, as diagnosis.learn writes it (SYSID4)",
+    )
+    parser.add_argument(
+        "--trials", action="store_true", help="the trials alone, without the experiments on causes"
     )
     options = parser.parse_args(arguments)
-    seeds = range(2 if options.quick else options.seeds)
-    run_study(partial(study, options.out, seeds, 0.25 if options.quick else 1.0, options.jobs))
+    seeds, shorter = range(2 if options.quick else options.seeds), 0.25 if options.quick else 1.0
+    run_study(
+        partial(study, options.out, seeds, shorter, options.jobs, options.model, not options.trials)
+    )
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ by the four controllers of chapter 6: PCA and PLS of these runs in a row with th
 filter, SysID of a run with the ship's true states, and the models of PLS back in the ship.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -15,10 +15,11 @@ import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import analysis
 from diagnosis.analysis import Regressed, Samples
-from diagnosis.model import write_model
 
-from . import sysid4
-from .monte_carlo import Content, run_all, shipped, vary
+from . import analysis_tables as tables
+from . import basin, sysid4
+from .model_loops import eigenvalues, write_loops
+from .monte_carlo import Content, run_all, vary
 from .outcome import AXES
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
@@ -29,7 +30,6 @@ FORCE = [f"thrusters.tau_cmd_{a}" for a in AXES]
 SEEN = [f"observer.{n}_m" for n in ("x", "y", "psi")]
 TRACK = ["vessel.x", "vessel.y", "vessel.psi", "guidance.x_t", "guidance.y_t", "guidance.psi_t"]
 LOG = {"signals": [*STATE, *FORCE, *SEEN, *TRACK], "every": 1}
-MODELS = ("PLS1", "PLS2", "PLS3", "PLS4")
 
 
 def logged(content: Content, seconds: float | None) -> Content:
@@ -61,90 +61,87 @@ def true_samples(run: Path) -> Samples:
     return Samples(names, log["time"], nu, nu_dot, tau, analysis.model_error(nu, nu_dot, tau))
 
 
-def components(report: Report, samples: Samples) -> None:
-    """PCA of model error, velocity and force."""
-    names = [f"{s}_{a}" for s in ("omega", "nu", "tau") for a in AXES]
-    X = np.hstack([samples.omega, samples.nu, samples.tau])
-    m = analysis.fit_components(X, names, 4)
-    bad = analysis.outliers(m, X)
-    report.heading("Principal components (7.3)")
-    report.text(
-        f"Four components explain {100.0 * m.explained[3]:.1f} % of {samples.time.size} samples; limits "
-        f"at 99 %: T² {m.t2_limit:.3g}, Q {m.q_limit:.3g}; {100.0 * bad.mean():.1f} % of the samples "
-        "are beyond one."
-    )
-
-
-def closed_loop(found: Regressed, out: Path, seconds: float | None) -> float:
-    """Position error [m] of backstepping on the ellipse with a model in the plant; NaN: it broke off."""
-    file = out / f"{found.recipe.name}.ssv"
-    write_model(file, analysis.as_model(found.c, found.B, found.columns))
-    system = cosim.load_scenario(logged(shipped("ellipse_bs"), seconds))
-    result = cosim.simulate(system, out / "logs" / found.recipe.name, parameters=[file])
-    return result.metrics.get("e_pos_rms", float("nan"))
-
-
-def regressions(report: Report, samples: Samples, out: Path, seconds: float | None) -> None:
-    """PLS1 to PLS4, and each that the plant can have in the closed loop."""
-    kept = analysis.without_outliers(samples)
+def identification(report: Report, runs: Sequence[tuple[str, Samples]]) -> None:
+    """SysID by concurrent learning of one run by several estimates of its motion (7.2)."""
+    found = {name: (analysis.identify([s]), s) for name, s in runs}
     rows = []
-    for name in MODELS:
-        found = analysis.regressed(kept, analysis.recipe(name))
-        shares = [found.by_axis(key) for key in ("r2", "q2")]
-        cells = [" / ".join(f"{s[a]:.3f}" for s in shares) for a in AXES]
-        if analysis.goes_into_the_plant(found.columns):
-            thrust = analysis.thrust_of(found)
-            values = ", ".join(f"{x:.3f}" for x in sorted(np.real(thrust.eigenvalues)))
-            cells += [values, "yes" if thrust.holds else "no", closed_loop(found, out, seconds)]
-        else:
-            cells += ["–", "–", "–"]
-        rows.append([name, *cells])
-    report.heading("Partial least squares (Table 7.2) and the ship with it (7.4)")
-    header = [
-        "recipe",
-        *(f"R² / Q² {a}" for a in AXES),
-        "eigenvalues of I + B_τ",
-        "check",
-        "position [m]",
+    for k, (name, hidden) in enumerate(zip(analysis.NAMES, sysid4.PHI, strict=True)):
+        rows.append([name, hidden, *(float(f.phi[k]) for f, _ in found.values())])
+    r2 = {name: analysis.explained([s], f.phi) for name, (f, s) in found.items()}
+    for k, axis in enumerate(AXES):
+        rows.append([f"R² of ω {axis}", "", *(f"{x[k]:.4f}" for x in r2.values())])
+        rows.append(
+            [f"condition number {axis}", "", *(f"{f.condition[k]:.3g}" for f, _ in found.values())]
+        )
+    report.table(["coefficient", "hidden", *found], rows)
+    passes = ", ".join(f"{name}: {f.passes} passes" for name, (f, _) in found.items())
+    report.text(
+        f"Backstepping on the ellipse at 0.08 m/s, no fault of the guidance, no noise. {passes}. By the "
+        "derivative filter the coefficients lean on its lag: what is regular is ω."
+    )
+
+
+def simulated(
+    report: Report, samples: Samples, true: Sequence[tuple[str, Samples]]
+) -> Mapping[str, Regressed]:
+    """All of the analysis of the simulated runs; returns the regressions."""
+    report.heading("Principal components (7.3)")
+    tables.write_components(report, samples, "simulated")
+    report.heading("Partial least squares (Table 7.2)")
+    found = tables.regressions(samples)
+    rows = [
+        [name, *tables.shares(r), r.by_axis("factors")["X"], len(r.columns)] for name, r in found.items()
     ]
-    report.table(header, rows)
+    report.table(["recipe", *(f"R² / Q² {a}" for a in AXES), "factors", "columns"], rows)
+    tables.write_findings(report, found)
+    tables.write_regressions(report, found, "simulated")
+    tables.write_shapes(report, samples, "simulated")
+    report.heading("Table 7.1 on these runs (Fig. 7.2)")
+    tables.write_table_7_1(report, samples)
+    report.heading("SysID by concurrent learning (7.2), SYSID4 hidden")
+    identification(report, true)
+    return found
+
+
+def measured(report: Report, data: Path) -> None:
+    """The same analysis of the real runs."""
+    runs = analysis.gather_samples(basin.files(data), "smoothed")
+    samples = analysis.joined(runs)
+    report.heading("The real ship")
     report.text(
-        "`position`: RMS error of backstepping on the ellipse with that model in the plant, no fault of "
-        "the guidance. `check`: sym(I + B_τ) ≥ 0.05 I, known before the simulation."
+        f"NTNU's runs {', '.join(samples.names)} in a row, five commands, velocities by the smoother. "
+        " They are not the thesis' runs: dynamic positioning and sailing by hand."
     )
-
-
-def identification(report: Report, samples: Samples) -> None:
-    """SysID by concurrent learning with the ship's true states."""
-    found = analysis.identify([samples])
-    r2 = analysis.explained([samples], found.phi)
-    report.heading("SysID by concurrent learning (7.2), true states")
-    rows = zip(analysis.NAMES, sysid4.PHI, found.phi, found.least_squares, strict=True)
+    tables.write_components(report, samples, "measured")
+    found = tables.regressions(samples)
     report.table(
-        ["coefficient", "hidden", "found", "least squares"], [[n, *map(float, x)] for n, *x in rows]
+        ["recipe", *(f"R² / Q² {a}" for a in AXES), "eigenvalues of I + B_τ"],
+        [[name, *tables.shares(r), eigenvalues(r)] for name, r in found.items()],
     )
-    report.text(
-        f"{found.passes} passes; R² of ω in X, Y, N: {', '.join(f'{x:.4f}' for x in r2)}; condition "
-        f"numbers {', '.join(f'{x:.3g}' for x in found.condition)}."
-    )
+    tables.write_findings(report, found)
+    tables.write_regressions(report, found, "measured")
+    tables.write_table_7_1(report, samples)
 
 
-def study(out: Path, seconds: float | None, jobs: int | None) -> Path:
+def study(out: Path, seconds: float | None, jobs: int | None, data: Path | None) -> Path:
     """Run everything and write the report; returns its path."""
     todo, logs = scenarios(seconds), out / "logs"
     with progress(len(todo), "chapter 7") as advance:
         run_all(todo, [0], folder, logs, jobs, advance)
     report = Report(out, "Chapter 7: the analysis of the model error", [0])
-    runs = analysis.gather_samples([logs / c / "0" for c in CONTROLLERS], "mdf")
-    samples = analysis.joined(runs)
+    samples = analysis.joined(analysis.gather_samples([logs / c / "0" for c in CONTROLLERS], "mdf"))
     report.text(
         f"Runs in a row: {', '.join(LABELS[c] for c in CONTROLLERS)}; ellipse at 0.08 m/s, SYSID4 in "
         "the plant, gains of Table 6.4, guidance fault, spikes; velocities by the modified derivative "
         "filter."
     )
-    components(report, samples)
-    regressions(report, samples, out, seconds)
-    identification(report, true_samples(logs / "true" / "0"))
+    quiet = logs / "true" / "0"
+    true = [("true states", true_samples(quiet))]
+    true += [(by, analysis.gather_samples([quiet], by)[0]) for by in ("smoothed", "mdf")]
+    found = simulated(report, samples, true)
+    write_loops(report, found, seconds, jobs)
+    if data is not None:
+        measured(report, data)
     return report.write()
 
 
@@ -153,11 +150,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = study_parser(
         "chapter7",
         "Principal components, PLS and SysID of simulated basin runs, and their models in the ship.",
-        "  python -m studies.chapter7\n  python -m studies.chapter7 --quick",
+        "  python -m studies.chapter7 --data ~/data\n  python -m studies.chapter7 --quick",
         seeds=None,
     )
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="folder with cse1/*.mat, measured runs (none)"
+    )
     options = parser.parse_args(arguments)
-    run_study(partial(study, options.out, 60.0 if options.quick else None, options.jobs))
+    run_study(partial(study, options.out, 60.0 if options.quick else None, options.jobs, options.data))
 
 
 if __name__ == "__main__":

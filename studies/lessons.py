@@ -265,16 +265,16 @@ def fallen(found: Found) -> Verdict:
     )
 
 
+def of_trials(found: Found) -> list[Verdict]:
+    """The lessons that the trials alone tell, in the order of 6.5."""
+    return [guidance(found), fallen(found), adaptive(found), surge_error(found), no_surge(found)]
+
+
+def of_causes(found: Found) -> list[Verdict]:
+    """The lessons that need the experiments on spikes, stores and delay."""
+    return [*spikes(found), eight(found), estimators(), oscillation(found)]
+
+
 def lessons(found: Found) -> list[Verdict]:
-    """Every lesson with its verdict, in the order of 6.5."""
-    return [
-        guidance(found),
-        fallen(found),
-        adaptive(found),
-        surge_error(found),
-        no_surge(found),
-        *spikes(found),
-        eight(found),
-        estimators(),
-        oscillation(found),
-    ]
+    """Every lesson with its verdict, those of the experiments where they were made."""
+    return of_trials(found) + (of_causes(found) if found.spiked else [])

@@ -1,7 +1,8 @@
 """The weight of the stored sums, footnote 1 of 4.1.4: ``python -m studies.store_weight``.
 
 The four variants of concurrent learning on both paths with the ship's true state and no noise: stored
-errors formed anew or as printed (stale), samples of saturated thrusters left out or not, four weights.
+errors formed anew or as printed (stale), samples of large forces left out or not, four weights; and once
+more as printed, where learning takes the force that is asked for to be the one that acts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,13 +18,17 @@ from .study_report import Report
 from .verdict import FOUR, OLD
 
 WEIGHTS = (1.0, 0.1, 0.05, 0.01)
-# Of the table: fresh or stale, and whether samples of saturated thrusters are kept out.
+# Of the table: fresh or stale, and whether samples of forces above 2 N are kept out.
 FORMS = {
     "fresh, gated": {},
     "fresh, ungated": UNGATED,
     "stale, gated": {"controller.stale": 1.0},
     "stale, ungated": {"controller.stale": 1.0, **UNGATED},
 }
+# Forms of which the controller is not told the clipped force, as printed.
+UNTOLD = {f"{form}, request": changes for form, changes in FORMS.items() if "ungated" in form}
+# Condition 1 is that the stored regressors have full rank: sigma_min above ``rank_tolerance``.
+TOLERANCE = 0.01
 # The thesis' order (5.3.3, 5.4.3), best first.
 ORDER = ("win_eps", "svd_eps", "win_z2", "svd_z2", "abs", "bs")
 PLAIN = "as it is"
@@ -40,10 +45,11 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
         if name not in FOUR:
             found[f"{name}|{PLAIN}|1"] = own
             continue
-        for form, changes in FORMS.items():
+        for form, changes in (FORMS | UNTOLD).items():
+            told: Content = {} if form in FORMS else {"optional_connections": []}
             for weight in WEIGHTS:
                 values = {**changes, "controller.store_weight": weight}
-                found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values)
+                found[f"{name}|{form}|{weight:g}"] = vary(own, parameters=values, **told)
     return found
 
 
@@ -59,15 +65,23 @@ def tables(report: Report, path: str, found: Mapping[str, Sequence[Outcome]]) ->
     report.text(
         "Position error, RMS [m]. " + ", ".join(f"{n}: {x:.4f}" for n, x in plain.items() if n in ORDER)
     )
-    rows = []
-    for form in FORMS:
+    rows, sigmas = [], []
+    for form in FORMS | UNTOLD:
         for weight in WEIGHTS:
-            errors = {label(n): found[f"{n}|{form}|{weight:g}"][0].position for n in FOUR}
+            runs = {label(n): found[f"{n}|{form}|{weight:g}"][0] for n in FOUR}
+            errors = {name: o.position for name, o in runs.items()}
             every = [{**errors, **plain}[n] for n in ORDER]
             same = all(a < b for a, b in pairwise(every))
             cells = [f"{errors[n]:.4f}" for n in ORDER[:4]]
             rows.append([f"{form}, {weight:g}", *cells, "yes" if same else "no"])
+            shown = [f"{runs[n].sigma:.2g} ({100.0 * runs[n].rank:.0f} %)" for n in ORDER[:4]]
+            sigmas.append([f"{form}, {weight:g}", *shown])
     report.table(["stored errors, samples, weight", *ORDER[:4], "thesis' order"], rows)
+    report.text(
+        "σ_min of the store at the end, and the share of the time in which Condition 1 is met "
+        f"(σ_min above {TOLERANCE:g}):"
+    )
+    report.table(["stored errors, samples, weight", *ORDER[:4]], sigmas)
 
 
 def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | None) -> Path:
@@ -77,7 +91,9 @@ def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | No
     report.text(
         "Footnote 1 of 4.1.4 reduces the stored part of the adaptation by ρ = 0.1: a "
         "weight of every stored sum. True states, no noise, one run each. `stale`: stored errors as "
-        "Algorithms 1 and 2 print them. `ungated`: samples of saturated thrusters are stored too."
+        "Algorithms 1 and 2 print them. `ungated`: samples of forces above 2 N are stored "
+        "too. `request`: the controller is not told the clipped force and learns from what it asks "
+        "for, as printed."
     )
     with progress(sum(map(len, todo.values())), "store weight") as advance:
         for path, contents in todo.items():

@@ -9,10 +9,11 @@ from scipy.spatial import KDTree
 
 from cosim.dispatch import FinishedRun
 from cosim.scenario import Roles
+from diagnosis.analysis import model_error
 
 from . import sysid4
 from .monte_carlo import Content, shipped, vary
-from .outcome import SETTLED, Log, missing, quick, rms
+from .outcome import AXES, SETTLED, Log, quick, rms
 
 RBS, ABS = "controller_bs", "controller_abs"
 CLZ, CLE = "controller_cl_win_z2", "controller_cl_win_eps"
@@ -27,10 +28,8 @@ HARD: dict[str, float] = dict(zip(AXIS_NAMES, (0.2, 0.6, 0.2, 3.0, 6.0, 3.0), st
 # A marker taken for its neighbour once a minute; its velocity is a spike like those of Fig. 6.8.
 POSE = ["observer.x_m", "observer.y_m", "observer.psi_m"]
 SPIKES = {"kind": "spikes", "signals": POSE, "size": [0.1, 0.1, 0.1], "rate": 1.0 / 60.0}
-LOGGED = [
-    *Roles().columns[1:],
-    "controller.z1_x",
-]
+MOTION = [f"vessel.{name}" for name in ("u", "v", "r", "u_dot", "v_dot", "r_dot")]
+LOGGED = [*dict.fromkeys([*Roles().columns[1:], "controller.z1_x", *MOTION])]
 LOST = 2.0  # m; the target is then on the other side of the path
 SLOW = 0.1  # Hz; the path itself asks for less
 
@@ -66,8 +65,9 @@ def scenario(
     faulty: bool = False,
     spikes: bool = True,
     parameters: Mapping[str, float] | None = None,
+    plant: Mapping[str, float] | None = None,
 ) -> Content:
-    """A trial with SYSID4 hidden in the plant and the gains of Table 6.4.
+    """A trial with something hidden in the plant and the gains of Table 6.4.
 
     Args:
         trial: path and true speed of the target.
@@ -75,13 +75,15 @@ def scenario(
         faulty: guidance is set to a quarter of the speed and called four times as often.
         spikes: whether the pose has spikes, beside the noise and freezes of the shipped scenario.
         parameters: further ``instance.parameter`` -> value; they win.
+        plant: what is hidden, ``instance.parameter`` -> value; SYSID4 by default.
     """
     base = shipped(trial.path)
     calls = 4.0 if faulty else 1.0
+    hidden = sysid4.parameters() if plant is None else dict(plant)
     return vary(
         base,
         {"controller": f"{controller}.fmu"},
-        sysid4.parameters()
+        hidden
         | gains(HARD)
         | {"guidance.u_t": trial.u_t / calls, "guidance.calls": calls}
         | dict(parameters or {}),
@@ -101,7 +103,8 @@ class Sailed(NamedTuple):
         cross_track, heading: RMS of e [m] and of the heading error [rad].
         first, lag: z1_x [m], mean over the first and the second half.
         inside: how far inside of the path the ship is, mean over the second half [m].
-        omega_X: model error in surge with the lost thrust, mean magnitude [N].
+        omega_X: model error in surge, (7.7) with the force after clipping, mean magnitude [N].
+        omega_Y: the same in sway, mean [N]; positive pushes to starboard.
         omega_hat_X: its estimate, largest magnitude [N].
         iae, work, iaew, iaewwt: metrics of 4.4.
         swing: true yaw rate faster than 0.1 Hz, RMS [rad/s].
@@ -116,6 +119,7 @@ class Sailed(NamedTuple):
     lag: float
     inside: float
     omega_X: float
+    omega_Y: float
     omega_hat_X: float
     iae: float
     work: float
@@ -125,7 +129,7 @@ class Sailed(NamedTuple):
     frequency: float
 
 
-BROKEN = Sailed(1.0, *[float("nan")] * 14)
+BROKEN = Sailed(1.0, *[float("nan")] * 15)
 
 
 def inside(log: Log, part: np.ndarray) -> float:
@@ -149,6 +153,10 @@ def sailed(run: FinishedRun) -> Sailed:
     m, z1_x, h = run.metrics, log["controller.z1_x"], t[1] - t[0]
     distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     swing = quick(log["vessel.r"], h, SLOW)[settled]
+    # Of the control model, whatever parameters the plant has; omega_star of the vessel is of its own.
+    motion = np.column_stack([log[name] for name in MOTION])[settled]
+    tau = np.column_stack([log[f"thrusters.tau_cmd_{a}"] for a in AXES])[settled]
+    omega = model_error(motion[:, :3], motion[:, 3:], tau)
     frequencies, power = signal.periodogram(swing, 1.0 / h)
     return Sailed(
         lost=float(distance[half].max() > LOST),
@@ -158,7 +166,8 @@ def sailed(run: FinishedRun) -> Sailed:
         first=float(z1_x[settled & ~half].mean()) if (settled & ~half).any() else float("nan"),
         lag=float(z1_x[half].mean()),
         inside=inside(log, half),
-        omega_X=float(np.abs(missing(log, "X")[settled]).mean()),
+        omega_X=float(np.abs(omega[:, 0]).mean()),
+        omega_Y=float(omega[:, 1].mean()),
         omega_hat_X=float(np.abs(log["controller.omega_hat_X"]).max()),
         iae=m["IAE"],
         work=m["W"],

@@ -6,7 +6,7 @@ from support.cases import in_part
 from support.loops import closed_loop, ellipse_target, multisine_target, unlimited
 from support.project import COMPONENTS
 
-from fmus.controller.adaptive import Disturbance
+from fmus.controller.adaptive import Disturbance, adaptive
 from fmus.controller.learning import Drive, learned, remembered
 from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
 from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, summed
@@ -51,6 +51,27 @@ def test_lyapunov_function_never_grows(name):
         growth.append(max(np.diff(values).max(), 0.0))
         assert values[-1] < values[0]
     assert growth[1] <= 0.5 * growth[0]
+
+
+def test_lyapunov_function_of_the_loss_of_thrust_alone_never_grows():
+    """Nothing but the losses (7.4) is unknown, and z2 alone teaches them, (A.9) with F = -diag(tau)."""
+    component = adaptive("controller_delta", "Losses of thrust alone", SURGE)
+    loss = (0.3, -0.1, 0.31)
+    hull = RotationalDamping()
+    p = component.params(
+        phi=SURGE.start(0.0, 0.0, 0.0, *hull), gamma=SURGE.gamma(*[0.0] * 11, 0.4, 0.4, 0.4)
+    )
+    p = p._replace(truth=SURGE.truth(0.0, 0.0, 0.0, *hull, *loss))
+    growth, last = [], None
+    for h in (0.02, 0.01):
+        loop = closed_loop(component, p, 60.0, h, multisine_target(2.0), AWAY, loss=loss)
+        rows = [(out.energy.lyapunov, out.phi_hat) for *_, out in loop]
+        values = np.array([v for v, _ in rows])
+        growth.append(max(np.diff(values).max(), 0.0))
+        first, last = values[0], np.array(rows[-1][1])[11:]
+        assert values[-1] < 0.2 * first
+    assert growth[1] <= 0.5 * growth[0]
+    assert np.abs(last - loss).max() < 0.1, "and on a rich motion the losses are found"
 
 
 def test_lyapunov_output_is_the_sum_of_its_terms():

@@ -175,6 +175,32 @@ def test_wrong_connection_is_refused_with_both_ends(ellipse, connection, message
     assert message in text
 
 
+def test_optional_connection_is_made_where_both_ends_are_there(ellipse):
+    poses = ["vessel.*", "observer.*"]
+    wanted = {(c.source.name, c.target.name) for c in prepare(load_scenario(ellipse)).connections}
+    assert ("thrusters.tau_cmd_X", "controller.tau_cmd_X") in wanted, "as it is shipped"
+    tau = ellipse["optional_connections"]
+    ellipse["connections"].remove(poses)
+    for optional in (
+        [poses],
+        [poses, ["vessel.x", "observer.x_m"]],  # x_m is connected already
+        [["vessel.x_m", "observer.x_m"], poses],
+        [poses, ["vessel.x_mm", "observer.x_m"], ["vessel.x_*", "observer.q_*"]],  # not there
+    ):
+        ellipse["optional_connections"] = [*optional, *tau]
+        made = [(c.source.name, c.target.name) for c in prepare(load_scenario(ellipse)).connections]
+        assert len(made) == len(wanted)
+        assert set(made) == wanted
+
+
+def test_optional_connection_that_cannot_be_is_told(ellipse):
+    ellipse["optional_connections"] = [["vessel.x", "autopilot.x"]]
+    assert any("no instance 'autopilot'" in w for w in prepare(load_scenario(ellipse)).warnings)
+    ellipse["connections"].remove(["vessel.*", "observer.*"])
+    ellipse["optional_connections"] = [["vessel.u", "observer.x_m"]]
+    assert "optional_connections[0] vessel.u -> observer.x_m: unit 'm/s'" in refused(ellipse)
+
+
 def test_unconnected_input_is_a_warning(ellipse):
     ellipse["connections"].pop(0)
     ellipse["faults"] = []

@@ -7,9 +7,11 @@ import pytest
 
 import cosim
 from cosim.dispatch import FinishedRun
+from diagnosis import Model
+from diagnosis.model import write_model
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
-from studies import chapter6, lessons, margin, store_contents, sysid4, trials
+from studies import chapter6, lessons, margin, observations, store_contents, sysid4, trials
 from studies.estimates_replayed import parameters
 from studies.found import FAULTY, REGULAR, Found, share
 from studies.monte_carlo import shipped, vary
@@ -160,7 +162,7 @@ def test_swift_gains_bear_less_delay():
 
 
 def sailed(**values):
-    zero = trials.Sailed(*[0.0] * 15)
+    zero = trials.Sailed(*[0.0] * 16)
     return zero._replace(**{"position": 0.25, "lag": -0.25, "first": -0.25, "swing": 0.01} | values)
 
 
@@ -215,6 +217,38 @@ def test_those_who_fall_behind_are_told():
     assert lessons.fallen(made_up({trials.RBS: {"lost": 1.0}})).here == "not reproduced"
 
 
+def test_observations_of_the_swift_ellipse():
+    worse, swings, failing, improving, *_ = observations.observations(made_up())
+    for calm in (worse, swings, failing, improving):
+        assert calm.here.endswith("without: no"), calm.thesis
+    fast = trials.TRIALS[2].name
+    found = made_up({trials.ABS: {"position": 0.2}})
+    runs = {
+        c: [r._replace(lost=1.0) for r in found.trials[fast, REGULAR][c]]
+        for c in (trials.CLZ, trials.CLE)
+    }
+    found.trials[fast, REGULAR].update(runs)
+    _, _, failing, improving, *_ = observations.observations(found)
+    assert failing.here.endswith("without: yes")
+    assert improving.here.endswith("without: yes")
+    found.trials[fast, FAULTY].update({trials.RBS: [sailed(lost=1.0)] * 5})
+    assert "with the fault: no run kept up" in observations.observations(found)[3].here
+
+
+def test_any_ship_may_be_hidden(tmp_path):
+    file = tmp_path / "ship.ssv"
+    write_model(file, Model().plus({"delta_X_u": -2.0, "loss_bow": 0.2}))
+    text, plant = chapter6.hidden(file)
+    assert plant == {"vessel.delta_X_u": -2.0, "thrusters.loss_bow": 0.2}
+    assert "vessel.delta_X_u = -2" in text
+    content = trials.scenario(SLOW, trials.RBS, plant=plant)
+    assert "delta_Y_r" not in content["fmus"]["vessel"]["parameters"]
+    assert content["fmus"]["thrusters"]["parameters"] == {"loss_bow": 0.2}
+    write_model(file, Model())
+    with pytest.raises(cosim.InputError, match="no parameter"):
+        chapter6.hidden(file)
+
+
 def test_spikes_are_the_cause_where_they_are():
     def verdict(with_spikes, without):
         given = {c: {"iaew": x} for c, x in ((trials.RBS, 10.0), (trials.ABS, 10.0))}
@@ -237,16 +271,17 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
     draw, sets = chapter6.draw, {}
 
     def one_set(logs, folder):
-        """Of the eight sets of pictures, which differ by their data alone, the first is drawn."""
+        """Of the four sets of pictures, which differ by their data alone, the first is drawn."""
         sets[folder.relative_to(tmp_path).as_posix()] = (
             [path.name for path in draw(logs, folder)] if not sets else []
         )
 
     monkeypatch.setattr(chapter6, "draw", one_set)
-    report = chapter6.study(tmp_path, range(1), 0.02, None)
+    report = chapter6.study(tmp_path, range(1), 0.02, None, None)
     text = report.read_text()
     results = json.loads((tmp_path / "results.json").read_text())
     assert len(results["lessons"]) == 10
+    assert len(results["observations"]) == 6
     assert {len(r) for r in results["trials"].values()} == {4}
     assert len(results["trials"]) == 8
     surge = [
@@ -254,8 +289,8 @@ def test_whole_study_in_small(tmp_path, monkeypatch):
     ]
     assert set(surge) == {0.0}
     pictures = [line.split("](")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")]
-    assert len(pictures) == 40
-    assert len(sets) == 8
+    assert len(pictures) == 20
+    assert len(sets) == 4
     drawn, names = next(iter(sets.items()))
     assert len(names) == 5
     for folder in sets:

@@ -162,6 +162,10 @@ class Scenario(Strict):
         description="[output, input] as instance.variable; a * on both sides connects all variables "
         "whose names agree there",
     )
+    optional_connections: list[tuple[str, str]] = Field(
+        default_factory=list,
+        description="the same, left out where an FMU has no such variable or the input is connected",
+    )
     transformations: dict[str, Transformation] = Field(
         default_factory=dict,
         description="connected input -> what becomes of values on their way there, in place of a "

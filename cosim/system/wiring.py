@@ -25,24 +25,32 @@ def connect(system: System) -> None:
     """
     taken: dict[str, Signal] = {}
     for k, (output, input_) in enumerate(system.scenario.connections):
-        where = f"connections[{k}] {output} -> {input_}"
-        for source, target in _resolve(system, output, input_, where):
-            ends = f"connections[{k}] {source.name} -> {target.name}"
-            if source.variable.causality != "output":
-                raise InputError(f"{ends}: {source.name} is {causality_of(source)}, not an output")
-            if target.variable.causality != "input":
-                raise InputError(f"{ends}: {target.name} is {causality_of(target)}, not an input")
-            if target.name in taken:
-                raise InputError(
-                    f"{ends}: {target.name} is already connected to {taken[target.name].name}"
-                )
-            if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
-                raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
-            taken[target.name] = source
-            system.connections.append(Connection(source, target, _link(source, target, ends, system)))
+        place = f"connections[{k}]"
+        for source, target in _resolve(system, output, input_, f"{place} {output} -> {input_}"):
+            _join(source, target, place, taken, system)
+    for k, (output, input_) in enumerate(system.scenario.optional_connections):
+        place = f"optional_connections[{k}]"
+        for source, target in _present(system, output, input_, f"{place} {output} -> {input_}"):
+            if target.name not in taken:
+                _join(source, target, place, taken, system)
     for name in system.scenario.transformations:
         if name not in taken:
             raise InputError(f"transformations: {name} is not connected{nearest(name, taken)}")
+
+
+def _join(source: Signal, target: Signal, place: str, taken: dict[str, Signal], system: System) -> None:
+    """Add one connection, and note in ``taken`` what feeds its input."""
+    ends = f"{place} {source.name} -> {target.name}"
+    if source.variable.causality != "output":
+        raise InputError(f"{ends}: {source.name} is {causality_of(source)}, not an output")
+    if target.variable.causality != "input":
+        raise InputError(f"{ends}: {target.name} is {causality_of(target)}, not an input")
+    if target.name in taken:
+        raise InputError(f"{ends}: {target.name} is already connected to {taken[target.name].name}")
+    if source.variable.type not in ACCEPTS.get(target.variable.type, ()):
+        raise InputError(f"{ends}: {source.variable.type} cannot feed {target.variable.type}")
+    taken[target.name] = source
+    system.connections.append(Connection(source, target, _link(source, target, ends, system)))
 
 
 def find_free_inputs(system: System) -> None:
@@ -84,6 +92,28 @@ def _resolve(system: System, output: str, input_: str, where: str) -> list[tuple
     """The pairs of a connection: one, or with * on both sides all whose names agree there."""
     if "*" not in output + input_:
         return [(system.find(output, where), system.find(input_, where))]
+    pairs = _group(system, output, input_, where)
+    if not pairs:
+        raise InputError(f"{where}: no output and input agree in the place of *")
+    return pairs
+
+
+def _present(system: System, output: str, input_: str, where: str) -> list[tuple[Signal, Signal]]:
+    """The pairs of an optional connection: those of which both FMUs have their variable."""
+    ends = [end.partition(".") for end in (output, input_)]
+    for instance, _, _ in ends:
+        if instance not in system.models:
+            system.warnings.append(f"{where}: left out, as there is no instance '{instance}'")
+            return []
+    if "*" in output + input_:
+        return _group(system, output, input_, where)
+    if any(variable not in system.models[instance].variables for instance, _, variable in ends):
+        return []
+    return [(system.find(output, where), system.find(input_, where))]
+
+
+def _group(system: System, output: str, input_: str, where: str) -> list[tuple[Signal, Signal]]:
+    """All pairs of output and input whose names agree in the place of *."""
     if output.count("*") != 1 or input_.count("*") != 1:
         raise InputError(f"{where}: a group needs exactly one * on each side")
     head, tail = _around(output)
@@ -104,8 +134,6 @@ def _resolve(system: System, output: str, input_: str, where: str) -> list[tuple
             other = system.models[target].variables.get(partner)
             if other is not None and other.causality == "input":
                 pairs.append((Signal(source, variable), Signal(target, other)))
-    if not pairs:
-        raise InputError(f"{where}: no output and input agree in the place of *")
     return pairs
 
 

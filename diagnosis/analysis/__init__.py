@@ -8,19 +8,24 @@ of the model error goes back into the ship by the effect ``linear_map``::
     diagnosis.model.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
 """
 
+from .analysis_figures import before_and_after, coefficient_bars, loadings, model_error_over_time
 from .concurrent_passes import Identified, explained, identify
 from .constrained_fit import Stable, nearest_stable
 from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
 from .partial_least_squares import Regressed, regressed
+from .pls_report import correlations
 from .principal_components import PrincipalComponents, fit_components, outliers, removals
 from .recipes import RECIPES, Recipe, recipe
-from .samples import Samples, gather_samples, joined, model_error, without_outliers
+from .samples import NU, OMEGA, TAU, Samples, gather_samples, joined, model_error, without_outliers
 from .table_7_1 import NAMES, TABLE_7_1, plant, row
 
 __all__ = [
     "NAMES",
+    "NU",
+    "OMEGA",
     "RECIPES",
     "TABLE_7_1",
+    "TAU",
     "EffectiveThrust",
     "Identified",
     "PrincipalComponents",
@@ -29,6 +34,9 @@ __all__ = [
     "Samples",
     "Stable",
     "as_model",
+    "before_and_after",
+    "coefficient_bars",
+    "correlations",
     "effective_thrust",
     "explained",
     "fit_components",
@@ -36,7 +44,9 @@ __all__ = [
     "goes_into_the_plant",
     "identify",
     "joined",
+    "loadings",
     "model_error",
+    "model_error_over_time",
     "nearest_stable",
     "outliers",
     "plant",

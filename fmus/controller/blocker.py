@@ -14,8 +14,8 @@ class BlockerOptions(NamedTuple):
     """Norms above which learning stops.
 
     Those of velocity and acceleration are so large by default that they never act. That of the force
-    does where the inputs ``tau_cmd`` are not connected: learning then sees the force that is asked for,
-    which may be more than thrusters give.
+    does: it is the force that acts where the inputs ``tau_cmd`` are connected, as in the shipped
+    scenarios, else the force that is asked for, which may be more than thrusters give.
     """
 
     nu_dot_max: Annotated[float, "1", "norm of the acceleration that blocks", POSITIVE] = OFF

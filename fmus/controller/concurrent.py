@@ -10,12 +10,13 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Component, DeclarationError
 from ..hull import Triple
-from ..ops import Number, choose, sqrt, when, where
+from ..ops import Number, choose, not_, sqrt, when, where
 from ..signals import Force
 from .adaptive import Disturbance, DisturbanceByError, attentive, energy, parameters, to_body
 from .backstepping import HELD, Inputs, acting, control, control_errors, outputs, starting
 from .blocker import Blocker, BlockerOptions, blocked, exceeds
 from .eigen import dot
+from .fixed_point import FixedPoint, Now, advanced
 from .learning import Drive, Memory, integrated, learned, remembered
 from .parametrisation import Parametrisation
 from .smoothing import Register, Sample, Tap, shifted
@@ -27,6 +28,9 @@ class SampleOptions(NamedTuple):
 
     rho: Annotated[float, "1/s", "omega_n by the integral (4.35); 0: by the store", POSITIVE] = 0.1
     smoothing: Annotated[float, "s", "samples are smoothed over this span; 0: off", POSITIVE] = 0.0
+    fixed_point: Annotated[
+        float, "s", "stored samples are smoothed by what follows within this time; 0: off", POSITIVE
+    ] = 0.0
 
 
 class Learning(NamedTuple):
@@ -50,6 +54,7 @@ class State(NamedTuple):
     blocker: Blocker
     register: Register
     integral: Memory
+    point: FixedPoint
 
 
 class Present(NamedTuple):
@@ -117,7 +122,7 @@ def concurrent(
 
     def init(i: Inputs, p: Any) -> State:
         phi = model.hat._make(p.phi)
-        s = State(phi, still, Force(), 0.0, beginning, Blocker(), Register(), no_integral)
+        s = State(phi, still, Force(), 0.0, beginning, Blocker(), Register(), no_integral, FixedPoint())
         _, out = step(s, i, p, 0.0)
         return s._replace(tau=out.tau)
 
@@ -143,7 +148,20 @@ def concurrent(
         omega_on = dot(p.disturbance, (1.0, 1.0, 1.0)) > 0.0
         target = choose(p.store.stale > 0.5, eps, y)
         row = Row(1.0, sample.time, sample.psi, target, F_sample)
-        kept = offer(model, storage, s.store, row, fresh, time, p.store, omega_on)
+
+        def smoothed_row() -> tuple[FixedPoint, Row, Any]:
+            pose = (e.x_hat, e.y_hat, e.psi_hat)
+            seen = learns & not_(e.frozen > 0.5)
+            new = Now(time, pose, nu, acted)
+            point, past, ready = advanced(model, p.belief, s.point, new, p.samples.fixed_point, h, seen)
+            F_past, y_past, eps_past = explained(model, past, s, p.belief)
+            aim = choose(p.store.stale > 0.5, eps_past, y_past)
+            return point, Row(1.0, past.time, past.psi, aim, F_past), ready
+
+        point, offered, ready = when(
+            (h > 0.0) & (p.samples.fixed_point > 0.0), smoothed_row, lambda: (s.point, row, fresh)
+        )
+        kept = offer(model, storage, s.store, offered, ready, time, p.store, omega_on)
         integral = when(
             omega_on & (p.samples.rho > 0.0),
             lambda: integrated(model, s.integral, row, dt * counts),
@@ -177,7 +195,7 @@ def concurrent(
         met = where((count > 0.5) & (sigma > p.store.rank_tolerance), 1.0, 0.0)
         tau = choose(h > 0.0, demand.tau, s.tau)
         return (
-            State(phi, omega, tau, time, kept, gate, register, integral),
+            State(phi, omega, tau, time, kept, gate, register, integral, point),
             Outputs(
                 *demand,
                 phi,

@@ -1,0 +1,161 @@
+"""An optimal fixed-point smoother of stored samples, 8.1 and 6.5 (after Chowdhary et al., 2012).
+
+A sample need not be stored at once: what is measured after its instant j tells more of it. On each
+axis of the earth-fixed pose runs a steady Kalman filter of position p, velocity v and a slow disturbance
+d, in
+
+    p' = v,   v' = R(psi) (M^-1 (tau + known) + S(r) nu) + d,   d' = white noise,
+
+where what is known of the hull and the force is given. Beside it the state of instant j is corrected by
+each later innovation e,
+
+    x_j' = Sigma C^T e,   Sigma' = Sigma (A - K C)^T,   Sigma(j) = P,
+
+which is Kalman's filter of the state with x_j added to it. With the covariance in units of that of the
+measurement, its bandwidth w [rad/s] is all that is to be chosen: K = (2 w, 2 w^2, w^3), poles of
+Butterworth. After the span T = 6/w, Sigma has fallen to e^-3 of P and x_j is taken as final.
+"""
+
+from typing import Any, NamedTuple
+
+from ..frames import rotate_to_body, rotate_to_earth
+from ..hull import Triple, inverse_mass
+from ..ops import Number, choose, fmax, when
+from .parametrisation import Parametrisation
+from .smoothing import Sample
+
+# w T; w h stays below this part of 1, so that a step is short beside the filter.
+SETTLES = 6.0
+FAST = 0.5
+STILL = (0.0, 0.0, 0.0)
+SOON = 1e-9  # s; a time or an age that has begun
+
+
+class Axis(NamedTuple):
+    """Position, velocity and disturbance of one axis."""
+
+    p: Any = 0.0
+    v: Any = 0.0
+    d: Any = 0.0
+
+
+class FixedPoint(NamedTuple):
+    """The filter, how long it has run [s], and the sample that is being smoothed, of age ``age`` [s]."""
+
+    axes: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
+    ran: Any = 0.0
+    age: Any = 0.0
+    time: Any = 0.0
+    tau: Triple = STILL
+    driven: Triple = STILL
+    smooth: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
+    sigma: tuple[Triple, Triple, Triple] = (STILL, STILL, STILL)
+
+
+class Now(NamedTuple):
+    """What a step brings: time [s], estimated pose and velocity, force that acted."""
+
+    time: Any
+    pose: Triple
+    nu: Triple
+    tau: Triple
+
+
+def covariance(w: Number) -> tuple[Triple, Triple, Triple]:
+    """P of the steady filter of bandwidth w [rad/s]; its first column is the gain K."""
+    w2 = w * w
+    w3 = w2 * w
+    return (
+        (2.0 * w, 2.0 * w2, w3),
+        (2.0 * w2, 3.0 * w3, 2.0 * w3 * w),
+        (w3, 2.0 * w3 * w, 2.0 * w3 * w2),
+    )
+
+
+def later(sigma: Any, K: Triple, h: Number) -> Any:
+    """Sigma after h [s] with the gain K."""
+    a, b, c = K
+    return tuple([(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma])
+
+
+def driving(model: Parametrisation, psi: Any, nu: Triple, tau: Triple, belief: Any) -> Triple:
+    """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
+    u, v, r = nu
+    kX, kY, kN = model.known(u, v, r, belief)
+    X, Y, N = tau[0] + kX, tau[1] + kY, tau[2] + kN
+    i11, i22, i23, i32, i33 = inverse_mass(belief.inertia)
+    x, y = rotate_to_earth(psi, i11 * X - r * v, i22 * Y + i23 * N + r * u)
+    return x, y, i32 * Y + i33 * N
+
+
+def body(axes: tuple[Axis, Axis, Axis], driven: Triple) -> tuple[Triple, Triple]:
+    """Velocity and acceleration along the ship."""
+    x, y, turn = axes
+    u, v = rotate_to_body(turn.p, x.v, y.v)
+    a, b = rotate_to_body(turn.p, driven[0] + x.d, driven[1] + y.d)
+    r = turn.v
+    return (u, v, r), (a + r * v, b - r * u, driven[2] + turn.d)
+
+
+def begun(now: Now) -> FixedPoint:
+    """The filter at its first instant, with the observer's velocity."""
+    x_dot, y_dot = rotate_to_earth(now.pose[2], now.nu[0], now.nu[1])
+    x, y, psi = now.pose
+    return FixedPoint((Axis(x, x_dot), Axis(y, y_dot), Axis(psi, now.nu[2])), SOON)
+
+
+def advanced(
+    model: Parametrisation, belief: Any, s: FixedPoint, now: Now, span: Number, h: Number, usable: Number
+) -> tuple[FixedPoint, Sample, Number]:
+    """The smoother after a step of h [s].
+
+    Args:
+        model: of which what is known is used.
+        belief: about the hull.
+        s: before.
+        now: what the step brought.
+        span: how long a sample is smoothed [s].
+        h: the step [s].
+        usable: False where nothing may be learned, or nothing is measured: everything begins anew. An
+            observer that finds the ship again after a freeze is wrong for longer than the freeze.
+
+    Returns:
+        The smoother, a sample, and True where that is final and to be stored.
+    """
+    w = SETTLES / fmax(span, SETTLES / FAST * h)
+    P = covariance(w)
+    K = P[0]
+
+    def stepped() -> tuple[FixedPoint, Sample, Number]:
+        turn = s.axes[2]
+        u, v = rotate_to_body(turn.p, s.axes[0].v, s.axes[1].v)
+        push = driving(model, turn.p, (u, v, turn.v), now.tau, belief)
+        axes, smooth = [], []
+        for axis, old, pushed, measured in zip(s.axes, s.smooth, push, now.pose, strict=True):
+            rate = pushed + axis.d
+            ahead = axis.p + h * (axis.v + 0.5 * h * rate)
+            e = h * (measured - ahead)
+            axes.append(Axis(ahead + K[0] * e, axis.v + h * rate + K[1] * e, axis.d + K[2] * e))
+            (a, _, _), (b, _, _), (c, _, _) = s.sigma
+            smooth.append(Axis(old.p + a * e, old.v + b * e, old.d + c * e))
+        going: Any = tuple(axes)
+        fixed: Any = tuple(smooth)
+        age, ran = s.age + h, s.ran + h
+        nu, nu_dot = body(fixed, s.driven)
+        sample = Sample(s.time, fixed[2].p, nu, nu_dot, s.tau)
+        done = (s.age > 0.0) & (age >= span)
+        after = FixedPoint(going, ran, age, s.time, s.tau, s.driven, fixed, later(s.sigma, K, h))
+        # The next one begins where the filter has settled and none is under way.
+        psi = going[2].p
+        a, b = rotate_to_body(psi, going[0].v, going[1].v)
+        drive = driving(model, psi, (a, b, going[2].v), now.tau, belief)
+        fresh = FixedPoint(going, ran, SOON, now.time, now.tau, drive, going, P)
+        idle = FixedPoint(going, ran)
+        settled = ran >= span
+        begins = settled & (done | (s.age <= 0.0))
+        return choose(begins, fresh, choose(s.age > 0.0, after, idle)), sample, done
+
+    def restarted() -> tuple[FixedPoint, Sample, Number]:
+        return choose(usable, begun(now), FixedPoint()), Sample(), False
+
+    return when(usable & (s.ran > 0.0), stepped, restarted)
