@@ -11,7 +11,7 @@ from ..fmu.component import WARNING
 from ..fmu.fmu_model import Variable
 from ..fmu.instance import Instance
 from ..process.run_state import INSTANCE, STATE, Owner
-from ..scenario.faults import TIME_TOLERANCE
+from ..scenario.plans import TIME_TOLERANCE
 from ..scenario.schema import Event
 from ..system.instance_pool import InstancePool
 from ..system.system import System

@@ -17,8 +17,9 @@ import numpy as np
 from ...compiled.library import NoLibraryError, asks_for_plain_loop, library
 from ...process.run_state import INSTANCE, STATE
 from ...results.pending_rows import PendingRows
-from ...scenario.faults import TIME_TOLERANCE, Effect
+from ...scenario.faults import Effect
 from ...scenario.operations import OPERATIONS, Operation
+from ...scenario.plans import TIME_TOLERANCE
 from ..algorithm import Master
 from ..changes import Changes
 from ..stepper import Stepper
