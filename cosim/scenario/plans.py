@@ -76,24 +76,28 @@ class WhiteNoise(PlanAhead):
 
     def __init__(self, std: Sequence[float], rng: np.random.Generator) -> None:
         self._std, self._rng = np.array(std), rng
-        self._drawn: list[list[float]] = []  # the next one is the last
+        self._rows = np.empty((0, len(std)))  # drawn ahead and left, the next one is the last
+        self._drawn: list[list[float]] = []  # the same for single calls; not both
 
-    def _draw(self) -> np.ndarray:
-        return self._std * self._rng.standard_normal((DRAWN, len(self._std)))
+    def _next(self) -> np.ndarray:
+        """Rows that have not been given, at least one."""
+        left = np.array(self._drawn) if self._drawn else self._rows
+        self._rows, self._drawn = self._rows[:0], []
+        return left if len(left) else self._std * self._rng.standard_normal((DRAWN, len(self._std)))
 
     def __call__(self, t: float) -> Sequence[float]:
         if not self._drawn:
-            self._drawn.extend(self._draw().tolist())
+            self._drawn = self._next().tolist()
         return self._drawn.pop()
 
     def ahead(self, times: np.ndarray, acts: np.ndarray, numbers: np.ndarray) -> None:
         acts[:] = 1
         k = 0
         while k < len(numbers):
-            rows = self._draw() if not self._drawn else np.array(self._drawn)
+            rows = self._next()
             taken = min(len(rows), len(numbers) - k)
             numbers[k : k + taken] = rows[::-1][:taken]
-            self._drawn = rows[: len(rows) - taken].tolist()
+            self._rows = rows[: len(rows) - taken]
             k += taken
 
 

@@ -114,6 +114,7 @@ class _CompiledLoop:
             fmu=self._fmus,
             instants=rows.instants.ctypes.data,
             rows=rows.taken.ctypes.data,
+            finite=rows.finite.ctypes.data,
             taken=rows.count.ctypes.data,
             called=called.ctypes.data + 4 * INSTANCE,
             room=rows.room,
