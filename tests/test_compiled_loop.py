@@ -219,7 +219,7 @@ def test_plan_may_be_asked_ahead_and_left_in_the_middle(kind):
     values = np.random.default_rng(2).standard_normal((60, 3))
     for k, row in enumerate(values):
         if k in (10, 50):
-            ahead.ask_ahead([float(k + j) for j in range(40 if k == 10 else 10)])
+            ahead.ask_ahead(k + np.arange(40.0 if k == 10 else 10.0))
         ours, other = array("d", row), array("d", row)
         once(ours, float(k))
         ahead(other, float(k))

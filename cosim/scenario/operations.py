@@ -58,7 +58,7 @@ class Operation:
         self.samples = 0
         self.sources: list[int] = []
 
-    def ask_ahead(self, times: Sequence[float]) -> None:
+    def ask_ahead(self, times: np.ndarray) -> None:
         """Plan the next calls; all that were planned before have been made.
 
         Args:
@@ -67,7 +67,7 @@ class Operation:
         self.cursor[0] = 0
         if self.plan is None:
             return
-        acts, numbers = ask_ahead(self.plan, np.asarray(times), self.width)
+        acts, numbers = ask_ahead(self.plan, times, self.width)
         self.acts, self.numbers = array("B", acts.tobytes()), array("d", numbers.tobytes())
 
     def __call__(self, values: Values, t: float) -> None:
@@ -146,7 +146,7 @@ class Delay(Operation):
         if missing > 0:
             self.memory.extend(array("d", bytes(8 * missing)))
 
-    def ask_ahead(self, times: Sequence[float]) -> None:
+    def ask_ahead(self, times: np.ndarray) -> None:
         self.reserve(len(times))
         super().ask_ahead(times)
 

@@ -156,20 +156,21 @@ class _CompiledLoop:
         master, loop = self._master, self._loop
         done = self._horizon
         first = max(0, done - max(stepper.every for stepper in self._steppers))
-        self._times = times = array("d", master.times(first, horizon).tobytes())
-        loop.first, loop.times = first, address(times)
+        times = master.times(first, horizon)
+        self._times = array("d", times.tobytes())
+        loop.first, loop.times = first, address(self._times)
         for stepper in self._steppers:
             every, h = stepper.every, stepper.step_size
-            due = range((done // every + 1) * every, horizon + 1, every)
+            due = np.arange((done // every + 1) * every, horizon + 1, every)
             if on_inputs := _operations(stepper.input_effects):
                 # Inputs of a step are those of its end; with Jacobi's method of the base step's
                 # beginning.
                 shift = first + master.is_jacobi
-                inputs = [times[k - shift] for k in due]
+                inputs = times[due - shift]
                 for operation in on_inputs:
                     operation.ask_ahead(inputs)
             if on_outputs := _operations(stepper.output_effects):
-                outputs = [times[k - every - first] + h for k in due]
+                outputs = times[due - every - first] + h
                 for operation in on_outputs:
                     operation.ask_ahead(outputs)
         self._horizon = horizon
