@@ -1,7 +1,7 @@
 """Do native FMUs and Python FMUs give the same log, byte for byte? ``python -m benchmarks.same_bits``.
 
-Runs each shipped scenario with both, as many steps as are asked for whatever its end, with its faults and
-events; exit code 1 if a log differs.
+Runs each shipped scenario with both, as many steps as are asked for whatever its end, with its faults
+and events; exit code 1 if a log differs.
 """
 
 import argparse

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..files import update_json, write_json
-from ..results import performance
 from ..results import log as logs
+from ..results import performance
 from ..system.system import System
 from .recorder import Recorder
 

@@ -72,7 +72,10 @@ class Recorder:
         message = ""
         # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
         known = int(self.pending.finite[0])
-        if not np.isfinite(taken[known:]).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
+        if (
+            not np.isfinite(taken[known:]).all()
+            and (wrong := ~np.isfinite(taken[:, self._outputs])).any()
+        ):
             k = int(np.argmax(wrong.any(axis=1)))
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"
