@@ -93,20 +93,19 @@ class Recorder:
 
     def kept(self) -> dict[str, np.ndarray]:
         """The columns for metrics and pictures, at every step."""
-        times, columns = self._kept.all()
-        return {"time": times, **dict(zip(self._kept_names, columns.T, strict=True))}
+        return dict(zip(["time", *self._kept_names], self._kept.all(), strict=True))
 
 
 class _Columns:
-    """Some columns of rows that come in blocks.
+    """Times and some columns of rows that come in blocks.
 
     Args:
-        width: how many.
+        width: how many columns.
     """
 
     def __init__(self, width: int) -> None:
-        self._full: list[tuple[np.ndarray, np.ndarray]] = []
-        self._times, self._rows = np.empty(CHUNK), np.empty((CHUNK, width))
+        self._full: list[np.ndarray] = []
+        self._last = np.empty((1 + width, CHUNK))
         self._count = 0
 
     def append(self, times: np.ndarray, rows: np.ndarray, slots: np.ndarray) -> None:
@@ -119,16 +118,13 @@ class _Columns:
         """
         first, end = self._count, self._count + len(times)
         if end > CHUNK:
-            self._full.append((self._times[:first], self._rows[:first]))
-            self._times, self._rows = np.empty_like(self._times), np.empty_like(self._rows)
+            self._full.append(self._last[:, :first])
+            self._last = np.empty_like(self._last)
             first, end = 0, len(times)
-        self._times[first:end] = times
-        # All slots are there; "raise" would make a copy.
-        rows.take(slots, axis=1, out=self._rows[first:end], mode="clip")
+        self._last[0, first:end] = times
+        self._last[1:, first:end] = rows.T[slots]
         self._count = end
 
-    def all(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times [s], shape (rows,), and columns, shape (rows, width)."""
-        parts = [*self._full, (self._times[: self._count], self._rows[: self._count])]
-        times, columns = zip(*parts, strict=True)
-        return np.concatenate(times), np.concatenate(columns)
+    def all(self) -> np.ndarray:
+        """Times [s] and columns, shape (1 + width, rows)."""
+        return np.concatenate([*self._full, self._last[:, : self._count]], axis=1)
