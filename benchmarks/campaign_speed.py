@@ -70,9 +70,7 @@ def campaign(content: dict[str, Any], workers: int) -> None:
 def bare(content: dict[str, Any]) -> None:
     """The same runs without campaign: prepare, step, compute the metrics."""
     import cosim
-    from cosim.master import Master
-    from cosim.master.loops.chosen_loop import choose_loop
-    from cosim.master.recorder import Recorder
+    from cosim.master import Master, Recorder, choose_loop
     from cosim.results import compute
     from cosim.system import InstancePool, prepare
 

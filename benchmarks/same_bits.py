@@ -18,7 +18,7 @@ ROOT = Path(__file__).parent.parent
 def log_of(scenario: Path, steps: int, native: bool) -> tuple[str, int, str]:
     """How a run ends, its rows, and the SHA-256 of its log."""
     import cosim
-    from cosim.scenario.load import with_settings
+    from cosim.scenario import with_settings
 
     stop = steps * json.loads(scenario.read_text())["step"]
     changes = [("stop", stop), ("metrics", {}), ("native", native)]

@@ -12,7 +12,7 @@ from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
 from cosim.compiled.row_text import Rows, compiled_lines
-from cosim.master.rounding import round_to_places
+from cosim.master.loops.rounding import round_to_places
 from cosim.results.log import format_rows
 from cosim.scenario import faults, operations
 

@@ -16,9 +16,11 @@ from ..scenario.schema import Event
 from ..system.instance_pool import InstancePool
 from ..system.system import System
 from .messages import Messages
-from .rounding import PLACES, round_to_places
 from .stepper import Stepper
 from .value_table import ValueTable
+
+# Decimal places of times [s]; chosen: far more than the shortest step, 1e-6 s, has.
+PLACES = 12
 
 
 class Master:
@@ -169,10 +171,6 @@ class Master:
     def time(self, k: int) -> float:
         """Time of base step k [s]: counted, never accumulated."""
         return round(k * self.system.scenario.step, PLACES)
-
-    def times(self, first: int, last: int) -> np.ndarray:
-        """Times of base steps from ``first`` to ``last`` [s], each as :meth:`time` has it."""
-        return round_to_places(np.arange(first, last + 1) * self.system.scenario.step)
 
     def run(self) -> Iterator[float]:
         """Step to the end; yields the time [s] after each base step.

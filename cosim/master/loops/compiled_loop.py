@@ -24,6 +24,7 @@ from ..algorithm import Master
 from ..changes import Changes
 from ..stepper import Stepper
 from .layout import STRUCTURES, FmuLayout, LoopLayout, address, lay_out_fmu, operations_layout
+from .rounding import round_to_places
 
 # Base steps whose times and chances are planned at once; chosen: the cost of a plan is small beside
 # that of the steps, and the wait for it not noticed.
@@ -156,7 +157,7 @@ class _CompiledLoop:
         master, loop = self._master, self._loop
         done = self._horizon
         first = max(0, done - max(stepper.every for stepper in self._steppers))
-        times = master.times(first, horizon)
+        times = round_to_places(np.arange(first, horizon + 1) * master.system.scenario.step)
         self._times = array("d", times.tobytes())
         loop.first, loop.times = first, address(self._times)
         for stepper in self._steppers:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-PLACES = 12
+from ..algorithm import PLACES
+
 SCALE = 10.0**PLACES
 # Numbers from here on [s] are farther apart than two decimal numbers: they are what they are rounded to.
 COARSE = 2.0**13
