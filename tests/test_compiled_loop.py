@@ -239,16 +239,16 @@ def test_many_times_are_rounded_as_each_is():
 
 def faults_of_chance(rng):
     """Each fault that draws, on two signals."""
-    both = {"signals": ["a.x", "a.y"]}
-    timed = both | {"rate": 3.0, "duration": (0.02, 0.4)}
+    timed = {"rate": 3.0, "duration": (0.02, 0.4)}
     found = [
-        faults.Noise(kind="noise", std=[0.1, 2.0], **both),
-        faults.Spikes(kind="spikes", size=3.0, **both | {"rate": 40.0}),
-        faults.Spikes(kind="spikes", size=3.0, **timed),
-        faults.Dropout(kind="dropout", **both | {"at": [0.3, 0.2, 9.0], "duration": 0.5}),
-        faults.Freeze(kind="freeze", **timed),
+        {"kind": "noise", "std": [0.1, 2.0]},
+        {"kind": "spikes", "size": 3.0, "rate": 40.0},
+        {"kind": "spikes", "size": 3.0, **timed},
+        {"kind": "dropout", "at": [0.3, 0.2, 9.0], "duration": 0.5},
+        {"kind": "freeze", **timed},
     ]
-    return [fault.bind([0, 1], 0.01, np.random.default_rng(rng)) for fault in found]
+    made = [faults.KINDS[f["kind"]].model_validate(f | {"signals": ["a.x", "a.y"]}) for f in found]
+    return [fault.bind([0, 1], 0.01, np.random.default_rng(rng)) for fault in made]
 
 
 @pytest.mark.parametrize("kind", range(5))
