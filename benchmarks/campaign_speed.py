@@ -70,7 +70,7 @@ def campaign(content: dict[str, Any], workers: int) -> None:
 def bare(content: dict[str, Any]) -> None:
     """The same runs without campaign: prepare, step, compute the metrics."""
     import cosim
-    from cosim.master import Master
+    from cosim.master import Master, Recorder, choose_loop
     from cosim.results import compute
     from cosim.system import InstancePool, prepare
 
@@ -80,12 +80,12 @@ def bare(content: dict[str, Any]) -> None:
     for seed in content["axes"]["seed"]["values"]:
         varied = prepare(cosim.load_scenario({**scenario, "seed": seed}), models=system.models)
         master = Master(varied, lambda _: None, pool=pool)
-        names = [signal.name for signal in master.table.signals]
-        rows = [(0.0, *master.table.row)]
-        rows.extend((t, *master.table.row) for t in master.run())
+        recorder = Recorder(varied, master, None)
+        recorder.take(0.0)
+        for _ in choose_loop(master, recorder.pending, False, 0.2).run():
+            recorder.flush()
         master.close()
-        columns = dict(zip(["time", *names], zip(*rows, strict=True), strict=True))
-        compute(columns, varied.scenario.metrics.start, varied.scenario.metrics.stop)
+        compute(recorder.kept(), varied.scenario.metrics.start, varied.scenario.metrics.stop)
     pool.close()
     system.close()
 

@@ -169,7 +169,7 @@ CASES = {
 }
 
 
-def make_plan(work: Path, steps: int, scenario: Path = SCENARIO) -> Plan:
+def make_plan(work: Path, steps: int, scenario: Path = SCENARIO, native: bool = False) -> Plan:
     """Export the scenario, without what cannot travel, and write down what all runs share."""
     import cosim
     from cosim.export import export_fmu, export_osp, export_ssp
@@ -177,7 +177,7 @@ def make_plan(work: Path, steps: int, scenario: Path = SCENARIO) -> Plan:
 
     content = json.loads(scenario.read_text())
     step = content["step"]
-    content |= {"stop": steps * step, "metrics": {}, "faults": [], "events": []}
+    content |= {"stop": steps * step, "metrics": {}, "faults": [], "events": [], "native": native}
     for entry in content["fmus"].values():
         if "/" in entry["path"]:
             entry["path"] = str((scenario.parent / entry["path"]).resolve())
@@ -227,11 +227,11 @@ def difference(found: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
     return float(away.max()), float((away / np.maximum(1.0, np.abs(expected))).max())
 
 
-def measure(steps: int, scenario: Path = SCENARIO) -> dict[str, Any]:
+def measure(steps: int, scenario: Path = SCENARIO, native: bool = False) -> dict[str, Any]:
     """Run all cases; the result is what ``--json`` writes."""
     with tempfile.TemporaryDirectory(prefix="same_answer_") as folder:
         work = Path(folder)
-        plan = make_plan(work, steps, scenario)
+        plan = make_plan(work, steps, scenario, native)
         found: dict[str, np.ndarray | str] = {}
         for case in CASES:
             result = run_apart(case, work)
@@ -316,6 +316,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.same_answer", description=__doc__)
     parser.add_argument("scenario", nargs="?", type=Path, default=SCENARIO, help="(ellipse)")
     parser.add_argument("--steps", type=int, default=2000, help="how many (2000)")
+    parser.add_argument("--native", action="store_true", help="compiled FMUs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers here as well")
     parser.add_argument("--case", nargs=2, metavar=("CASE", "FOLDER"), help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -323,7 +324,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         case, work = options.case[0], Path(options.case[1])
         np.save(work / f"{case}.npy", CASES[case].run(json.loads((work / "plan.json").read_text())))
         return 0
-    answer = measure(options.steps, options.scenario)
+    answer = measure(options.steps, options.scenario, options.native)
     if options.json:
         options.json.write_text(json.dumps(answer, indent=2) + "\n")
     return 0 if report(answer) else 1

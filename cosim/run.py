@@ -6,21 +6,11 @@ if __name__ == "__main__":
     watched()  # before all other imports, which take a while
 
 import argparse
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskID,
-    TaskProgressColumn,
-    TextColumn,
-    TimeRemainingColumn,
-)
 
 from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, run_command
 from .errors import InputError
@@ -29,6 +19,7 @@ from .master.ending import Result
 from .master.simulation import simulate
 from .results.performance import table
 from .scenario.load import load_scenario, with_settings
+from .scenario.schema import Scenario
 from .scenario.setting import parse_assignment
 
 EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
@@ -49,23 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.set:
             settings = [parse_assignment(text) for text in options.set]
             scenario = with_settings(scenario, settings, Path.cwd(), "--set")
-        bar = (
-            nullcontext()
-            if options.quiet or not console.is_terminal
-            else Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TaskProgressColumn(),
-                TimeRemainingColumn(),
-                console=console,
-                transient=True,
-            )
-        )
-        with bar as shown:
-            progress = _no_progress
-            if shown is not None:
-                task = shown.add_task(escape(printable(scenario.name)), total=scenario.stop)
-                progress = partial(_advance, shown, task)
+        with _progress(console, scenario, options.quiet) as progress:
             result = simulate(
                 scenario,
                 options.out,
@@ -95,12 +70,21 @@ def _no_interrupt() -> None:
     """No-op: an interrupt comes too late."""
 
 
-def _no_progress(t: float) -> None:
-    """No-op progress callback, for output that is no terminal."""
+@contextmanager
+def _progress(console: Console, scenario: Scenario, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """Show how far a run is: ``progress(t)`` with the simulated time [s]."""
+    if quiet or not console.is_terminal:
+        yield lambda t: None
+        return
+    from rich.markup import escape  # only now: most runs of a program need none of this
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-
-def _advance(bar: Progress, task: TaskID, t: float) -> None:
-    bar.update(task, completed=t)
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=console, transient=True) as shown:
+        task = shown.add_task(escape(printable(scenario.name)), total=scenario.stop)
+        yield lambda t: shown.update(task, completed=t)
 
 
 def _report(result: Result, quiet: bool) -> None:

@@ -12,6 +12,7 @@ from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
 from cosim.compiled.row_text import Rows, compiled_lines
+from cosim.master.loops.rounding import round_to_places
 from cosim.results.log import format_rows
 from cosim.scenario import faults, operations
 
@@ -219,10 +220,49 @@ def test_plan_may_be_asked_ahead_and_left_in_the_middle(kind):
     values = np.random.default_rng(2).standard_normal((60, 3))
     for k, row in enumerate(values):
         if k in (10, 50):
-            ahead.ask_ahead([float(k + j) for j in range(40 if k == 10 else 10)])
+            ahead.ask_ahead(k + np.arange(40.0 if k == 10 else 10.0))
         ours, other = array("d", row), array("d", row)
         once(ours, float(k))
         ahead(other, float(k))
+        assert ours.tobytes() == other.tobytes()
+
+
+def test_many_times_are_rounded_as_each_is():
+    rng = np.random.default_rng(5)
+    counted = [
+        np.arange(k, k + 200) * h for h in (0.01, 1e-6, 1 / 3, 2.0**-13) for k in (0, 10**6, 10**9)
+    ]
+    drawn = [rng.uniform(0.0, largest, 500) for largest in (1e-9, 1.0, 4500.0, 8192.0, 1e4)]
+    for times in (*counted, *drawn, (rng.integers(0, 2**40, 500) + 0.5) / 1e12):
+        assert round_to_places(times).tolist() == [round(t, 12) for t in times.tolist()]
+
+
+def faults_of_chance(rng):
+    """Each fault that draws, on two signals."""
+    timed = {"rate": 3.0, "duration": (0.02, 0.4)}
+    found = [
+        {"kind": "noise", "std": [0.1, 2.0]},
+        {"kind": "spikes", "size": 3.0, "rate": 40.0},
+        {"kind": "spikes", "size": 3.0, **timed},
+        {"kind": "dropout", "at": [0.3, 0.2, 9.0], "duration": 0.5},
+        {"kind": "freeze", **timed},
+    ]
+    made = [faults.KINDS[f["kind"]].model_validate(f | {"signals": ["a.x", "a.y"]}) for f in found]
+    return [fault.bind([0, 1], 0.01, np.random.default_rng(rng)) for fault in made]
+
+
+@pytest.mark.parametrize("kind", range(5))
+def test_faults_draw_the_same_for_many_calls_as_call_by_call(kind):
+    once, ahead = (faults_of_chance(7)[kind] for _ in range(2))
+    values = np.random.default_rng(2).standard_normal((4000, 2))
+    times = np.arange(4000) * 0.01
+    spans = {5: 1, 6: 1500, 1506: 2, 1508: 700, 2500: 1500}  # between them call by call
+    for k, row in enumerate(values):
+        if k in spans:
+            ahead.ask_ahead(times[k : k + spans[k]])
+        ours, other = array("d", row), array("d", row)
+        once(ours, times[k])
+        ahead(other, times[k])
         assert ours.tobytes() == other.tobytes()
 
 

@@ -1,5 +1,6 @@
 """Interrupts: held while files are made, and a command that is interrupted leaves nothing, whenever it is."""
 
+import json
 import os
 import random
 import signal
@@ -7,12 +8,14 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import pytest
 from support.project import ROOT
 from test_diagnosis_commands import frame
 
-from cosim.interrupts import Held
+from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
+from cosim.master.loop_surroundings import interruptible
 from diagnosis import result_folder
 from diagnosis.result_folder import together
 
@@ -81,6 +84,57 @@ run_command(main)
 def test_an_interrupt_that_was_lost_acts_at_the_next_step():
     done = subprocess.run([sys.executable, "-c", LOST], cwd=ROOT, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+LOST_RUN = """
+import signal
+from contextlib import suppress
+from cosim import run
+from cosim.command import run_command
+
+load = run.load_scenario
+
+def loads(*arguments):
+    with suppress(KeyboardInterrupt):  # as where Python runs a callback of C
+        signal.raise_signal(signal.SIGTERM)
+    return load(*arguments)
+
+run.load_scenario = loads
+run_command(run.main)
+"""
+
+
+@posix
+def test_an_interrupt_that_was_lost_before_a_run_ends_it(tmp_path):
+    content = {
+        "name": "endless", "step": 0.01, "stop": 1e5, "metrics": {},
+        "fmus": {"guidance": {"path": "guidance_ellipse.fmu"}}, "connections": [],
+    }  # fmt: skip
+    (tmp_path / "endless.json").write_text(json.dumps(content))
+    done = subprocess.run(
+        [sys.executable, "-c", LOST_RUN, str(tmp_path / "endless.json"), "--out", str(tmp_path / "out")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (130, "interrupted")
+
+
+@posix
+def test_an_interrupt_that_was_lost_is_not_for_the_next_run():
+    before = on_interrupt(lambda: None)
+    try:
+        raise_on_interrupt()
+        with suppress(KeyboardInterrupt):
+            interrupt()
+        asked = []
+        for _ in range(2):
+            with interruptible() as interrupted:
+                asked.append(interrupted())
+    finally:
+        restore(before)
+    assert asked == [True, False]
 
 
 def test_other_threads_hold_nothing():

@@ -2,6 +2,8 @@
 
 from .algorithm import Master
 from .ending import Result
+from .loops.chosen_loop import choose_loop
+from .recorder import Recorder
 from .simulation import simulate
 
-__all__ = ["Master", "Result", "simulate"]
+__all__ = ["Master", "Recorder", "Result", "choose_loop", "simulate"]

@@ -11,13 +11,16 @@ from ..fmu.component import WARNING
 from ..fmu.fmu_model import Variable
 from ..fmu.instance import Instance
 from ..process.run_state import INSTANCE, STATE, Owner
-from ..scenario.faults import TIME_TOLERANCE
+from ..scenario.plans import TIME_TOLERANCE
 from ..scenario.schema import Event
 from ..system.instance_pool import InstancePool
 from ..system.system import System
 from .messages import Messages
 from .stepper import Stepper
 from .value_table import ValueTable
+
+# Decimal places of times [s]; chosen: far more than the shortest step, 1e-6 s, has.
+PLACES = 12
 
 
 class Master:
@@ -167,17 +170,7 @@ class Master:
 
     def time(self, k: int) -> float:
         """Time of base step k [s]: counted, never accumulated."""
-        return round(k * self.system.scenario.step, 12)
-
-    def times(self, first: int, last: int) -> np.ndarray:
-        """Times of base steps from ``first`` to ``last`` [s], each as :meth:`time` has it."""
-        found = np.arange(first, last + 1) * self.system.scenario.step
-        whole = np.rint(found * 1e12)
-        # Below 2**52 the product is at most 0.25 wrong, so these are the whole numbers that are meant;
-        # and a quotient of two exact numbers is rounded once, as a decimal number that is read.
-        if whole[-1] < 2.0**52 and np.abs(found * 1e12 - whole).max() < 0.2:
-            return whole / 1e12
-        return np.array([self.time(k) for k in range(first, last + 1)])
+        return round(k * self.system.scenario.step, PLACES)
 
     def run(self) -> Iterator[float]:
         """Step to the end; yields the time [s] after each base step.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..files import update_json, write_json
-from ..results import drawing, performance
 from ..results import log as logs
+from ..results import performance
 from ..system.system import System
 from .recorder import Recorder
 
@@ -80,6 +80,8 @@ def finish(
     except performance.MetricsError as error:
         show(f"note: no metrics: {error}")
     if draw and result.status != "interrupted":
+        from ..results import drawing
+
         with writing(result):
             runs = {system.scenario.name: columns}
             used = {system.scenario.name: roles}

@@ -14,6 +14,9 @@ from ..system.system import System
 from .algorithm import Master
 from .value_table import ValueTable
 
+# Rows of the kept columns in one piece of memory; chosen: a piece of a dozen columns is about 1.6 MB.
+CHUNK = 2**14
+
 
 class Recorder:
     """Writes the logged columns in blocks, and keeps the columns of metrics and pictures, logged or not.
@@ -39,7 +42,7 @@ class Recorder:
         self._outputs = self._slots(table, master.outputs)
         self._kept_names = needed(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
-        self._kept: list[np.ndarray] = []  # blocks, shape (1 + names, rows)
+        self._kept = _Columns(len(self._kept_names))
         logged = self._slots(table, system.logged)
         self.pending = PendingRows(table.row, logged, system.scenario.log.every)
         self.take = self.pending.take
@@ -68,14 +71,18 @@ class Recorder:
         times, taken = self.pending.all()
         message = ""
         # Inputs may be lost, and NaN; all of the table is quicker to look at than a part of it.
-        if not np.isfinite(taken).all() and (wrong := ~np.isfinite(taken[:, self._outputs])).any():
+        known = int(self.pending.finite[0])
+        if (
+            not np.isfinite(taken[known:]).all()
+            and (wrong := ~np.isfinite(taken[:, self._outputs])).any()
+        ):
             k = int(np.argmax(wrong.any(axis=1)))
             name = self._names[self._outputs[int(np.argmax(wrong[k]))]]
             message = f"{name} is not finite at t = {times[k]:g} s"
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
             self._writer.write(self.pending.logged(len(times)))
-        self._kept.append(np.vstack([times, taken.T[self._kept_slots]]))
+        self._kept.append(times, taken, self._kept_slots)
         self.pending.clear()
         if message:
             raise SimulationError(message)
@@ -86,6 +93,38 @@ class Recorder:
 
     def kept(self) -> dict[str, np.ndarray]:
         """The columns for metrics and pictures, at every step."""
-        names = ["time", *self._kept_names]
-        table = np.concatenate(self._kept, axis=1) if self._kept else np.empty((len(names), 0))
-        return dict(zip(names, table, strict=True))
+        return dict(zip(["time", *self._kept_names], self._kept.all(), strict=True))
+
+
+class _Columns:
+    """Times and some columns of rows that come in blocks.
+
+    Args:
+        width: how many columns.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._full: list[np.ndarray] = []
+        self._last = np.empty((1 + width, CHUNK))
+        self._count = 0
+
+    def append(self, times: np.ndarray, rows: np.ndarray, slots: np.ndarray) -> None:
+        """Take a block of at most CHUNK rows.
+
+        Args:
+            times: [s], shape (rows,).
+            rows: shape (rows, signals).
+            slots: of the columns.
+        """
+        first, end = self._count, self._count + len(times)
+        if end > CHUNK:
+            self._full.append(self._last[:, :first])
+            self._last = np.empty_like(self._last)
+            first, end = 0, len(times)
+        self._last[0, first:end] = times
+        self._last[1:, first:end] = rows.T[slots]
+        self._count = end
+
+    def all(self) -> np.ndarray:
+        """Times [s] and columns, shape (1 + width, rows)."""
+        return np.concatenate([*self._full, self._last[:, : self._count]], axis=1)

@@ -32,6 +32,7 @@ class PendingRows:
         instants, taken: memory of their times [s], shape (rows,), and of the rows, shape (rows,
             signals).
         count: how many there are, shape (1,).
+        finite: of how many, from the first on, it is known that all values are finite, shape (1,).
         room: how many there may be.
     """
 
@@ -40,6 +41,7 @@ class PendingRows:
         memory, self._counts = STATE.pending(8 * BLOCK * (1 + width))
         self.instants, self.taken = _parts(memory, width)
         self.count = np.frombuffer(self._counts, np.int32)[TAKEN : TAKEN + 1]
+        self.finite = np.zeros(1, np.int64)
         self.room = BLOCK
         self._doubles = memory[: 8 * BLOCK].cast("d")
         self._slots, self._every = slots, every
@@ -75,6 +77,7 @@ class PendingRows:
         """The rows are in the log."""
         count, self._counts[TAKEN] = self._counts[TAKEN], 0
         self._counts[STEPS] += count
+        self.finite[0] = 0
 
 
 def _parts(memory: memoryview, width: int) -> tuple[np.ndarray, np.ndarray]:

@@ -17,17 +17,12 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from . import operations
 from .operations import Add, Hold, Replace, Values
+from .plans import WhiteNoise, Windows, Within
 from .strict import Strict
 
 Effect = Callable[[Values, float], None]
 Times = Annotated[float, Field(ge=0.0)]
 Span = tuple[Times, Times]
-
-# Tolerance of time comparisons [s]: rounding must not move an instant by a step, and no step is shorter
-# than 1e-6 s.
-TIME_TOLERANCE = 1e-9
-# Samples of noise that are drawn at once; chosen: many, because the call of the generator is what costs.
-DRAWN = 1024
 
 KINDS: dict[str, type["Fault"]] = {}
 
@@ -76,26 +71,9 @@ class Timed(Fault):
             raise ValueError("the shortest duration comes first")
         return self
 
-    def windows(self, step: float, rng: np.random.Generator) -> Callable[[float], bool]:
-        """A function of t [s]: whether the fault is active then; t must not decrease."""
-        pending = sorted(self.at or [])
-        rate = self.rate
-        start = pending.pop(0) if pending else math.inf
-        if rate is not None:
-            start = rng.exponential(1.0 / rate)
-        stop = -math.inf
-
-        def active(t: float) -> bool:
-            nonlocal start, stop
-            while t >= start - TIME_TOLERANCE:
-                stop = max(stop, start + self._draw_duration(step, rng))
-                if rate is None:
-                    start = pending.pop(0) if pending else math.inf
-                else:
-                    start = stop + rng.exponential(1.0 / rate)
-            return t < stop - TIME_TOLERANCE
-
-        return active
+    def windows(self, step: float, rng: np.random.Generator) -> Windows:
+        """When the fault is active."""
+        return Windows(self.at, self.rate or 0.0, lambda: self._draw_duration(step, rng), rng)
 
     def _draw_duration(self, step: float, rng: np.random.Generator) -> float:
         """How long the fault lasts this time [s]: at least a sample."""
@@ -144,15 +122,7 @@ class Noise(Fault):
         return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        std = np.array(_each(self.std, len(slots)))
-        drawn: list[list[float]] = []
-
-        def sample(t: float) -> list[float]:
-            if not drawn:
-                drawn.extend((std * rng.standard_normal((DRAWN, len(slots)))).tolist())
-            return drawn.pop()
-
-        return Add(slots, sample)
+        return Add(slots, WhiteNoise(_each(self.std, len(slots)), rng))
 
 
 class Spikes(Timed):
@@ -169,14 +139,11 @@ class Spikes(Timed):
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         sizes = _each(self.size, len(slots))
-        active = self.windows(step, rng)
 
-        def sample(t: float) -> list[float] | None:
-            if not active(t):
-                return None
+        def sample() -> list[float]:
             return [size if rng.random() < 0.5 else -size for size in sizes]
 
-        return Add(slots, sample)
+        return Add(slots, Within(self.windows(step, rng), sample))
 
 
 class Wrap(Fault):
@@ -218,6 +185,5 @@ class Dropout(Timed):
     value: Literal["nan", "zero"] = Field("nan", description="what is reported instead")
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
-        active = self.windows(step, rng)
         lost = [math.nan if self.value == "nan" else 0.0] * len(slots)
-        return Replace(slots, lambda t: lost if active(t) else None)
+        return Replace(slots, Within(self.windows(step, rng), lambda: lost))

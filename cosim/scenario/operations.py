@@ -11,8 +11,11 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import ClassVar, Protocol
+
+import numpy as np
+
+from .plans import Plan, Windows, Within, ask_ahead
 
 
 class Values(Protocol):
@@ -23,17 +26,12 @@ class Values(Protocol):
     def __setitem__(self, slot: int, value: float, /) -> None: ...
 
 
-# What an operation applies at a call at t [s], a number for each slot; None where it does not act then.
-Plan = Callable[[float], Sequence[float] | None]
-
-
 class Operation:
     """What happens to the values at some slots each time they have been set.
 
     Args:
         slots: places in the value table.
-        plan: what it applies; is called once for each call, with times that do not decrease. A
-            sequence is applied at every call.
+        plan: what it applies, :data:`cosim.scenario.plans.Plan`. A sequence is applied at every call.
 
     Attributes:
         code: what it does, for cosim/compiled/loop.c.
@@ -60,7 +58,7 @@ class Operation:
         self.samples = 0
         self.sources: list[int] = []
 
-    def ask_ahead(self, times: Sequence[float]) -> None:
+    def ask_ahead(self, times: np.ndarray) -> None:
         """Plan the next calls; all that were planned before have been made.
 
         Args:
@@ -69,14 +67,8 @@ class Operation:
         self.cursor[0] = 0
         if self.plan is None:
             return
-        rows = [*map(self.plan, times)]
-        none = (0.0,) * self.width
-        self.acts = array("B", [row is not None for row in rows])
-        self.numbers = array("d", chain.from_iterable([none if row is None else row for row in rows]))
-        if len(self.numbers) != self.width * len(rows):
-            raise ValueError(
-                f"the plan of {type(self).__name__} gives another number of numbers than slots"
-            )
+        acts, numbers = ask_ahead(self.plan, times, self.width)
+        self.acts, self.numbers = array("B", acts.tobytes()), array("d", numbers.tobytes())
 
     def __call__(self, values: Values, t: float) -> None:
         """Act on the values of time t [s]."""
@@ -123,7 +115,8 @@ class Hold(Operation):
     code = 2
 
     def __init__(self, slots: Sequence[int], active: Callable[[float], bool]) -> None:
-        super().__init__(slots, lambda t: () if active(t) else None)
+        within = Within(active, tuple) if isinstance(active, Windows) else None
+        super().__init__(slots, within or (lambda t: () if active(t) else None))
         self.width = 0
         self.memory = array("d", bytes(8 * len(slots)))
 
@@ -153,7 +146,7 @@ class Delay(Operation):
         if missing > 0:
             self.memory.extend(array("d", bytes(8 * missing)))
 
-    def ask_ahead(self, times: Sequence[float]) -> None:
+    def ask_ahead(self, times: np.ndarray) -> None:
         self.reserve(len(times))
         super().ask_ahead(times)
 

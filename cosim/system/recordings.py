@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError, nearest
-from ..scenario.faults import TIME_TOLERANCE, Effect, Values
+from ..scenario.faults import Effect, Values
+from ..scenario.plans import TIME_TOLERANCE
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,14 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-from filelock import FileLock
 from platformdirs import user_cache_path
 
 from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
-from ..fmi.trace import TraceError
-from ..native.compilers import CompilerError
-from ..native.export_source import export_source
-from ..native.native_fmu import native_fmu
 from . import ledger
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, pack
@@ -75,6 +72,8 @@ def export(
     Returns:
         The files written.
     """
+    from ..native.export_source import export_source
+
     found = [load(*which(name), effects)[1] for name in _every(names, starts)]
     if starts is not None:
         found = [starts.baked(component) for component in found]
@@ -131,6 +130,8 @@ def _cached(
     fmu = folder / f"{stem}.fmu"
     if starts is None and fmu.is_file():
         return fmu
+    from filelock import FileLock  # only now: most calls find what they need, and this takes a while
+
     module, component = load(stem, own_file, effects)
     if starts is not None:
         component = starts.baked(component)
@@ -157,6 +158,10 @@ def _cached(
 
 
 def _compiled(component: Component, native: Native, work: Path, python: Path | None) -> Path:
+    from ..fmi.trace import TraceError
+    from ..native.compilers import CompilerError
+    from ..native.native_fmu import native_fmu
+
     try:
         return native_fmu(component, native.targets, work, python)
     except (CompilerError, TraceError) as error:
@@ -167,12 +172,24 @@ def _source_hash(
     own_file: Path | None, effects: EffectSet, starts: Mapping[str, float], native: Native | None = None
 ) -> str:
     """Hash of all that a build reads, of the start values that it changes, and of its compilers."""
-    digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
-    own = [*effects.files, *([own_file] if own_file else [])]
-    ours = [p for suffix in ("py", "c") for p in ROOT.rglob(f"*.{suffix}") if CHECKER not in p.parents]
-    for path in [*sorted(ours), *own]:
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    digest = _our_source().copy()
+    for path in [*effects.files, *([own_file] if own_file else [])]:
+        _read(digest, path)
     digest.update(changes(starts).encode())
     if native is not None:
         digest.update(native.key.encode())
     return digest.hexdigest()[:16]
+
+
+@cache
+def _our_source() -> Any:
+    """Hash of this package's source, and of the version of pythonfmu: read once in a process."""
+    digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
+    ours = [p for suffix in ("py", "c") for p in ROOT.rglob(f"*.{suffix}") if CHECKER not in p.parents]
+    for path in sorted(ours):
+        _read(digest, path)
+    return digest
+
+
+def _read(digest: Any, path: Path) -> None:
+    digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")

@@ -208,10 +208,30 @@ EXPORT fmi2Status fmi2Reset(fmi2Component c) {
     return fmi2OK;
 }
 
+/* Whether value references follow one another below a limit, so that all values lie side by side. */
+static int side_by_side(const fmi2ValueReference vr[], size_t n, size_t limit) {
+    size_t k;
+    if (n == 0 || vr[0] >= limit || n > limit - vr[0]) return 0;
+    for (k = 1; k < n; k++)
+        if (vr[k] != vr[0] + k) return 0;
+    return 1;
+}
+
+static int all_finite(const double *values, size_t n) {
+    size_t k;
+    int bad = 0;
+    for (k = 0; k < n; k++) bad |= !is_finite(values[k]);
+    return !bad;
+}
+
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Instance *m = c;
     size_t k;
     if (m->stale) initialise(m);
+    if (side_by_side(vr, n, VARIABLES)) {
+        memcpy(value, m->now.values + vr[0], n * sizeof(double));
+        return fmi2OK;
+    }
     for (k = 0; k < n; k++) {
         if (vr[k] >= VARIABLES) return refuse(m, "there is no variable with this value reference");
         value[k] = m->now.values[vr[k]];
@@ -244,8 +264,11 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], si
     Instance *m = c;
     fmi2Status status = fmi2OK;
     size_t k;
-    for (k = 0; k < n; k++)
-        if (set(m, vr[k], value[k]) != fmi2OK) status = fmi2Warning;
+    if (n && vr[0] >= PARAMS && side_by_side(vr, n, FIRST_OUTPUT) && (!HOLD_NONFINITE || all_finite(value, n)))
+        memcpy(m->now.values + vr[0], value, n * sizeof(double));
+    else
+        for (k = 0; k < n; k++)
+            if (set(m, vr[k], value[k]) != fmi2OK) status = fmi2Warning;
     if (m->now.initialising) m->stale = 1;
     return status;
 }
@@ -270,7 +293,7 @@ NO_VARIABLES(String)
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_return) {
     Instance *m = c;
     const double *after;
-    int k, bad = 0;
+    int k;
     (void)no_return;
     if (!(h >= 0.0 && is_finite(h))) {
         tell(m, fmi2Error, "step at t = %.15g s: %.15g s is no step size", t, h);
@@ -287,8 +310,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
         tell(m, fmi2Error, "step at t = %.15g s failed: division by zero", t);
         return fmi2Error;
     }
-    for (k = 0; k < OUTPUTS; k++) bad |= !is_finite(m->outputs[k]);
-    if (bad) {
+    if (!all_finite(m->outputs, OUTPUTS)) {
         char text[512] = "";
         for (k = 0; k < OUTPUTS; k++)
             if (!is_finite(m->outputs[k]) && strlen(text) + strlen(names[FIRST_OUTPUT + k]) + 3 < sizeof text)

@@ -17,12 +17,14 @@ import numpy as np
 from ...compiled.library import NoLibraryError, asks_for_plain_loop, library
 from ...process.run_state import INSTANCE, STATE
 from ...results.pending_rows import PendingRows
-from ...scenario.faults import TIME_TOLERANCE, Effect
+from ...scenario.faults import Effect
 from ...scenario.operations import OPERATIONS, Operation
+from ...scenario.plans import TIME_TOLERANCE
 from ..algorithm import Master
 from ..changes import Changes
 from ..stepper import Stepper
 from .layout import STRUCTURES, FmuLayout, LoopLayout, address, lay_out_fmu, operations_layout
+from .rounding import round_to_places
 
 # Base steps whose times and chances are planned at once; chosen: the cost of a plan is small beside
 # that of the steps, and the wait for it not noticed.
@@ -113,6 +115,7 @@ class _CompiledLoop:
             fmu=self._fmus,
             instants=rows.instants.ctypes.data,
             rows=rows.taken.ctypes.data,
+            finite=rows.finite.ctypes.data,
             taken=rows.count.ctypes.data,
             called=called.ctypes.data + 4 * INSTANCE,
             room=rows.room,
@@ -154,20 +157,21 @@ class _CompiledLoop:
         master, loop = self._master, self._loop
         done = self._horizon
         first = max(0, done - max(stepper.every for stepper in self._steppers))
-        self._times = times = array("d", master.times(first, horizon).tobytes())
-        loop.first, loop.times = first, address(times)
+        times = round_to_places(np.arange(first, horizon + 1) * master.system.scenario.step)
+        self._times = array("d", times.tobytes())
+        loop.first, loop.times = first, address(self._times)
         for stepper in self._steppers:
             every, h = stepper.every, stepper.step_size
-            due = range((done // every + 1) * every, horizon + 1, every)
+            due = np.arange((done // every + 1) * every, horizon + 1, every)
             if on_inputs := _operations(stepper.input_effects):
                 # Inputs of a step are those of its end; with Jacobi's method of the base step's
                 # beginning.
                 shift = first + master.is_jacobi
-                inputs = [times[k - shift] for k in due]
+                inputs = times[due - shift]
                 for operation in on_inputs:
                     operation.ask_ahead(inputs)
             if on_outputs := _operations(stepper.output_effects):
-                outputs = [times[k - every - first] + h for k in due]
+                outputs = times[due - every - first] + h
                 for operation in on_outputs:
                     operation.ask_ahead(outputs)
         self._horizon = horizon

@@ -80,6 +80,7 @@ class LoopLayout(ctypes.Structure):
         ("first", c_int64),
         ("instants", c_void_p),
         ("rows", c_void_p),
+        ("finite", c_void_p),
         ("called", c_void_p),
         ("taken", c_void_p),
         ("room", c_int64),
