@@ -29,7 +29,7 @@ COSIM_LAYERS = (
     ("master", "watch"),
     ("dispatch",),
     ("export", "campaign"),
-    ("run", "metrics", "plots", "interface"),  # commands
+    ("simulating", "run", "metrics", "plots", "interface"),  # Python, commands
 )
 
 # The same of diagnosis: the steps of the work, in their order.
@@ -85,6 +85,7 @@ PUBLIC_TO_DIAGNOSIS = (
     "cosim.errors",
     "cosim.interrupts",
     "cosim.lazy",
+    "cosim.process",
     "cosim.results",
 )
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
