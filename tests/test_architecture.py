@@ -13,7 +13,7 @@ import pytest
 from support.project import ROOT
 
 # Each may import those before it, and nothing else of the project.
-PACKAGES = ("fmus", "cosim", "diagnosis", "studies", "benchmarks")
+PACKAGES = ("fmus", "cosim", "diagnosis", "cybership", "studies", "benchmarks")
 
 # The modules and packages directly in cosim, lowest first; each line may import the lines before it only.
 COSIM_LAYERS = (
@@ -45,7 +45,7 @@ DIAGNOSIS_LAYERS = (
     ("report",),
     ("analysis",),
     ("open_loop",),
-    ("command_line",),
+    ("interactive", "command_line"),
     ("compare", "learn", "pca", "pls", "replay", "sysid", "watch"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
