@@ -17,6 +17,7 @@ from .model import Integrals, Model, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
 from .report.notebook import Plots, as_html
+from .report.page import write_report
 from .report.result_keys import DiagnosisContent
 from .report.terminal import summary
 
@@ -98,6 +99,11 @@ class ShownDiagnosis(session.Diagnosis):
             raise InputError("the learned model is not sound, see .stability; anyway=True writes it")
         write_model(Path(path), self.model)
         return Path(path)
+
+    def write_report(self, path: str | Path = "report.html") -> Path:
+        """Write the report of ``python -m diagnosis.learn``: one HTML file that needs no other."""
+        c = self.comparison
+        return write_report(path, self.content, c.evaluations, c.omega_std)
 
     def __repr__(self) -> str:
         return summary(self.content)

@@ -87,10 +87,14 @@ def simulate(
         system = prepare(scenario, overrides, only_own, models, beliefs)
         try:
             description = describe(system)
-            given = Path(out) if out is not None else default_folder(scenario.name, description, overwrite)
+            given = (
+                Path(out) if out is not None else default_folder(scenario.name, description, overwrite)
+            )
             folder = Path(os.path.abspath(given))
             if out is None and given.name != scenario.name:
-                show(f"note: another run is in '{given.with_name(scenario.name)}'; this one goes to '{given}'")
+                show(
+                    f"note: another run is in '{given.with_name(scenario.name)}'; this one goes to '{given}'"
+                )
             result, recorder = _run(system, folder, description, realtime, show, progress, pool)
         finally:
             owner.leave_copies()

@@ -50,8 +50,8 @@ def load_scenario(
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
-        near += [] if path.suffix else shipped_names()
-        raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
+        hint = nearest(path.name, near) if near else nearest(path.stem, shipped_names())
+        raise InputError(f"no such scenario: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None
     except json.JSONDecodeError as error:

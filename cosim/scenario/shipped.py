@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from ..formats.namespaces import OSP_STRUCTURE
+
 # In a clone beside the packages, in an installation within this one (setup.py).
 FOLDERS = (Path(__file__).parents[2] / "scenarios", Path(__file__).parents[1] / "shipped")
 
@@ -17,8 +19,12 @@ def shipped_names() -> list[str]:
 
 
 def find_scenario(source: str | Path) -> Path:
-    """The file of a scenario: a path, or the bare name of a shipped one where there is no such file."""
+    """The file of a scenario: a path, or the bare name of a shipped one.
+
+    A file of that name, or a folder that is a system, comes first; any other folder does not count.
+    """
     path = Path(source)
-    if not path.exists() and path.name == str(source) and path.name in shipped_names():
+    is_there = path.is_file() or (path / OSP_STRUCTURE).is_file()
+    if not is_there and path.name == str(source) and path.name in shipped_names():
         return shipped_folder() / f"{path.name}.json"
     return path

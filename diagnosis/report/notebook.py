@@ -84,7 +84,9 @@ def as_html(content: DiagnosisContent, plots: Plots) -> str:
     """The finding, the errors of all runs, and where the model fails, as a part of a page."""
     lines = [f"<p><b>{escape(formatting.VERDICTS[content.verdict])}</b></p>"]
     lines += [f"<p>{escape(text)}</p>" for text in (content.sentence, content.remainder.sentence)]
-    rows = "".join(f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.effects)
+    rows = "".join(
+        f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.effects
+    )
     lines += [f"<table>{rows}</table>"] if rows else []
     cells = "".join(map(_row, content.errors))
     head = "<tr><th>run</th><th>position over 8 s [mm]</th><th>heading over 8 s [°]</th></tr>"
@@ -101,4 +103,3 @@ def _row(e: RunErrors) -> str:
         for p, f in pairs
     )
     return f"<tr><td>{escape(e.run)}{' (held out)' if e.held_out else ''}</td>{cells}</tr>"
-
