@@ -200,7 +200,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--log",
         choices=("all", "compact"),
-        help="signals in the log: all, or what metrics, pictures and the diagnosis need (the scenario's)",
+        help="signals in the log: all, or what metrics, pictures and the diagnosis need",
     )
     parser.add_argument("--parquet", action="store_true", help="log.parquet in place of log.csv")
     parser.add_argument(

@@ -77,16 +77,16 @@ def simulate(
             is there, ``results/<name>_2`` and so on.
         parameters: SSP parameter sets for the plant, whose values override the scenario's.
         seed: of noise and faults, in place of the scenario's.
-        set: values by their paths, as ``{"vessel.m": 15.0, "stop": 60.0, "controller": "./mine.fmu"}``; a
-            path of a file is relative to the working directory.
+        set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
+            files are relative to the working directory.
         believe: SSP parameter sets that controllers and observers believe of the plant.
         options: ``realtime``: simulated seconds for each second of wall time; ``pictures``: whether to
             write them; ``only_own``: whether to refuse FMUs with programs that were not built on this
-            computer; ``show``: receives notes, a line each; ``progress``: receives the simulated time [s];
-            ``native``: whether to compile; ``overwrite``: write to ``results/<name>`` whatever is there.
+            computer; ``show``: receives notes, a line each; ``progress``: receives the simulated time
+            [s]; ``native``: whether to compile; ``overwrite``: use ``results/<name>`` whatever is there.
 
     Returns:
-        How it ended, with ``metrics``, ``log`` and ``plot()``. A failed or interrupted run keeps its log.
+        How it ended, with ``metrics``, ``log``, ``plot()``. A failed or interrupted run keeps its log.
 
     Raises:
         InputError: the scenario cannot be run; nothing has been written.

@@ -1,4 +1,4 @@
-"""Shell completion: ``eval "$(cybership completion bash)"``; the same for zsh, and for fish with ``source``."""
+"""Shell completion: ``eval "$(cybership completion bash)"``; so for zsh, for fish with ``source``."""
 
 import sys
 
@@ -10,7 +10,8 @@ BASH = """_cybership() {{
     if [ "$COMP_CWORD" -eq 1 ]; then
         COMPREPLY=($(compgen -W "{commands}" -- "$word"))
     elif [ "${{word:0:1}}" = "-" ]; then
-        local known="$("${{COMP_WORDS[0]}}" "${{COMP_WORDS[1]}}" --help 2> /dev/null | grep -oE -- '--[a-z][a-z-]*')"
+        local help="$("${{COMP_WORDS[0]}}" "${{COMP_WORDS[1]}}" --help 2> /dev/null)"
+        local known="$(grep -oE -- '--[a-z][a-z-]*' <<< "$help")"
         COMPREPLY=($(compgen -W "$known" -- "$word"))
     else
         COMPREPLY=($(compgen -f -- "$word"))

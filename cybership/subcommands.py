@@ -17,9 +17,7 @@ class Subcommand(NamedTuple):
 
 # In the order in which people meet them.
 SUBCOMMANDS = {
-    "demo": Subcommand(
-        "cybership.demo", "the mission in one command: sail, diagnose, sail with the finding"
-    ),
+    "demo": Subcommand("cybership.demo", "all in one: sail, diagnose, sail with what was found"),
     "run": Subcommand("cosim.run", "run a scenario: log, metrics, pictures"),
     "metrics": Subcommand("cosim.metrics", "metrics of a finished run"),
     "plots": Subcommand("cosim.plots", "pictures of runs, laid over each other; PNG, SVG or PDF"),
@@ -32,9 +30,7 @@ SUBCOMMANDS = {
     "export": Subcommand("cosim.export", "a scenario for other tools: SSP, OSP, one FMU"),
     "interface": Subcommand("cosim.interface", "what each FMU of a scenario gets and gives"),
     "schema": Subcommand("cosim.scenario", "the JSON schema of scenario files"),
-    "replay": Subcommand(
-        "diagnosis.replay", "a measured run through an observer: what is blocked, stored"
-    ),
+    "replay": Subcommand("diagnosis.replay", "a measured run through an observer: what it blocks"),
     "sysid": Subcommand("diagnosis.sysid", "system identification by concurrent learning"),
     "watch": Subcommand("diagnosis.watch", "thrusters that fail during a run"),
     "pca": Subcommand("diagnosis.pca", "principal components and outliers of runs"),

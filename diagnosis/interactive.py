@@ -1,4 +1,4 @@
-"""The diagnosis from Python: runs from files, and a result that shows itself in terminal and notebook."""
+"""The diagnosis from Python: runs from files, and a result that shows itself."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ class ShownDiagnosis(session.Diagnosis):
     def residual(self) -> pandas.DataFrame:
         """What the learned model leaves: one row a window of 3 s.
 
-        Columns ``run``, ``held_out``, ``time`` (of the middle) [s], ``X``, ``Y`` [N], ``N`` [N m], and the
-        standard deviation of each, ``X_std``, ...; ``attrs["units"]`` has the units.
+        Columns ``run``, ``held_out``, ``time`` (of the middle) [s], ``X``, ``Y`` [N], ``N`` [N m], and
+        their standard deviations ``X_std``, ...; ``attrs["units"]`` has the units.
         """
         import pandas
 

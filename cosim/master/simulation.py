@@ -92,9 +92,8 @@ def simulate(
             )
             folder = Path(os.path.abspath(given))
             if out is None and given.name != scenario.name:
-                show(
-                    f"note: another run is in '{given.with_name(scenario.name)}'; this one goes to '{given}'"
-                )
+                first = given.with_name(scenario.name)
+                show(f"note: another run is in '{first}'; this one goes to '{given}'")
             result, recorder = _run(system, folder, description, realtime, show, progress, pool)
         finally:
             owner.leave_copies()

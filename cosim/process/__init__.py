@@ -1,4 +1,4 @@
-"""The process of a run: its state where another process reads it, its scratch folders, further processes."""
+"""The process of a run: its state where another process reads it, scratch folders, more processes."""
 
 from ..lazy import lazy_names
 

@@ -25,6 +25,9 @@ LINES = (("blue", "-"), ("green", "--"), ("red", "--"), ("magenta", "-."))
 MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple", "tab:gray")
 
 
+USUAL = PictureOptions()
+
+
 class Picture(NamedTuple):
     """A picture.
 
@@ -61,7 +64,7 @@ def draw(
     start: float | None = None,
     stop: float | None = None,
     roles: Mapping[str, Roles] | None = None,
-    options: PictureOptions = PictureOptions(),
+    options: PictureOptions = USUAL,
 ) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
 

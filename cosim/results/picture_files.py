@@ -55,7 +55,7 @@ class PictureOptions(NamedTuple):
             chosen.__exit__(None, None, None)
 
     def sized(self, figure: Figure) -> Figure:
-        """The figure, as wide as wanted in proportion to the project's width, and as high in proportion."""
+        """The figure in another size, of the same shape."""
         scale = self.width / WIDTH
         figure.set_size_inches(scale * figure.get_figwidth(), scale * figure.get_figheight())
         return figure

@@ -26,8 +26,8 @@ def load_scenario(
 
     Args:
         source: path of the file, or the name of a shipped scenario; a dict is read as if it lay in the
-            working directory. An SSP archive, an OSP directory or its OspSystemStructure.xml is a scenario
-            as well.
+            working directory. An SSP archive, an OSP directory or its OspSystemStructure.xml is a
+            scenario as well.
         changes: keys that override those of the file, unless None.
 
     Raises:
