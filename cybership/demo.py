@@ -1,8 +1,8 @@
 """The mission in one command: ``cybership demo``.
 
-A ship with more drag than its model sails two paths. From the one the diagnosis finds what the model lacks,
-the other puts that to the test. What was found goes into the belief of the controller, and the ship sails
-again.
+A ship with more drag than its model sails two paths. From the one the diagnosis finds what the model
+lacks, the other puts that to the test. What was found goes into the belief of the controller, and the
+ship sails again.
 """
 
 if __name__ == "__main__":

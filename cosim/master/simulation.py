@@ -87,9 +87,8 @@ def simulate(
         system = prepare(scenario, overrides, only_own, models, beliefs)
         try:
             description = describe(system)
-            given = (
-                Path(out) if out is not None else default_folder(scenario.name, description, overwrite)
-            )
+            usual = default_folder(scenario.name, description, overwrite)
+            given = usual if out is None else Path(out)
             folder = Path(os.path.abspath(given))
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)

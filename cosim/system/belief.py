@@ -1,8 +1,9 @@
 """What controllers and observers believe of the plant: the model of a parameter set, by names.
 
-An FMU believes in a plant if it has parameters of the same names as the plant's (``m``, ``X_u``, ...), or
-a parameter described as ``estimate at the start of NAME``, from which it learns. It gets the whole model:
-of what the file does not name, the start value of the plant's FMU. ``delta_NAME`` adds to ``NAME``.
+An FMU believes in a plant if it has parameters of the same names as the plant's (``m``, ``X_u``, ...),
+or a parameter described as ``estimate at the start of NAME``, from which it learns. It gets the whole
+model: of what the file does not name, the start value of the plant's FMU. ``delta_NAME`` adds to
+``NAME``.
 """
 
 from collections.abc import Iterator
