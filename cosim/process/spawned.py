@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def without_program() -> Iterator[None]:
     """Processes that multiprocessing spawns inside do not import the program that spawns them.
 
-    They would run a plain script again from its first line, if that has no ``if __name__ == "__main__"``.
+    They would run a plain script again that has no ``if __name__ == "__main__":``.
     A specification by the name ``__main__`` is what multiprocessing takes for a program that needs no
     import. A program that was started as a module (``python -m``) is left as it is.
     """

@@ -26,6 +26,7 @@ MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple",
 
 
 USUAL = PictureOptions()
+Window = tuple[float | None, float | None]
 
 
 class Picture(NamedTuple):
@@ -65,6 +66,7 @@ def draw(
     stop: float | None = None,
     roles: Mapping[str, Roles] | None = None,
     options: PictureOptions = USUAL,
+    windows: Mapping[str, Window] | None = None,
 ) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
 
@@ -74,6 +76,7 @@ def draw(
         start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
         roles: label -> columns to use, where they are not the default ones.
         options: format, size and style.
+        windows: label -> first and last time of its metrics [s], where they are not ``start`` and ``stop``.
 
     Returns:
         The files written, among trajectory.png, errors.png, metrics.png, forces.png and
@@ -86,7 +89,7 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with options.applied():
-        for name, figure in figures(runs, start, stop, roles):
+        for name, figure in figures(runs, start, stop, roles, windows=windows):
             file = folder / f"{name}.{options.format}"
             save(options.sized(figure), file, options.dpi)
             written.append(file)
@@ -99,6 +102,7 @@ def figures(
     stop: float | None = None,
     roles: Mapping[str, Roles] | None = None,
     names: Sequence[str] = tuple(PICTURES),
+    windows: Mapping[str, Window] | None = None,
 ) -> "Iterator[tuple[str, Figure]]":
     """Name and figure of the pictures for which at least one log has the columns; see :func:`draw`."""
     for name in names:
@@ -108,7 +112,8 @@ def figures(
             own = (roles or {}).get(label, DEFAULT_ROLES)
             part = _usable(log, picture.choices, own)
             if part is not None:
-                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, start, stop))
+                window = (windows or {}).get(label, (start, stop))
+                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, *window))
         if not able:
             continue
         try:
