@@ -10,7 +10,7 @@ from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Run, clean, read, smooth
 from diagnosis.smoothing.likelihood import Criterion, likeliest
-from diagnosis.smoothing.penalised import Problem
+from diagnosis.smoothing.penalised import Problem, Weighted
 from diagnosis.smoothing.spline import (
     basis,
     gram,
@@ -194,7 +194,8 @@ def test_smoothness_has_the_largest_likelihood():
     again, same = likeliest(p, np.ones(1000), 30.0 * best)
     np.testing.assert_allclose(again, best, rtol=1e-9)
     assert same == pytest.approx(cost, abs=1e-6)
-    criteria = [Criterion(p, np.ones(1000), c) for c in range(3)]
+    shared = Weighted(p, np.ones(1000))
+    criteria = [Criterion(shared, c) for c in range(3)]
     values = [
         sum(f.cost(np.log10(s) + off) for f, s in zip(criteria, best, strict=True))
         for off in (-0.1, 0.1)

@@ -103,7 +103,8 @@ class Rivals:
         """
         target = flat(hidden)
         contained = [e for e, held in CONTAINS.items() if held & set(right)]
-        possible = [e.id for e in STANDARD.values() if EACH_VSP not in e.needs]
+        looked_for = (e for e in STANDARD.values() if e.search.by != "given")
+        possible = [e.id for e in looked_for if EACH_VSP not in e.needs]
         found = {e: self.left(target, e) for e in possible if e not in {*right, *contained, "waves"}}
         if self.nuisance:
             found[NOTHING] = self._share(target, target, [])

@@ -199,7 +199,8 @@ class Response:
         for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
             past, arriving = chain.command_response(past, tuple(each), drive, h)
             past, shares = chain.force_response(past, arriving, drive, h)
-            given[k], acting[k] = np.stack(arriving, axis=-1), np.stack(shares, axis=-1)
+            for axis in range(3):
+                given[k, ..., axis], acting[k, ..., axis] = arriving[axis], shares[axis]
         found = []
         for signal in (given, acting):
             parts_first = np.moveaxis(signal[before:], 1, 0)

@@ -29,7 +29,8 @@ EVERY = 0.5  # s
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
-KEPT = 3  # models of which parts of the model error are remembered: the last, one before, one beside
+KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
+ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -64,7 +65,7 @@ class Integrals:
     smooth: csr_matrix
     slope: csr_matrix
     held: csr_matrix
-    memory: dict[tuple[str, Any], Any] = field(default_factory=dict, repr=False)
+    memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
 
     @property
     def run(self) -> Run:
@@ -80,13 +81,14 @@ class Integrals:
 
         Of two models that differ in the hull alone the thrust is the same, and so on.
         """
-        found = self.memory.pop((what, key), None)
+        kept = self.memory.setdefault(what, {})
+        found = kept.pop(key, None)
         if found is None:
             found = make()
-            older = [k for k in self.memory if k[0] == what]
-            for k in older[: len(older) + 1 - KEPT]:
-                del self.memory[k]
-        self.memory[what, key] = found  # the last in order is the latest
+            most = ROOM // found.nbytes if isinstance(found, np.ndarray) else KEPT
+            while len(kept) >= max(most, KEPT):
+                del kept[next(iter(kept))]
+        kept[key] = found  # the last in order is the latest
         return found
 
 

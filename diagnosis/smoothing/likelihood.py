@@ -21,7 +21,7 @@ from scipy.linalg import LinAlgError
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import brentq, minimize_scalar, root_scalar
 
-from .penalised import Equations, Problem, System, solve
+from .penalised import Equations, Problem, System, Weighted, solve
 from .spline import third
 
 ADAPTIONS = 2  # rounds of adapting the penalty; a third changes less than the noise does (chosen)
@@ -50,7 +50,8 @@ def likeliest(
         Smoothness, and -2 log L, the sum of all channels.
     """
     starts = (None, None, None) if near is None else np.log10(near).tolist()
-    found = [Criterion(p, weights, channel).minimum(starts[channel]) for channel in range(3)]
+    shared = Weighted(p, weights)
+    found = [Criterion(shared, channel).minimum(starts[channel]) for channel in range(3)]
     decades, costs = zip(*found, strict=True)
     return 10.0 ** np.array(decades), float(sum(costs))
 
@@ -59,13 +60,13 @@ class Criterion:
     """-2 log L of one channel over its smoothness, in decades.
 
     Args:
-        p: problem.
-        weights: (n,), of the samples.
+        w: problem and weights.
         channel: 0 to 2.
     """
 
-    def __init__(self, p: Problem, weights: np.ndarray, channel: int) -> None:
-        self._equations, self._rank = Equations(p, channel, weights), p.grid.rank
+    def __init__(self, w: Weighted, channel: int) -> None:
+        p = w.problem
+        self._equations, self._rank = Equations(w, channel), p.grid.rank
         self._z, self._variance = p.z[:, [channel]], p.sigma[channel] ** 2
 
     def _parts(self, decades: float) -> tuple[System, float, float]:

@@ -44,22 +44,36 @@ class Problem(NamedTuple):
     sigma: np.ndarray
 
 
+class Weighted:
+    """What the equations of the three channels share: the basis with weights.
+
+    Args:
+        p: problem.
+        weights: (n,), of the samples.
+    """
+
+    def __init__(self, p: Problem, weights: np.ndarray) -> None:
+        self.problem = p
+        self.root = np.sqrt(weights)[:, None]
+        self.basis = _scaled(p.b.matrix, self.root)
+        self.transposed = self.basis.T.tocsr()
+        self.normal = gram(p.b, weights, p.grid.size)
+
+
 class Equations:
     """The weighted penalised least squares of one channel, for any smoothness.
 
     Args:
-        p: problem.
+        w: problem and weights.
         channel: 0 to 2.
-        weights: (n,), of the samples.
     """
 
-    def __init__(self, p: Problem, channel: int, weights: np.ndarray) -> None:
-        self.root = np.sqrt(weights)[:, None]
-        self.basis = _scaled(p.b.matrix, self.root)
-        self.rough = _scaled(p.rough, np.repeat(np.sqrt(p.stiffness[channel]), POINTS)[:, None])
-        self.normal = gram(p.b, weights, p.grid.size)
-        self.penalty = penalty(p.grid, p.stiffness[channel])
-        self.transposed = self.basis.T.tocsr(), self.rough.T.tocsr()
+    def __init__(self, w: Weighted, channel: int) -> None:
+        p, stiffness = w.problem, w.problem.stiffness[channel]
+        self.root, self.basis, self.normal = w.root, w.basis, w.normal
+        self.rough = _scaled(p.rough, np.repeat(np.sqrt(stiffness), POINTS)[:, None])
+        self.penalty = penalty(p.grid, stiffness)
+        self.transposed = w.transposed, self.rough.T.tocsr()
 
 
 def _scaled(matrix: csr_array, factors: np.ndarray) -> csr_array:
@@ -140,6 +154,7 @@ class Fit(NamedTuple):
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
     """The smoothing spline of each channel, for weights (n,) of the samples."""
-    a, b, c = (System(Equations(p, k, weights), float(smoothness[k])) for k in range(3))
+    shared = Weighted(p, weights)
+    a, b, c = (System(Equations(shared, k), float(smoothness[k])) for k in range(3))
     parts = [system.solve(p.z[:, [k]]) for k, system in enumerate((a, b, c))]
     return Fit(np.hstack(parts), (a, b, c))
