@@ -76,7 +76,7 @@ def draw(
         start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
         roles: label -> columns to use, where they are not the default ones.
         options: format, size and style.
-        windows: label -> first and last time of its metrics [s], where they are not ``start`` and ``stop``.
+        windows: label -> first and last time of its metrics [s], in place of ``start`` and ``stop``.
 
     Returns:
         The files written, among trajectory.png, errors.png, metrics.png, forces.png and

@@ -112,7 +112,8 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error"
+    alone = "" if e.share_unique is None else f", {_percent(e.share_unique)} by nothing else"
+    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))
 
 

@@ -1,9 +1,9 @@
 """PID control of position and heading: the baseline that knows of the ship no more than three masses.
 
 tau = K_P e + K_D e_dot + K_I int e dt with e the target minus the estimate, along, across and in heading
-(T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley, 2011, ch. 12). The integral
-of the position error is kept north and east, where what it compensates for is often constant. There is no
-feed-forward.
+(T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, Wiley, 2011, ch. 12). The
+integral of the position error is kept north and east, where what it compensates for is often constant.
+There is no feed-forward.
 
 An input that is NaN or infinite keeps its last finite value.
 """
@@ -19,8 +19,8 @@ from .backstepping import Demand, Errors
 from .parametrisation import GAIN
 
 # Fossen's rule for a mass without damping: K_P = m w^2, K_D = 2 z w m, K_I = w K_P / 10. The natural
-# frequency w is chosen: a measurement that freezes for 1 s, as in the shipped scenarios, is half a radian of
-# it. The damping ratio z = 1 does not overshoot.
+# frequency w is chosen: a measurement that freezes for 1 s, as in the shipped scenarios, is half a
+# radian of it. The damping ratio z = 1 does not overshoot.
 FREQUENCY = 0.5  # rad/s
 DAMPING = 1.0
 INTEGRAL = 0.1  # of the natural frequency
