@@ -48,5 +48,8 @@ def _input(description: Mapping[str, Any]) -> Any:
     if not isinstance(told, dict) or "scenario" not in told:
         return None
     scenario = {k: v for k, v in told["scenario"].items() if k != "log"}
+    # Where an FMU lies does not matter: archives are unpacked to another folder each time.
+    for entry in scenario.get("fmus", {}).values():
+        entry.pop("path", None)
     hashes = {name: fmu["sha256"] for name, fmu in told.get("fmus", {}).items()}
     return scenario, hashes

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
 from ..assessment.evaluation import Evaluation
 from ..identification.findings import Findings
@@ -37,7 +38,11 @@ def unique_shares(
     first, last = squares(start), squares(learned.model)
     found: list[float | None] = []
     for finding in learned.effects:
-        others = learned.keep([f.id for f in learned.effects if f.id != finding.id])
+        try:
+            others = learned.keep([f.id for f in learned.effects if f.id != finding.id])
+        except LinAlgError:  # these data do not determine the others alone
+            found.append(None)
+            continue
         without = others.model if others.effects else others.refitted or start
         found.append(min(1.0, max(0.0, (squares(without) - last) / first)))
     return found
