@@ -5,7 +5,7 @@ import pytest
 from support.cases import in_part, slow
 from support.measured import sail, smoothed
 
-from diagnosis.identification import method
+from diagnosis.identification import forward_selection, method
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate, TrainingSet
 from diagnosis.identification.shortlist import NEW, novelty, rank
@@ -118,6 +118,18 @@ def test_coefficients_within_the_prior_are_no_finding():
     off = {"X_u": -0.6, "Y_v": -1.45, "N_r": -2.0, "Y_r": -6.9}
     w, _ = data(ship=off)
     assert list(learn([w], prior=0.1).effects) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("harm", "found"), [([True, False, True], 2), ([True, True], 0)])
+def test_an_effect_that_harms_alone_stays_with_the_next_or_goes(monkeypatch, harm, found):
+    """One of two causes may harm the runs in which the other acts most, and both together do not."""
+    told = iter(harm)
+    monkeypatch.setattr(forward_selection, "harmful", lambda *_: next(told, True))
+    pair = {"ship": {"delta_X_u": -3.0}, "thrusters": {"loss_yaw": 0.3}}
+    learned = learn([data(**pair)[0]], 0.0)
+    assert len(learned.effects) == found
+    assert {f.id for f in learned.effects} == ({"X_u", "loss_yaw"} if found else set())
 
 
 def test_what_a_curve_has_in_it_is_no_candidate_beside_it():

@@ -17,13 +17,12 @@ import numpy as np
 from scipy import stats
 
 from ..model import Integrals
-from ..model.uncertainty import NOISE_TOLERANCE
-from ..model.weak_form import EVERY, OVERLAP
+from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
+from ..model.weak_form import EVERY, OVERLAP, commanded
 from .covariates import AXES
 
 CHANCE = 0.01  # level of the test, all axes and both statistics together; contract
 SHARE_OF_FIRST = 0.05  # of an axis' first model error, from which a remainder matters; contract
-SHARE_OF_COMMAND = 0.02  # of the RMS commanded force of the axis; contract
 SPAN = 12  # windows: 6 s, twice their width, so that what is left is slower than a window; chosen
 # Variance of a mean of SPAN windows by noise alone, as a share of that of independent windows: measured
 # 0.04 to 0.13 on runs without a hidden cause (tests/test_diagnosis_remainder.py), and doubled.
@@ -72,7 +71,7 @@ def axis_remainders(
         before, after: of each run the model error (K, 3) of the first model and of this [N, N, N m].
         std: of each run its standard deviation by noise (K, 3) [N, N, N m].
     """
-    command = np.concatenate([w.held @ w.run.tau_cmd for w in data])
+    command = commanded(data)
     first, left, noise = (np.concatenate(x) for x in (before, after, std))
     groups = spans(data)
     found = {}

@@ -1,9 +1,10 @@
-"""What a candidate must show to be accepted: more than chance, in runs that its fit has not seen."""
+"""What a candidate must show to be accepted: more than chance, no harm to runs that it has not seen."""
 
 import numpy as np
 
 from fmus.ship import Ship
 
+from ..model.uncertainty import SHARE_OF_COMMAND
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 
@@ -15,10 +16,8 @@ LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explain
 LEAST_OF_AXIS = 0.02
 
 
-def accepted(nothing: Scored, best: Scored, total: float) -> bool:
-    """Whether a candidate is beyond chance, and does no harm in runs that it was not fitted to.
-
-    What the prior charges for nominal coefficients that moved is counted on both sides.
+def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
+    """Whether a candidate explains more than chance does, by cross-validation over blocks.
 
     Args:
         nothing: the score without it.
@@ -26,11 +25,16 @@ def accepted(nothing: Scored, best: Scored, total: float) -> bool:
         total: sum of squares of the first model error, in units of the noise.
     """
     fall = nothing.score - best.score
-    return (
-        fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
-        and float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
-        and not worse(best.runs, nothing.runs, best.prior - nothing.prior)
-    )
+    explains = float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
+    return explains and fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
+
+
+def harmful(nothing: Scored, best: Scored) -> bool:
+    """Whether a candidate makes runs worse that it was not fitted to.
+
+    What the prior charges for nominal coefficients that moved is counted on both sides.
+    """
+    return worse(best.runs, nothing.runs, best.prior - nothing.prior)
 
 
 def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
@@ -44,15 +48,18 @@ def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
     return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
 
 
-def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray) -> bool:
-    """Whether an effect takes away a share of the first sum of squares of some axis that shows.
+def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
+    """Whether an effect takes away a force that shows, on some axis.
 
     Args:
         first: (K, 3), the first model error.
         without, left: (K, 3), the model error without the effect and with it.
+        command: (K, 3), the commanded force.
     """
     fall = np.sum(without**2 - left**2, axis=0)
-    return bool(np.any(fall >= LEAST_OF_AXIS * np.sum(first**2, axis=0)))
+    of_error = LEAST_OF_AXIS * np.sum(first**2, axis=0)
+    of_command = SHARE_OF_COMMAND**2 * np.sum(command**2, axis=0)
+    return bool(np.any(fall >= np.maximum(of_error, of_command)))
 
 
 def better(present: str, best: Shortlist, ship: Ship) -> int | None:

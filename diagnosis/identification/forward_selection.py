@@ -4,6 +4,9 @@ Each step scores every effect by block-cross-validated MAP regression, refines t
 and accepts the first if it is beyond chance and does no harm in runs that it was not fitted to. The
 model then takes the effect in, so that the next step starts from a model that is right so far; what was
 found is refined along with each candidate. With a second effect in, each place is searched again.
+
+One of two causes, alone, may well do harm where the other acts most: an effect that explains much and
+harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,14 +17,15 @@ import numpy as np
 from fmus.effects import Effect
 
 from ..model import Integrals, Model
-from .acceptance import accepted, better, matters
+from ..model.weak_form import commanded
+from .acceptance import better, beyond_chance, harmful, matters
 from .conclusion import Place, Search
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
 from .map_regression import first_share
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance, refit
-from .shortlist import Ranking, Shortlist, alike, rank, reweighted
+from .shortlist import Ranking, Shortlist, alike, rank, reweighted, scored_alone
 from .waves import Waves, find_waves
 
 MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
@@ -89,9 +93,10 @@ def search(
     t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())
-    lacking = ranking.base
+    lacking, command = ranking.base, commanded(data)
     ranked: list[Ranked] = []
     places: list[Place] = []
+    before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
     while len(places) < MOST_EFFECTS:
         advance(f"effect {len(places) + 1}: the best candidates refined")
         t, ranking, best = reweighted(t, at, ranking)
@@ -99,16 +104,27 @@ def search(
         ranked = ranked or in_one_order(ranking, best)
         first = best.scored[0]
         left = best.refined[first.candidate].left
-        if not (accepted(ranking.nothing, first, total) and matters(lacking, ranking.base, left)):
+        # As well fitted as the candidates are: what other coefficients give is not an effect's.
+        alone = refit(t, at, ranking.nuisance).estimate
+        nothing = scored_alone(t, alone)
+        shows = matters(lacking, t.error(alone), left, command)
+        if not (shows and beyond_chance(nothing, first, total)):
             break
+        harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
+        if harms and before is not None:
+            break
+        before = (t, alone) if harms else None
         places.append(place(best, rng))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
-        if len(places) > 1:
+        if len(places) > 1 and before is None:
             at, places = searched_again(t, at, places, advance, rng)
         advance(f"effect {len(places) + 1}: every effect as a candidate")
         ranking = rank(t, at, {p.id for p in places})
-    at = refit(t, at, nuisance(t, at, ranking.base)).estimate
+    if before is not None:
+        t, at = before
+        del places[-1]
+    at = refit(t, at, nuisance(t, at, t.error(at))).estimate
     return Search(t, at, places, ranked, lacking)
 
 

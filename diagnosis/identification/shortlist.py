@@ -51,7 +51,6 @@ class Ranking:
         table: all candidates.
         candidates: in the table's order.
         order: the candidates scored, best first.
-        nothing: the score without any.
     """
 
     base: np.ndarray
@@ -59,7 +58,6 @@ class Ranking:
     table: GramTable
     candidates: Sequence[Candidate]
     order: Sequence[Scored]
-    nothing: Scored
 
     @property
     def size(self) -> float:
@@ -91,7 +89,14 @@ def weighted(
     size = float(table.total[0, 0])
     new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
     order = in_order([score(table, k, len(found[k].shapes)) for k in new])
-    return Ranking(base, along, table, found, order, score(table, -1, 1))
+    return Ranking(base, along, table, found, order)
+
+
+def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
+    """The score of a model without any candidate."""
+    base = t.error(at)
+    along = nuisance(t, at, base)
+    return score(gram_table(base, t.blocks, [], along, np.asarray(t.sigma)), -1, 1)
 
 
 def novelty(t: GramTable, candidate: int, free: int) -> float:

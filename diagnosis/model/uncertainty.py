@@ -22,6 +22,9 @@ CORNERS = np.geomspace(0.1, 200.0, 80)  # rad/s, table of w0, which is held with
 KERNEL_POINTS = 1201  # of the kernel's Fourier integral; chosen
 # Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
+# Of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come from
+# how a simulator integrates. Contract, for what is left; the same for what is found.
+SHARE_OF_COMMAND = 0.02
 SMALLEST_SHARE = 0.05  # of a window's time that samples cover; chosen
 SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
 

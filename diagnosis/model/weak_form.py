@@ -4,7 +4,7 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -163,6 +163,11 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
     driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, nu))
     driven = driven @ model.effective_thrust.T
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
+
+
+def commanded(data: Sequence[Integrals]) -> np.ndarray:
+    """Commanded force (K, 3) [N, N, N m], averaged over the windows of some runs."""
+    return np.concatenate([w.held @ w.run.tau_cmd for w in data])
 
 
 def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
