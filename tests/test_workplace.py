@@ -2,11 +2,14 @@
 
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from support.project import ROOT
 
@@ -15,11 +18,15 @@ import diagnosis
 import fmus
 from cosim import run
 from cosim.command import missing_extra
+from cosim.results import draw
+from cosim.results.picture_files import PictureOptions
 from cosim.results.result_files import default_folder
 from cosim.scenario import Roles, load_scenario
 from cosim.system import prepare
 from cybership.__main__ import main, usage
 from cybership.subcommands import SUBCOMMANDS
+from diagnosis import result_folder
+from diagnosis.report import unique_share
 
 SHORT = {"stop": 1.0, "metrics": {}}
 
@@ -187,3 +194,57 @@ def test_shipped_scenarios_come_by_name(tmp_path, monkeypatch):
     assert {"ellipse", "eight", "setpoint"} <= {*cosim.shipped_names()}
     with pytest.raises(cosim.InputError, match="did you mean 'ellipse'"):
         load_scenario("elipse.json")
+
+
+def test_a_diagnosis_is_not_laid_over_that_of_other_inputs(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "log.csv").write_text("time\n")
+    usual, hashed = tmp_path / "diagnosis", result_folder.sha256(tmp_path / "a")
+    assert hashed == result_folder.sha256(tmp_path / "a" / "log.csv") != ""
+    inputs = {"a": hashed}
+    assert result_folder.default_folder(usual, inputs) == usual
+    usual.mkdir()
+    assert result_folder.default_folder(usual, inputs) == usual  # empty
+    (usual / "diagnosis.json").write_text("{}")
+    second = tmp_path / "diagnosis_2"
+    assert result_folder.default_folder(usual, inputs) == second  # of unknown inputs
+    assert result_folder.default_folder(usual, inputs, overwrite=True) == usual
+    result_folder.keep_inputs(usual, inputs)
+    assert result_folder.default_folder(usual, inputs) == usual
+    assert result_folder.default_folder(usual, {"b": "other"}) == second
+
+
+def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
+    line = np.linspace(0.0, 1.0, 5)
+    log = {"time": line, "vessel.x": line, "vessel.y": line, "vessel.psi": 0.0 * line}
+    for width in (4.0, 8.0):
+        look = PictureOptions("svg", width=width, style="ggplot")
+        assert [p.name for p in draw({"a": log}, tmp_path, options=look)] == ["trajectory.svg"]
+        svg = (tmp_path / "trajectory.svg").read_text()
+        assert float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(72.0 * width)
+    with pytest.raises(cosim.InputError, match="no style 'gplot'; did you mean 'ggplot'"):
+        draw({"a": log}, tmp_path, options=PictureOptions(style="gplot"))
+
+
+def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
+    """Here a model is the size of the error that it leaves."""
+    monkeypatch.setattr(unique_share, "omega", lambda w, model: np.full((4, 3), model))
+    left = {"a": 0.9, "b": 0.1}  # without it, all else fitted anew; 0.1 with both
+
+    def keep(ids):
+        (gone,) = left.keys() - set(ids)
+        return SimpleNamespace(effects=ids, model=left[gone])
+
+    found = SimpleNamespace(
+        effects=[SimpleNamespace(id="a"), SimpleNamespace(id="b")],
+        model=0.1, sigma=np.ones(3), keep=keep,
+    )  # fmt: skip
+    runs = [SimpleNamespace(held_out=False, integrals=None)]
+    assert unique_share.unique_shares(found, 1.0, runs) == pytest.approx([0.8, 0.0])
+
+
+def test_the_version_is_the_same_everywhere():
+    project = (ROOT / "pyproject.toml").read_text()
+    version = re.search(r'^version = "(.+)"', project, re.M)[1]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text()
