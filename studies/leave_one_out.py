@@ -24,11 +24,11 @@ class Fold:
 
     Attributes:
         found: what was learned; its last evaluation is that of the run left out.
-        in_sample: fall (3,) of the model error on this run when it is among the training runs.
+        seen: the same run when it is among the training runs.
     """
 
     found: Diagnosis
-    in_sample: np.ndarray | None = None
+    seen: Evaluation | None = None
 
     @property
     def evaluation(self) -> Evaluation:

@@ -18,7 +18,7 @@ from diagnosis.identification import MEASURED
 from diagnosis.progress import Advance, progress
 
 from . import basin, bollard, ship_tables
-from .leave_one_out import Fold, fall, gather, leave_out
+from .leave_one_out import Fold, gather, leave_out
 from .study_command import run_study, study_parser
 from .study_report import Report
 
@@ -38,9 +38,9 @@ def learned(runs: Sequence[Integrals], prior: float, quick: bool, advance: Advan
 
 
 def with_all(folds: Sequence[Fold], found: Diagnosis) -> list[Fold]:
-    """The folds with the fall on their run when it is among the training runs."""
-    in_sample = {e.name: fall(e) for e in found.comparison.evaluations}
-    return [Fold(f.found, in_sample[f.name]) for f in folds]
+    """The folds with the errors on their run when it is among the training runs."""
+    seen = {e.name: e for e in found.comparison.evaluations}
+    return [Fold(f.found, seen[f.name]) for f in folds]
 
 
 def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
