@@ -22,6 +22,7 @@ from cosim.results import draw
 NEEDED = ("scipy", "jinja2", "pandas")
 # What the plant has and its model does not: scenarios/hidden.ssv.
 HIDDEN = "hidden.ssv"
+SECONDS = 150.0  # of each run; chosen: more than a round of the ellipse, and the demo stays short
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -81,9 +82,8 @@ def _sail(name: str, folder: Path, hidden: Path, believe: list[Path] | None = No
     Raises:
         InputError: it did not go through.
     """
-    result = cosim.simulate(
-        name, folder, [hidden], set={"log.signals": "compact"}, believe=believe or []
-    )
+    settings = {"log.signals": "compact", "stop": SECONDS}
+    result = cosim.simulate(name, folder, [hidden], set=settings, believe=believe or [])
     if result.status != "done":
         raise cosim.InputError(f"the run in '{folder}' {result.status}: {result.message}")
     return result
