@@ -14,5 +14,5 @@ myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 4
 autodoc_member_order = "alphabetical"
 autodoc_typehints = "description"
-# Links to files of the repository that are no pages of the site; tests/test_docs.py sees that they exist.
+# Links to files of the repository that are no pages: tests/test_docs.py sees that they exist.
 suppress_warnings = ["myst.xref_missing"]
