@@ -5,8 +5,10 @@ runs a scenario; from Python::
 
     import cosim
 
-    result = cosim.simulate(cosim.load_scenario("scenarios/ellipse.json"), "results/ellipse")
-    log = cosim.read_log(result.folder)
+    result = cosim.simulate("ellipse", seed=3, set={"vessel.m": 15.0})
+    result.metrics["e_pos_rms"]  # m
+    result.log["vessel.x"]  # a column of a table, whose attrs["units"] tell its unit
+    result.plot("errors").save("errors.svg")
 
 The packages below, each using only those before it: ``compiled`` (C for the step loop and the log),
 ``fmu`` (one FMU), ``formats`` (files of the SSP and OSP standards), ``scenario`` (the user's input),
@@ -25,10 +27,12 @@ if TYPE_CHECKING:
     from .files import atomic_write
     from .formats.ssv import Parameter, ParameterSet, read_parameters, write_parameters
     from .master.ending import Result
-    from .master.simulation import simulate
     from .results.log import read_log
+    from .results.log_frame import log_frame
     from .scenario.load import load_scenario
     from .scenario.schema import Scenario
+    from .scenario.shipped import shipped_folder, shipped_names
+    from .simulating import simulate
 
 __all__ = [
     "BASE_UNITS",
@@ -41,9 +45,12 @@ __all__ = [
     "Unit",
     "atomic_write",
     "load_scenario",
+    "log_frame",
     "read_log",
     "read_parameters",
     "run_campaign",
+    "shipped_folder",
+    "shipped_names",
     "simulate",
     "write_parameters",
 ]
@@ -61,10 +68,18 @@ __getattr__ = lazy_names(
         "Unit": "conversion",
         "atomic_write": "files",
         "load_scenario": "scenario.load",
+        "log_frame": "results.log_frame",
         "read_log": "results.log",
         "read_parameters": "formats.ssv",
         "run_campaign": "campaign.conduct",
-        "simulate": "master.simulation",
+        "shipped_folder": "scenario.shipped",
+        "shipped_names": "scenario.shipped",
+        "simulate": "simulating",
         "write_parameters": "formats.ssv",
     },
 )
+
+
+def __dir__() -> list[str]:
+    """The public names, also those that are not imported yet."""
+    return sorted(__all__)

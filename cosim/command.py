@@ -12,12 +12,33 @@ from rich.console import Console
 from .interrupts import INTERRUPTED, ignore_interrupts, raise_on_interrupt
 from .process.run_state import STATE
 
-__all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "Output", "complain", "printable", "run_command"]
+__all__ = [
+    "BAD_INPUT",
+    "FAILED",
+    "INTERRUPTED",
+    "Output",
+    "complain",
+    "missing_extra",
+    "printable",
+    "run_command",
+]
 
 # Exit codes; 130 is what shells report after Ctrl-C (128 + SIGINT).
 BAD_INPUT, FAILED = 2, 3
 # Longest word and line of a message [characters]; chosen: longer than any path or name in use.
 LONGEST_WORD, LONGEST_LINE = 400, 4000
+# Libraries that not every installation has, as they are imported -> the extra that brings them.
+EXTRAS = {
+    "distributed": "campaign",
+    "fmu_manipulation_toolbox": "export",
+    "jinja2": "diagnosis",
+    "pandas": "diagnosis",
+    "pyarrow": "parquet",
+    "pysindy": "hidden",
+    "scipy": "diagnosis",
+    "sklearn": "analysis",
+    "ziglang": "native",
+}
 
 
 def printable(text: str) -> str:
@@ -41,6 +62,14 @@ def _cut(text: str, longest: int) -> str:
 def complain(message: object, kind: str = "error: ") -> None:
     """Say on standard error why the command ends, in one line."""
     print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
+
+
+def missing_extra(error: ModuleNotFoundError) -> str | None:
+    """What to install so that an import works, in a line; None if no extra brings the library."""
+    library = (error.name or "").partition(".")[0]
+    if library not in EXTRAS:
+        return None
+    return f"this needs {library}: pip install 'cybership[{EXTRAS[library]}]'"
 
 
 class Output(Console):
@@ -75,6 +104,10 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         code = 0
     except OSError as error:
         complain(error)
+    except ModuleNotFoundError as error:
+        line = missing_extra(error)
+        complain(line or f"this should not have happened: {error!r}; please report it")
+        code = BAD_INPUT if line else FAILED
     except Exception as error:
         complain(f"this should not have happened: {error!r}; please report it")
     STATE.end(code)

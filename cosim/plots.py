@@ -13,6 +13,7 @@ from .command import BAD_INPUT, complain, printable, run_command
 from .errors import InputError
 from .results.drawing import draw
 from .results.log import read_log
+from .results.picture_files import FORMATS, PictureOptions
 from .results.run_options import read_options
 
 
@@ -21,15 +22,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m cosim.plots",
         description="Draw the pictures of finished runs, laid over each other.",
-        epilog="example: python -m cosim.plots results/ellipse results/ellipse_bs --out results/both",
+        epilog="examples:  python -m cosim.plots results/ellipse results/ellipse_bs --out results/both\n"
+        "           python -m cosim.plots results/ellipse --format pdf --width 3.5 --out figures\n"
+        "           python -m cosim.plots results/ellipse --format svg --style ggplot --out figures",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="results of a run")
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="where the PNGs go (.)")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="where they go (.)")
+    usual = PictureOptions()
+    parser.add_argument("--format", choices=FORMATS, default=usual.format, help="(png)")
+    parser.add_argument(
+        "--width", type=_positive, metavar="INCHES", default=usual.width, help=f"({usual.width:g})"
+    )
+    parser.add_argument(
+        "--dpi", type=_positive, metavar="N", default=usual.dpi, help=f"pixels per inch ({usual.dpi:g})"
+    )
+    parser.add_argument("--style", metavar="NAME", help="style of matplotlib, or a file of one")
     options = parser.parse_args(arguments)
+    look = PictureOptions(options.format, options.dpi, options.width, options.style)
     try:
         runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
-        roles = {folder.resolve().name: read_options(folder).roles for folder in options.folders}
-        drawn = draw(runs, options.out, roles=roles)
+        told = {folder.resolve().name: read_options(folder) for folder in options.folders}
+        roles = {label: run.roles for label, run in told.items()}
+        windows = {label: (run.start, run.stop) for label, run in told.items()}
+        drawn = draw(runs, options.out, roles=roles, options=look, windows=windows)
     except InputError as error:
         complain(error)
         return BAD_INPUT
@@ -39,6 +55,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for path in drawn:
         print(printable(str(path)))
     return 0
+
+
+def _positive(text: str) -> float:
+    """A size; above a thousand nothing could draw it."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= 1000.0:
+        raise argparse.ArgumentTypeError(f"needs a number above 0, at most 1000, not '{text}'")
+    return value
 
 
 if __name__ == "__main__":

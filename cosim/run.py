@@ -35,11 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print(printable(text), markup=False)
 
     try:
-        chosen = {"step": options.step, "stop": options.stop, "seed": options.seed}
-        scenario = load_scenario(options.scenario, chosen)
-        if options.set:
-            settings = [parse_assignment(text) for text in options.set]
-            scenario = with_settings(scenario, settings, Path.cwd(), "--set")
+        scenario = _scenario(options)
         with _progress(console, scenario, options.quiet) as progress:
             result = simulate(
                 scenario,
@@ -50,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 only_own=options.only_own,
                 show=show,
                 progress=progress,
+                believe=options.believe,
+                overwrite=options.overwrite,
             )
     except InputError as error:
         complain(error)
@@ -64,6 +62,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         restore(handlers)
     return EXIT_CODES[result.status]
+
+
+def _scenario(options: argparse.Namespace) -> Scenario:
+    """The scenario with what the options change of it."""
+    chosen = {"step": options.step, "stop": options.stop, "seed": options.seed}
+    scenario = load_scenario(options.scenario, chosen)
+    settings = [parse_assignment(text) for text in options.set]
+    settings += [] if options.log is None else [("log.signals", options.log)]
+    settings += [("log.format", "parquet")] if options.parquet else []
+    return with_settings(scenario, settings, Path.cwd(), "--set") if settings else scenario
 
 
 def _no_interrupt() -> None:
@@ -149,7 +157,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="JSON file; or an SSP archive, an OSP directory or its OspSystemStructure.xml",
+        help="JSON file, or the name of a shipped one; or an SSP archive, an OSP directory or its "
+        "OspSystemStructure.xml",
     )
     parser.add_argument("--stop", type=_positive, metavar="SECONDS", help="another end")
     parser.add_argument("--step", type=_positive, metavar="SECONDS", help="another base step")
@@ -162,13 +171,36 @@ def _parser() -> argparse.ArgumentParser:
         help="one value of the scenario, such as vessel.m=15 (a parameter), controller=./mine.fmu, "
         "faults.0.std=0.001; may be given several times",
     )
-    parser.add_argument("--out", type=_folder, metavar="DIR", help="result folder (results/<name>)")
+    parser.add_argument(
+        "--out",
+        type=_folder,
+        metavar="DIR",
+        help="result folder (results/<name>; where another run is there, results/<name>_2, ...)",
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="use results/<name>, whatever run is there"
+    )
+    parser.add_argument(
+        "--log",
+        choices=("all", "compact"),
+        help="signals in the log: all, or what metrics, pictures and the diagnosis need",
+    )
+    parser.add_argument("--parquet", action="store_true", help="log.parquet in place of log.csv")
     parser.add_argument(
         "--parameters",
         metavar="FILE.ssv",
         action="append",
         default=[],
-        help="SSP parameter set whose values override the scenario's; may be given several times",
+        help="SSP parameter set for the plant, whose values override the scenario's; may be given "
+        "several times",
+    )
+    parser.add_argument(
+        "--believe",
+        metavar="FILE.ssv",
+        action="append",
+        default=[],
+        help="SSP parameter set of the plant that controllers and observers believe; may be given "
+        "several times",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")

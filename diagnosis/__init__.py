@@ -12,9 +12,11 @@ A measured run goes through three steps, each model-free, before it is compared 
 
 or all at once, as ``python -m diagnosis.learn`` does it::
 
-    runs = diagnosis.gather(["run1.csv", "run2.csv"])
-    result = diagnosis.diagnose(runs[:1], held_out=runs[1:])
-    print(result.verdict, [f.id for f in result.learned.effects])
+    runs = diagnosis.load(["run1.csv", "run2.csv"])
+    d = diagnosis.diagnose(runs[:1], held_out=runs[1:])
+    print(d)  # in ten lines; in a notebook ``d`` shows itself with pictures
+    d.plot.where().save("where.svg")
+    d.to_ssv("model.ssv")
 """
 
 from importlib import import_module
@@ -29,11 +31,12 @@ if TYPE_CHECKING:
     from .data import Counts, Run, Track, clean, read
     from .gathering import gather
     from .identification import Finding, Findings, method
-    from .model import Integrals, Model, integrals, omega
+    from .interactive import ShownDiagnosis, diagnose, load
+    from .model import Integrals, Model, integrals, omega, read_model, write_model
     from .model.uncertainty import omega_std
     from .report.content import comparison_content, diagnosis_content
     from .report.result_keys import ComparisonContent, DiagnosisContent, EffectResult
-    from .session import Comparison, Diagnosis, diagnose, evaluate
+    from .session import Comparison, Diagnosis, evaluate
     from .smoothing import Smoothed, smooth
 
 __all__ = [
@@ -51,6 +54,7 @@ __all__ = [
     "Model",
     "PredictionError",
     "Run",
+    "ShownDiagnosis",
     "Smoothed",
     "Stability",
     "Track",
@@ -65,11 +69,14 @@ __all__ = [
     "evaluate_run",
     "gather",
     "integrals",
+    "load",
     "method",
     "omega",
     "omega_std",
     "read",
+    "read_model",
     "smooth",
+    "write_model",
 ]
 
 _HOME = {
@@ -87,7 +94,11 @@ _HOME = {
     "omega": "diagnosis.model",
     "Comparison": "diagnosis.session",
     "Diagnosis": "diagnosis.session",
-    "diagnose": "diagnosis.session",
+    "ShownDiagnosis": "diagnosis.interactive",
+    "diagnose": "diagnosis.interactive",
+    "load": "diagnosis.interactive",
+    "read_model": "diagnosis.model",
+    "write_model": "diagnosis.model",
     "evaluate": "diagnosis.session",
     "Run": "diagnosis.data",
     "read": "diagnosis.data",
@@ -114,3 +125,8 @@ def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, also those that are not imported yet."""
+    return sorted(__all__)

@@ -2,8 +2,9 @@
 
 import argparse
 import io
+import shlex
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,10 @@ from fmus.effects import STANDARD
 from fmus.ship import Ship, ship
 
 from .progress import Advance, progress
+from .result_folder import default_folder, keep_inputs, sha256
+
+# Options that name files which decide a result.
+INPUTS = ("train", "test", "runs", "run", "model", "effects")
 
 
 class Done(NamedTuple):
@@ -81,8 +86,7 @@ def analysis_parser(
         help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
         f"derivative filter ({estimates})",
     )
-    out = Path("results", name)
-    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    out_options(made, Path("results", name))
     return made
 
 
@@ -104,16 +108,54 @@ def open_loop_parser(name: str, description: str, epilog: str) -> argparse.Argum
         metavar="FILE",
         help="observer, guidance and controller's parameters, in place of the run's own scenario",
     )
-    out = Path("results", name)
-    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    out_options(made, Path("results", name))
     return made
 
 
-def folder(text: str) -> Path:
-    """The argument of ``--out``."""
+def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
+    """Add ``--out`` and ``--overwrite``.
+
+    Args:
+        made: of the command.
+        usual: result folder without ``--out``, unless the result of other inputs is there.
+    """
+    made.add_argument(
+        "--out",
+        type=_folder,
+        metavar="DIR",
+        help=f"result folder ({usual}; where the result of other inputs is, {usual}_2, ...)",
+    )
+    made.add_argument("--overwrite", action="store_true", help=f"use {usual}, whatever is there")
+    made.set_defaults(usual=usual)
+
+
+def _folder(text: str) -> Path:
     if not text.strip():
         raise argparse.ArgumentTypeError("needs the name of a folder")
     return Path(text)
+
+
+def inputs_of(options: argparse.Namespace) -> dict[str, str]:
+    """The files that a command reads, as they were named -> SHA-256."""
+    given = [getattr(options, name, None) for name in INPUTS]
+    paths = [p for each in given for p in (each if isinstance(each, list) else [each]) if p is not None]
+    return {str(path): sha256(Path(path)) for path in paths}
+
+
+def command_of(name: str) -> str:
+    """The command line as it could be given again."""
+    return shlex.join(["python", "-m", f"diagnosis.{name}", *sys.argv[1:]])
+
+
+def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
+    """Choose the result folder where there is no ``--out``; returns the inputs in that case."""
+    if options.out is not None:
+        return None
+    inputs = inputs_of(options)
+    options.out = default_folder(options.usual, inputs, options.overwrite)
+    if options.out != options.usual:
+        complain(f"another result is in '{options.usual}'; this one goes to '{options.out}'", "note: ")
+    return inputs
 
 
 def ship_with(files: Sequence[Path]) -> Ship:
@@ -131,11 +173,12 @@ def ship_with(files: Sequence[Path]) -> Ship:
         raise InputError(" ".join(str(error).split())) from None
 
 
-def run(work: Callable[[Advance], Done]) -> int:
+def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.Namespace) -> int:
     """Do the work of a command, and show what it found.
 
     Args:
-        work: is given a callback for progress.
+        work: is given the options and a callback for progress.
+        options: of the command line; ``out`` is filled in.
 
     Returns:
         The exit code.
@@ -146,12 +189,15 @@ def run(work: Callable[[Advance], Done]) -> int:
     with Held() as interrupts:
         interrupts.allow()
         try:
+            inputs = _place(options)
             with progress(errors) as advance:
-                done = work(advance)
+                done = work(options, advance)
         except InputError as error:
             complain(error)
             return BAD_INPUT
         interrupts.hold()  # the files are there: what was found is shown
+        if inputs is not None:
+            keep_inputs(options.out, inputs)
         output = Output(highlight=False, markup=False)
         for part in done.shown:
             output.print(part)

@@ -7,12 +7,11 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from cosim.command import run_command
 
-from .command_line import Done, folder, parser, run, ship_with
+from .command_line import Done, command_of, inputs_of, out_options, parser, run, ship_with
 from .progress import Advance
 from .result_folder import together
 
@@ -21,7 +20,7 @@ FILES = ("comparison.json", "report.html")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    return run(partial(compare, _parser().parse_args(arguments)))
+    return run(compare, _parser().parse_args(arguments))
 
 
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
@@ -42,8 +41,9 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         advance("where it fails")
         content = comparison_content(comparison, options.model, FILES)
         (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
         write_report(
-            new / "report.html", content, comparison.evaluations, comparison.omega_std, advance=advance
+            new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
         )
     return Done(0, show_comparison(content, str(options.out)))
 
@@ -59,8 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
     )
-    out = Path("results", "comparison")
-    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    out_options(made, Path("results", "comparison"))
     return made
 
 

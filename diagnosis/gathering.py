@@ -12,6 +12,7 @@ import numpy as np
 
 from cosim import InputError
 from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
+from cosim.process import without_program
 
 from .data import Run, clean, read
 from .model import Integrals, integrals
@@ -79,7 +80,7 @@ def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable
     # Ctrl-C is for this process alone, which then lets the others end.
     pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), ignore_interrupts)
     try:
-        with UninterruptedProcesses():
+        with UninterruptedProcesses(), without_program():
             futures = [pool.submit(_smoothed, run, anyway) for run in runs]
         for run, future in zip(runs, futures, strict=True):
             advance(f"smoothing {run.name}")

@@ -7,13 +7,12 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command_line import Done, folder, parser, run, ship_with
+from .command_line import Done, command_of, inputs_of, out_options, parser, run, ship_with
 from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
@@ -23,7 +22,7 @@ DIAGNOSIS, MODEL, REPORT = FILES = ("diagnosis.json", "model.ssv", "report.html"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    return run(partial(learn, _parser().parse_args(arguments)))
+    return run(learn, _parser().parse_args(arguments))
 
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
@@ -55,8 +54,9 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
         comparison = diagnosis.comparison
+        origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
         write_report(
-            new / REPORT, content, comparison.evaluations, comparison.omega_std, advance=advance
+            new / REPORT, content, comparison.evaluations, comparison.omega_std, advance, origin
         )
     shown = [*show_diagnosis(content, str(options.out))]
     if refused:
@@ -119,8 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
     )
-    out = Path("results", "diagnosis")
-    made.add_argument("--out", type=folder, metavar="DIR", default=out, help=f"result folder ({out})")
+    out_options(made, Path("results", "diagnosis"))
     return made
 
 

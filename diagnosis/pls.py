@@ -7,7 +7,6 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 
 from cosim.command import run_command
 
@@ -20,7 +19,7 @@ RESULT, MODEL, REPORT = FILES = ("pls.json", "model.ssv", "report.html")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    return run(partial(pls, _parser().parse_args(arguments)))
+    return run(pls, _parser().parse_args(arguments))
 
 
 def pls(options: argparse.Namespace, advance: Advance) -> Done:

@@ -1,14 +1,21 @@
-"""Files that appear in a folder together, when all of them are whole."""
+"""Files that appear in a folder together, when all of them are whole, and which folder that is."""
 
+import hashlib
+import json
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 from tempfile import mkdtemp
 
 from cosim import InputError
 from cosim.interrupts import Held
+
+# In a folder that nobody chose: the hashes of what the result there was made of.
+MADE_OF = ".inputs.json"
+LOGS = ("log.csv", "log.parquet")
 
 
 @contextmanager
@@ -53,3 +60,43 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
             with suppress(OSError):  # not empty: it has the files
                 for folder in made:
                     folder.rmdir()
+
+
+def sha256(path: Path) -> str:
+    """The hash of a file, or of the log in a folder; empty where that cannot be read."""
+    if path.is_dir():
+        path = next((path / name for name in LOGS if (path / name).is_file()), path)
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def default_folder(usual: Path, inputs: Mapping[str, str], overwrite: bool = False) -> Path:
+    """The usual folder, or the first of ``usual_2``, ... that is free or has a result of these inputs.
+
+    Args:
+        usual: where results go.
+        inputs: file -> hash.
+        overwrite: whether the usual folder may hold any result.
+    """
+    if overwrite:
+        return usual
+    for number in count(1):
+        folder = usual if number == 1 else usual.with_name(f"{usual.name}_{number}")
+        if not folder.is_dir() or not any(folder.iterdir()) or _made_of(folder) == [*inputs.values()]:
+            return folder
+    raise AssertionError
+
+
+def _made_of(folder: Path) -> object:
+    try:
+        return json.loads((folder / MADE_OF).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def keep_inputs(folder: Path, inputs: Mapping[str, str]) -> None:
+    """Say in a result folder what the result was made of."""
+    with suppress(OSError):  # the result is there all the same
+        (folder / MADE_OF).write_text(json.dumps([*inputs.values()]), encoding="utf-8")

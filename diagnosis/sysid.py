@@ -7,7 +7,6 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from cosim import InputError
@@ -22,7 +21,7 @@ RESULT, MODEL, REPORT = FILES = ("sysid.json", "model.ssv", "report.html")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    return run(partial(sysid, _parser().parse_args(arguments)))
+    return run(sysid, _parser().parse_args(arguments))
 
 
 def sysid(options: argparse.Namespace, advance: Advance) -> Done:

@@ -7,7 +7,6 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 
 from cosim.command import run_command
 
@@ -20,7 +19,7 @@ FILES = ("watch.json", "report.html")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    return run(partial(watch, _parser().parse_args(arguments)))
+    return run(watch, _parser().parse_args(arguments))
 
 
 def watch(options: argparse.Namespace, advance: Advance) -> Done:

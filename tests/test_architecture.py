@@ -13,7 +13,7 @@ import pytest
 from support.project import ROOT
 
 # Each may import those before it, and nothing else of the project.
-PACKAGES = ("fmus", "cosim", "diagnosis", "studies", "benchmarks")
+PACKAGES = ("fmus", "cosim", "diagnosis", "cybership", "studies", "benchmarks")
 
 # The modules and packages directly in cosim, lowest first; each line may import the lines before it only.
 COSIM_LAYERS = (
@@ -29,7 +29,7 @@ COSIM_LAYERS = (
     ("master", "watch"),
     ("dispatch",),
     ("export", "campaign"),
-    ("run", "metrics", "plots", "interface"),  # commands
+    ("simulating", "run", "metrics", "plots", "interface"),  # Python, commands
 )
 
 # The same of diagnosis: the steps of the work, in their order.
@@ -45,7 +45,7 @@ DIAGNOSIS_LAYERS = (
     ("report",),
     ("analysis",),
     ("open_loop",),
-    ("command_line",),
+    ("interactive", "command_line"),
     ("compare", "learn", "pca", "pls", "replay", "sysid", "watch"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
@@ -85,6 +85,7 @@ PUBLIC_TO_DIAGNOSIS = (
     "cosim.errors",
     "cosim.interrupts",
     "cosim.lazy",
+    "cosim.process",
     "cosim.results",
 )
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fmus.controller import abs as abs_module
-from fmus.controller import bs
+from fmus.controller import bs, pid
 from fmus.controller.adaptive import Disturbance
 from fmus.controller.backstepping import Gains, Inputs, control_errors
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
@@ -179,3 +179,26 @@ def test_nothing_is_learned_while_frozen_if_so_chosen():
 def test_gains_default_to_table_5_1():
     assert tuple(Gains()) == (0.4, 1.0, 0.2, 1.0, 5.0, 1.0)
     assert ROTATIONAL_GAINS == (8.0, 4.0, 8.0, 8.0, 8.0, 4.0, 8.0, 8.0)
+
+
+def test_pid_finds_a_constant_force():
+    """Its integral is what the force is, and then the ship lies where it should; windup has an end."""
+    force = np.array([0.3, -0.2])  # N, north and east
+    params, h = pid.COMPONENT.params(), 0.1
+    body = vessel.COMPONENT.prepare(vessel.COMPONENT.params()).hull
+    s = vessel.State()
+    cs = pid.COMPONENT.init(pid.Inputs(true_estimate(s), Target()), params)
+    out = None
+    for _ in range(round(140.0 / h)):
+        cs, out = pid.COMPONENT.step(cs, pid.Inputs(true_estimate(s), Target()), params, h)
+        X, Y = rotate_to_body(s.psi, *force)
+        s = vessel.integrate(s, Force(out.tau.tau_X + X, out.tau.tau_Y + Y, out.tau.tau_N), body, h)
+    assert out is not None
+    assert np.hypot(s.x, s.y) < 1e-3
+    assert (out.omega_hat_X, out.omega_hat_Y) == pytest.approx(rotate_to_body(s.psi, *force), abs=5e-3)
+    far = pid.Inputs(Estimate(), Target(x_t=1e3))
+    for _ in range(1000):
+        cs, _ = pid.COMPONENT.step(cs, far, params, 1.0)
+    assert cs.north == params.limit_position
+    frozen = pid.Inputs(Estimate(frozen=1.0), Target(x_t=-1.0))
+    assert pid.COMPONENT.step(cs, frozen, params, 1.0)[0] == cs

@@ -53,8 +53,7 @@ def run_campaign(
 ) -> pandas.DataFrame:
     """Run a scenario many times, and give one row for each run.
 
-    Runs that have finished in the same folder before are not run again. A program that calls this with
-    workers needs ``if __name__ == "__main__":`` around it, as each worker imports the program.
+    Runs that have finished in the same folder before are not run again.
 
     Args:
         campaign: path of a campaign file, or its content.

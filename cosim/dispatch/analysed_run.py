@@ -114,8 +114,7 @@ def analyse_runs(
     """Run scenarios, and give what an analysis makes of each.
 
     FMUs are loaded once in a process and reset between runs where they are the project's own; logs stay
-    in memory. The analysis may be called in another process: it and what it gives are pickled. A program
-    that calls this needs ``if __name__ == "__main__":`` around it, as each process imports the program.
+    in memory. The analysis may be called in another process: it and what it gives are pickled.
 
     Args:
         scenarios: contents, as if they lay in the working directory.

@@ -8,7 +8,7 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Generator, Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from itertools import islice
 from queue import Empty, Queue
 from tempfile import TemporaryDirectory
@@ -24,6 +24,7 @@ from distributed import (
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
+from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
 from .job import Job, Row, own_version
 from .travelling_files import Files
@@ -78,10 +79,12 @@ class DaskWorkers:
         self._files = files
         self._cluster: LocalCluster | None = None
         self._scratch = TemporaryDirectory(prefix="campaign_", ignore_cleanup_errors=True)
+        self._program = ExitStack()
         for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
             logging.getLogger(logger).setLevel(logging.CRITICAL)
         try:
             if address is None:
+                self._program.enter_context(without_program())  # also for workers that start again
                 # A Ctrl-C is for this process alone; the workers end with it.
                 with UninterruptedProcesses():
                     self._cluster = LocalCluster(
@@ -99,6 +102,7 @@ class DaskWorkers:
             else:
                 self._client = Client(address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
+            self._program.close()
             self._scratch.cleanup()
             where = "with processes on this computer" if address is None else f"at '{address}'"
             raise InputError(f"no Dask scheduler answers {where}: {error}") from None
@@ -216,4 +220,5 @@ class DaskWorkers:
         if self._cluster is not None:
             with suppress(OSError):
                 self._cluster.close()
+        self._program.close()
         self._scratch.cleanup()

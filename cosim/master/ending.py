@@ -1,16 +1,27 @@
 """How a run ended, and what is written once its steps are done."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from ..errors import InputError, nearest
 from ..files import update_json, write_json
 from ..results import log as logs
 from ..results import performance
+from ..results.log_frame import log_frame
+from ..results.picture_files import Drawn
+from ..results.run_options import read_options
 from ..system.system import System
 from .recorder import Recorder
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass
@@ -38,6 +49,34 @@ class Result:
     pace: dict[str, float] = field(default_factory=dict)
     loop: str = ""
     loop_reason: str = ""
+
+    @cached_property
+    def log(self) -> pandas.DataFrame:
+        """The log as a table, read when it is first asked for; see :func:`cosim.log_frame`."""
+        return log_frame(self.folder)
+
+    def plot(self, name: str = "trajectory") -> Drawn:
+        """Draw one of the pictures of a run.
+
+        Args:
+            name: ``trajectory``, ``errors``, ``metrics``, ``forces`` or ``model_error``.
+
+        Returns:
+            The picture, which shows itself in a notebook.
+
+        Raises:
+            InputError: no such picture, or the log lacks what it needs.
+        """
+        from ..results import drawing
+
+        if name not in drawing.PICTURES:
+            raise InputError(f"no picture '{name}'{nearest(name, drawing.PICTURES)}")
+        run, label = read_options(self.folder), self.folder.name
+        runs = {label: logs.read_log(self.folder)}
+        drawn = drawing.figures(runs, run.start, run.stop, {label: run.roles}, [name])
+        for _, figure in drawn:
+            return Drawn(figure)
+        raise InputError(f"the log in '{self.folder}' lacks columns to draw {name}")
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from ..formats.ssv import read_parameters
 from ..process.run_state import LOGGING, STATE, Owner
 from ..process.scratch import sweep
 from ..results import log as logs
-from ..results.result_files import clear_results
+from ..results.result_files import clear_results, default_folder
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
@@ -45,12 +45,14 @@ def simulate(
     progress: Callable[[float], None] = lambda _: None,
     pool: InstancePool | None = None,
     native: bool | None = None,
+    believe: Sequence[str | Path] = (),
+    overwrite: bool = False,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
     Args:
         scenario: from :func:`cosim.load_scenario`.
-        out: result folder; default ``results/<name>`` in the working directory.
+        out: result folder; None: see :func:`~cosim.results.result_files.default_folder`.
         parameters: SSP parameter sets whose values override the scenario's.
         realtime: simulated seconds per second of wall time; None runs as fast as it can.
         pictures: whether to draw.
@@ -60,6 +62,8 @@ def simulate(
         pool: FMUs that serve several runs, for a scenario whose paths are all files.
         native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
             nothing; None leaves it to the scenario, which by default compiles the loop.
+        believe: SSP parameter sets that controllers and observers believe of the plant.
+        overwrite: whether the default folder is ``results/<name>``, whatever is there.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -70,20 +74,26 @@ def simulate(
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
+    beliefs = [(Path(p), read_parameters(Path(p))) for p in believe]
     if native is not None:
         scenario = with_settings(scenario, [("native", native)], Path.cwd())
     # FMUs may change the working directory.
     here = os.getcwd()
-    given = Path(out) if out is not None else Path("results") / scenario.name
-    folder = Path(os.path.abspath(given))
     owner = Owner()
     sweep()
     result: Result | None = None
     try:
         models = None if pool is None else pool.models(scenario)
-        system = prepare(scenario, overrides, only_own, models)
+        system = prepare(scenario, overrides, only_own, models, beliefs)
         try:
-            result, recorder = _run(system, folder, realtime, show, progress, pool)
+            description = describe(system)
+            usual = default_folder(scenario.name, description, overwrite)
+            given = usual if out is None else Path(out)
+            folder = Path(os.path.abspath(given))
+            if out is None and given.name != scenario.name:
+                first = given.with_name(scenario.name)
+                show(f"note: another run is in '{first}'; this one goes to '{given}'")
+            result, recorder = _run(system, folder, description, realtime, show, progress, pool)
         finally:
             owner.leave_copies()
             if pool is None:
@@ -104,6 +114,7 @@ def simulate(
 def _run(
     system: System,
     folder: Path,
+    description: dict[str, Any],
     realtime: float | None,
     show: Callable[[str], None],
     progress: Callable[[float], None],
@@ -117,7 +128,6 @@ def _run(
         show(f"warning: {warning}")
     if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
         raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
-    description = describe(system)
     STATE.begin(str(folder), json.dumps(description), system.order)
     with interruptible() as interrupted:
         try:

@@ -8,17 +8,32 @@ if TYPE_CHECKING:
     from .canvas import thin
     from .drawing import draw
     from .log import Log, read_log
+    from .log_frame import log_frame
     from .performance import MetricsError, compute, over_time, tracking
+    from .picture_files import Drawn
 
-__all__ = ["Log", "MetricsError", "compute", "draw", "over_time", "read_log", "thin", "tracking"]
+__all__ = [
+    "Drawn",
+    "Log",
+    "MetricsError",
+    "compute",
+    "draw",
+    "log_frame",
+    "over_time",
+    "read_log",
+    "thin",
+    "tracking",
+]
 
 __getattr__ = lazy_names(
     __name__,
     {
+        "Drawn": "picture_files",
         "Log": "log",
         "MetricsError": "performance",
         "compute": "performance",
         "draw": "drawing",
+        "log_frame": "log_frame",
         "over_time": "performance",
         "read_log": "log",
         "thin": "canvas",

@@ -132,10 +132,16 @@ def finish(figure: Figure, panels: np.ndarray, runs: Runs, least: float = 0.0) -
     return figure
 
 
-def save(figure: Figure, file: Path) -> None:
-    """Write a figure, completely or not at all."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
+    """Write a figure, completely or not at all; the ending of the name says in which format.
 
-    FigureCanvasAgg(figure)
+    Args:
+        figure: what to write.
+        file: ``.png``, ``.svg`` or ``.pdf``.
+        dpi: pixels per inch of a PNG.
+    """
+    form = file.suffix[1:]
+    # Without a date the same figure is the same file.
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with atomic_write(file) as scratch:
-        figure.savefig(scratch, format="png", dpi=DPI)
+        figure.savefig(scratch, format=form, dpi=dpi, metadata=metadata)

@@ -1,6 +1,6 @@
 """Pictures of one run, or of several laid over each other: the five of the thesis, 5.1."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,6 +11,7 @@ from .canvas import Run, Runs, save
 from .lines import errors, forces, metrics, model_error
 from .log import Log
 from .performance import MetricsError
+from .picture_files import PictureOptions
 from .track import trajectory
 
 if TYPE_CHECKING:
@@ -22,6 +23,10 @@ LARGEST = 1e9
 # The thesis' lines, 5.3, then matplotlib's colours.
 LINES = (("blue", "-"), ("green", "--"), ("red", "--"), ("magenta", "-."))
 MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple", "tab:gray")
+
+
+USUAL = PictureOptions()
+Window = tuple[float | None, float | None]
 
 
 class Picture(NamedTuple):
@@ -60,39 +65,62 @@ def draw(
     start: float | None = None,
     stop: float | None = None,
     roles: Mapping[str, Roles] | None = None,
+    options: PictureOptions = USUAL,
+    windows: Mapping[str, Window] | None = None,
 ) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
 
     Args:
         runs: label -> log; several logs are laid over each other.
-        folder: for the PNG files, made when missing.
+        folder: for the files, made when missing.
         start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
         roles: label -> columns to use, where they are not the default ones.
+        options: format, size and style.
+        windows: label -> first and last time of its metrics [s], in place of ``start`` and ``stop``.
 
     Returns:
         The files written, among trajectory.png, errors.png, metrics.png, forces.png and
         model_error.png.
+
+    Raises:
+        InputError: there is no such style.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, picture in PICTURES.items():
+    with options.applied():
+        for name, figure in figures(runs, start, stop, roles, windows=windows):
+            file = folder / f"{name}.{options.format}"
+            save(options.sized(figure), file, options.dpi)
+            written.append(file)
+    return written
+
+
+def figures(
+    runs: Mapping[str, Log],
+    start: float | None = None,
+    stop: float | None = None,
+    roles: Mapping[str, Roles] | None = None,
+    names: Sequence[str] = tuple(PICTURES),
+    windows: Mapping[str, Window] | None = None,
+) -> "Iterator[tuple[str, Figure]]":
+    """Name and figure of the pictures for which at least one log has the columns; see :func:`draw`."""
+    for name in names:
+        picture = PICTURES[name]
         able: list[Run] = []
         for k, (label, log) in enumerate(runs.items()):
             own = (roles or {}).get(label, DEFAULT_ROLES)
             part = _usable(log, picture.choices, own)
             if part is not None:
-                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, start, stop))
+                window = (windows or {}).get(label, (start, stop))
+                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, *window))
         if not able:
             continue
-        file = folder / f"{name}.png"
         try:
             figure = picture.figure(able)
         except MetricsError:  # fewer than two rows in the window
             continue
-        save(figure, file)
-        written.append(file)
-    return written
+        yield name, figure
 
 
 def _line(k: int) -> dict[str, Any]:

@@ -32,6 +32,11 @@ def errors(runs: Runs) -> "Figure":
     return finish(figure, panels, runs, least=1e-4)
 
 
+def _is_anything(runs: Runs, role: str) -> bool:
+    """Whether a column of a role is not zero throughout in some run."""
+    return any(np.any(run.log[name] != 0.0) for run in runs for name in run.roles.of(role))
+
+
 GROWING = (
     ("ISE", "ISE [m² s]"),
     ("IAE", "IAE [m s]"),
@@ -56,13 +61,14 @@ def metrics(runs: Runs) -> "Figure":
 
 
 def forces(runs: Runs) -> "Figure":
-    """Norms of the controller's linear, nonlinear and total force, (5.1)."""
-    figure, panels = stacked(3, 1, 6.5)
-    parts = (
+    """Norms of the controller's linear, nonlinear and total force, (5.1); those that are not zero."""
+    every = (
         ("linear", "linear_force"),
         ("nonlinear", "nonlinear_force"),
         ("total", "requested_force"),
     )
+    parts = [part for part in every if _is_anything(runs, part[1])] or [every[-1]]
+    figure, panels = stacked(len(parts), 1, 1.0 + 1.85 * len(parts))
     for panel, (title, role) in zip(panels.flat, parts, strict=True):
         for run in runs:
             plot(panel, run, _norm(run.log, run.roles.of(role)))

@@ -194,10 +194,15 @@ def _header(line: str) -> list[str]:
 
 def to_parquet(folder: Path) -> Path:
     """Replace the CSV log of a folder by Parquet; the CSV is removed when the new file is complete."""
-    from pyarrow import csv, parquet
+    from pyarrow import csv, parquet, types
 
+    table = csv.read_csv(folder / CSV)
+    # Bytes of equal weight lie together: 12 MB in place of 20 for the ellipse, whose CSV has 45.
+    floats = [field.name for field in table.schema if types.is_floating(field.type)]
     with atomic_write(folder / PARQUET) as scratch:
-        parquet.write_table(csv.read_csv(folder / CSV), scratch)
+        parquet.write_table(
+            table, scratch, compression="zstd", use_dictionary=False, use_byte_stream_split=floats
+        )
     (folder / CSV).unlink()
     return folder / PARQUET
 

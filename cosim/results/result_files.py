@@ -1,9 +1,15 @@
 """The files of a run in its result folder."""
 
+import json
+from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 from .drawing import PICTURES
 from .log import CSV, METRICS, PARQUET, SIDECAR
+
+RESULTS = Path("results")
 
 
 def clear_results(folder: Path) -> None:
@@ -13,3 +19,37 @@ def clear_results(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
         for scratch in folder.glob(f".{name}.*.part"):  # of a run that was killed
             scratch.unlink(missing_ok=True)
+
+
+def default_folder(name: str, description: Mapping[str, Any], overwrite: bool = False) -> Path:
+    """``results/<name>``, or the first of ``results/<name>_2``, ... with the same run or none.
+
+    Args:
+        name: of the scenario.
+        description: of the run, as its log.json will have it.
+        overwrite: whether ``results/<name>`` may be any run's.
+    """
+    for number in count(1):
+        folder = RESULTS / (name if number == 1 else f"{name}_{number}")
+        try:
+            earlier = json.loads((folder / SIDECAR).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return folder
+        except (OSError, ValueError):  # no log of ours: not to be replaced
+            earlier = {}
+        if overwrite or _input(earlier) == _input(description):
+            return folder
+    raise AssertionError
+
+
+def _input(description: Mapping[str, Any]) -> Any:
+    """What decides the result of a run: the scenario as it was understood, and the FMUs."""
+    told = json.loads(json.dumps(description))
+    if not isinstance(told, dict) or "scenario" not in told:
+        return None
+    scenario = {k: v for k, v in told["scenario"].items() if k != "log"}
+    # Where an FMU lies does not matter: archives are unpacked to another folder each time.
+    for entry in scenario.get("fmus", {}).values():
+        entry.pop("path", None)
+    hashes = {name: fmu["sha256"] for name, fmu in told.get("fmus", {}).items()}
+    return scenario, hashes

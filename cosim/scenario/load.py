@@ -13,6 +13,7 @@ from . import faults
 from .roles import Roles
 from .schema import Event, FmuEntry, LogOptions, MetricsOptions, Recording, Scenario, Transformation
 from .setting import set_value
+from .shipped import find_scenario, shipped_names
 
 # Parts of pydantic's error locations that name a validator or a type, not a place in the file.
 INTERNAL = ("function-", "constrained-", "bool", "int", "float", "str", "tuple", "list[")
@@ -24,8 +25,9 @@ def load_scenario(
     """A scenario from a JSON file or from the same content as a dict, or a system of other tools.
 
     Args:
-        source: path of the file; a dict is read as if it lay in the working directory. An SSP archive,
-            an OSP directory or its OspSystemStructure.xml is a scenario as well.
+        source: path of the file, or the name of a shipped scenario; a dict is read as if it lay in the
+            working directory. An SSP archive, an OSP directory or its OspSystemStructure.xml is a
+            scenario as well.
         changes: keys that override those of the file, unless None.
 
     Raises:
@@ -34,7 +36,7 @@ def load_scenario(
     chosen = {key: value for key, value in (changes or {}).items() if value is not None}
     if isinstance(source, dict):
         return _validate(source | chosen, "scenario", Path.cwd())
-    path = Path(source)
+    path = find_scenario(source)
     if is_system(path):
         system = read_system(path)
         for key in ("step", "stop"):
@@ -48,7 +50,8 @@ def load_scenario(
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
-        raise InputError(f"no such scenario: '{path}'{nearest(path.name, near)}") from None
+        hint = nearest(path.name, near) if near else nearest(path.stem, shipped_names())
+        raise InputError(f"no such scenario: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None
     except json.JSONDecodeError as error:

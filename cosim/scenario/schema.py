@@ -97,8 +97,10 @@ class Event(Strict):
 class LogOptions(Strict):
     """What is logged, and how often."""
 
-    signals: Literal["all"] | list[str] = Field(
-        "all", description="all inputs and outputs, or names as instance.variable, * as wildcard"
+    signals: Literal["all", "compact"] | list[str] = Field(
+        "all",
+        description="all inputs and outputs; what metrics, pictures and the diagnosis need; or names as "
+        "instance.variable, * as wildcard",
     )
     every: PositiveInt = Field(1, description="log every n-th base step")
     format: Literal["csv", "parquet"] = "csv"

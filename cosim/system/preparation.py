@@ -30,6 +30,7 @@ def prepare(
     overrides: Overrides = (),
     only_own: bool = False,
     models: Mapping[str, Model] | None = None,
+    beliefs: Overrides = (),
 ) -> System:
     """Read the FMUs of a scenario and check all that can be checked without running.
 
@@ -38,6 +39,7 @@ def prepare(
         overrides: parameter sets whose values override the scenario's.
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         models: the FMU of each instance, where they have been read before.
+        beliefs: parameter sets of what other FMUs believe of the models that these name.
 
     Raises:
         InputError: the first error.
@@ -50,7 +52,7 @@ def prepare(
     check_processes(system)
     check_window(scenario)
     _count_steps(system)
-    check_parameters(system, overrides)
+    check_parameters(system, overrides, beliefs)
     connect(system)
     system.recordings = check_recordings(system)
     find_free_inputs(system)
@@ -108,6 +110,8 @@ def _choose_signals(system: System) -> None:
     wanted = system.scenario.log.signals
     if wanted == "all":
         system.logged = flowing
+    elif wanted == "compact":
+        system.logged = _compact(system, available)
     else:
         for k, pattern in enumerate(wanted):
             for name in _matching(system, pattern, flowing, f"log.signals[{k}]"):
@@ -126,6 +130,15 @@ def _choose_signals(system: System) -> None:
     system.signals = {
         name: Signal(name.partition(".")[0], v) for name, v in available.items() if name in needed
     }
+
+
+def _compact(system: System, available: Mapping[str, Variable]) -> list[str]:
+    """What metrics, pictures and the diagnosis read: the roles, and what measures the pose."""
+    sources = set(system.scenario.roles.pose)
+    measured = [c.target.name for c in system.connections if c.source.name in sources]
+    poses = [f"{name}.{axis}_m" for name in system.models for axis in ("x", "y", "psi")]
+    wanted = {*system.scenario.roles.columns, *measured, *poses}
+    return [name for name in available if name in wanted]
 
 
 def _numbers(system: System) -> dict[str, Variable]:

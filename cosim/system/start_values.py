@@ -8,6 +8,7 @@ from pathlib import Path
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import INT_LIMIT, Model, Value, Variable
 from ..formats.ssv import ParameterSet
+from .belief import Chosen, believe
 from .parameter_table import read_table, table_parameters
 from .system import System
 
@@ -15,13 +16,21 @@ from .system import System
 Overrides = Sequence[tuple[Path, ParameterSet]]
 
 
-def check_parameters(system: System, overrides: Overrides) -> None:
+def check_parameters(system: System, overrides: Overrides, beliefs: Overrides = ()) -> None:
     """Fill in the start values of a system.
+
+    Args:
+        system: is changed.
+        overrides: parameter sets of the models that they name.
+        beliefs: parameter sets of what other FMUs believe of these models.
 
     Raises:
         InputError: no such parameter, or a value that it cannot have.
     """
-    for name, values in _merge_parameters(system, overrides).items():
+    chosen = _merge_parameters(system, overrides)
+    for path, given in beliefs:
+        believe(system, path, given, chosen)
+    for name, values in chosen.items():
         known = system.models[name].variables
         settable = {k: v for k, v in known.items() if v.causality in ("parameter", "input")}
         system.parameters[name] = []
@@ -34,9 +43,9 @@ def check_parameters(system: System, overrides: Overrides) -> None:
             system.parameters[name].append((settable[parameter], value))
 
 
-def _merge_parameters(system: System, overrides: Overrides) -> dict[str, dict[str, tuple[Value, str]]]:
+def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
     """Instance -> parameter -> value and its origin; parameter sets override the scenario."""
-    chosen: dict[str, dict[str, tuple[Value, str]]] = {}
+    chosen: Chosen = {}
     for name, entry in system.scenario.fmus.items():
         chosen[name] = {k: (v, f"fmus.{name}.parameters") for k, v in entry.parameters.items()}
         chosen[name] |= _from_table(system, name)

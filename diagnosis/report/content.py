@@ -16,6 +16,7 @@ from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit
 from .headline import headline
+from .unique_share import unique_shares
 
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
@@ -51,8 +52,10 @@ def diagnosis_content(
         files: names of the files that are written together.
     """
     learned, comparison, s = diagnosis.learned, diagnosis.comparison, diagnosis.stability
+    unique = unique_shares(learned, diagnosis.start, comparison.evaluations)
     effects = [
-        _effect(diagnosis, f, share) for f, share in zip(learned.effects, diagnosis.shares, strict=True)
+        _effect(diagnosis, f, share, alone)
+        for f, share, alone in zip(learned.effects, diagnosis.shares, unique, strict=True)
     ]
     suspects = [result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects]
     return result_keys.DiagnosisContent(
@@ -175,7 +178,9 @@ def _profile(p: Profile) -> result_keys.ProfileResult:
     )
 
 
-def _effect(diagnosis: Diagnosis, f: Finding, share: float) -> result_keys.EffectResult:
+def _effect(
+    diagnosis: Diagnosis, f: Finding, share: float, unique: float | None
+) -> result_keys.EffectResult:
     effects = diagnosis.start.ship.effects
     effect = effects[f.id]
     # Of a coefficient the addition counts, of any other parameter of the effect its value.
@@ -197,4 +202,5 @@ def _effect(diagnosis: Diagnosis, f: Finding, share: float) -> result_keys.Effec
         sentence=sentence(Found(effect, values, diagnosis.speeds)),
         equation=equation(effect, values, ci95),
         separation=separation_note(f.id, f.alike),
+        share_unique=unique,
     )

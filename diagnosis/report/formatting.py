@@ -11,6 +11,25 @@ VERDICTS = {
     "unexplained": "Something is missing, and nothing known here explains it",
     "none": "Nothing is missing that these data show",
 }
+# What the page says and means; numbers are those of the contract of the files, docs/diagnosis.md.
+GLOSSARY = (
+    (
+        "surge, sway, yaw",
+        "motion ahead, to starboard, and turning with the bow to starboard; X, Y and N",
+    ),
+    ("ω, model error", "the force that the model would need to move as the ship did [N, N, N·m]"),
+    (
+        "window",
+        "8 s of a run, predicted from where the ship was at first; of ω: 3 s, weighted",
+    ),
+    ("held out", "a run of which nothing was learned, to see whether what was learned holds"),
+    ("candidate, effect", "a physical cause that the model lacks, with its own parameters"),
+    ("nominal", "what the model has before anything is learned"),
+    ("confidence", "probability that this effect, and not another one, is a true cause"),
+    ("95 % interval", "holds the value in 95 of 100 repetitions, if the effect is the true cause"),
+    ("cross-validated", "judged on a part of the data that the fit has not seen, for each part in turn"),
+    ("noise, uncertainty", "what measurement and smoothing alone would show as a model error"),
+)
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
 POSITIONAL = (1e-4, 1e6)  # magnitudes that are written without an exponent; chosen

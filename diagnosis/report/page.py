@@ -1,6 +1,6 @@
 """The report: content of a JSON file as text and tables, with figures of the runs, in one HTML page."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+NO_ORIGIN: Mapping[str, object] = {}
+
+
 class Drawing(NamedTuple):
     """A figure of the page: its ``<svg>`` element and its caption."""
 
@@ -37,6 +40,7 @@ def write_report(
     evaluations: Sequence[Evaluation],
     omega_std: Sequence[np.ndarray] | None = None,
     advance: Advance = silent,
+    origin: Mapping[str, object] = NO_ORIGIN,
 ) -> Path:
     """Write the report: one HTML file that needs no other.
 
@@ -46,6 +50,7 @@ def write_report(
         evaluations: one for each run, in the order of ``content.errors``.
         omega_std: standard deviation (K, 3) [N, N, N m] of each run's model error; None if not known.
         advance: receives the name of each step when it begins.
+        origin: what else the result was made with, such as the command line and the hashes of its files.
 
     Returns:
         The path.
@@ -73,7 +78,8 @@ def write_report(
         figures=drawn,
         tiles=list(_tiles(content, learned)),
         runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
-        provenance=[(label, value) for label, value in _provenance(content) if value is not None],
+        provenance=[(k, v) for k, v in (*_provenance(content), *origin.items()) if v is not None],
+        glossary=formatting.GLOSSARY,
     )
     with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")

@@ -129,7 +129,7 @@ class Coefficient(Part):
 
 
 class EffectResult(Part):
-    """An effect that was accepted."""
+    """An effect that was accepted; share_unique: of the error, what nothing else explains."""
 
     id: str
     axis: Axes
@@ -141,6 +141,7 @@ class EffectResult(Part):
     sentence: str
     equation: str
     separation: str
+    share_unique: Number = None
 
 
 class AxisRemainderResult(Part):

@@ -8,10 +8,12 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from .formatting import VERDICTS
 from .headline import is_sure, told
 from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, RunErrors
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
+MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
 
 
 def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
@@ -50,6 +52,24 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
     yield from _errors(r.errors, learned=bool(r.effects) or r.verdict == "coefficients")
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)
+
+
+def summary(r: DiagnosisContent) -> str:
+    """The result in at most ten lines."""
+    sure = sorted(r.effects, key=lambda e: not is_sure(e))[:MAX_SUMMARY]
+    lines = [f"{r.verdict}: {VERDICTS[r.verdict]}"]
+    lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in sure] or [f"  {r.sentence}"]
+    lines += [f"  {r.remainder.sentence}"]
+    for e in r.errors[:MAX_SUMMARY]:
+        position = e.window_position_rmse
+        pair = " -> ".join(
+            _number(None if x is None else 1e3 * x, 2) for x in (position.before, position.after)
+        )
+        held_out = " (held out)" if e.held_out else ""
+        lines.append(f"  {e.run}{held_out}: predictions over 8 s miss by {pair} mm")
+    more = len(r.errors) - MAX_SUMMARY
+    lines += [f"  and {more} more runs"] if more > 0 else []
+    return "\n".join(lines)
 
 
 def _titled(title: str, body: RenderableType) -> Iterator[RenderableType]:
@@ -92,7 +112,8 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error"
+    alone = "" if e.share_unique is None else f", {_percent(e.share_unique)} by nothing else"
+    yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))
 
 

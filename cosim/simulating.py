@@ -1,0 +1,100 @@
+"""A run from Python: :func:`cosim.simulate`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from .errors import InputError
+from .master import simulation
+from .master.ending import Result
+from .scenario.load import load_scenario, with_settings
+from .scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .system.instance_pool import InstancePool
+
+
+_alone = threading.Lock()
+_running: threading.Thread | None = None
+
+
+@contextmanager
+def _one_at_a_time() -> Iterator[None]:
+    """Wait until no other thread of this process simulates.
+
+    Raises:
+        InputError: this thread does.
+    """
+    global _running
+    if _running is threading.current_thread():
+        raise InputError("a run cannot begin another one in its own process: use processes")
+    with _alone:
+        _running = threading.current_thread()
+        try:
+            yield
+        finally:
+            _running = None
+
+
+class Options(TypedDict, total=False):
+    """What else a run can be told, see :func:`cosim.master.simulation.simulate`."""
+
+    realtime: float | None
+    pictures: bool
+    only_own: bool
+    show: Callable[[str], None]
+    progress: Callable[[float], None]
+    pool: InstancePool | None
+    native: bool | None
+    overwrite: bool
+
+
+def simulate(
+    scenario: Scenario | str | Path | dict[str, Any],
+    out: str | Path | None = None,
+    parameters: Sequence[str | Path] = (),
+    *,
+    seed: int | None = None,
+    set: Mapping[str, Any] | None = None,  # noqa: A002 - as the option of the command
+    believe: Sequence[str | Path] = (),
+    **options: Unpack[Options],
+) -> Result:
+    """Run a scenario, and write its log and metrics.
+
+    In a thread it works, too; several threads wait for each other, as the FMUs of one process share its
+    working directory. For runs side by side use processes: :func:`cosim.run_campaign`.
+
+    Args:
+        scenario: the name of a shipped one (``"ellipse"``), a file, its content, or what
+            :func:`cosim.load_scenario` gives.
+        out: result folder; by default ``results/<name>`` in the working directory, or, where another run
+            is there, ``results/<name>_2`` and so on.
+        parameters: SSP parameter sets for the plant, whose values override the scenario's.
+        seed: of noise and faults, in place of the scenario's.
+        set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
+            files are relative to the working directory.
+        believe: SSP parameter sets that controllers and observers believe of the plant.
+        options: ``realtime``: simulated seconds for each second of wall time; ``pictures``: whether to
+            write them; ``only_own``: whether to refuse FMUs with programs that were not built on this
+            computer; ``show``: receives notes, a line each; ``progress``: receives the simulated time
+            [s]; ``native``: whether to compile; ``overwrite``: use ``results/<name>`` whatever is there.
+
+    Returns:
+        How it ended, with ``metrics``, ``log``, ``plot()``. A failed or interrupted run keeps its log.
+
+    Raises:
+        InputError: the scenario cannot be run; nothing has been written.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    settings = dict(set or {}) | ({} if seed is None else {"seed": seed})
+    if settings:
+        scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
+    with _one_at_a_time():
+        return simulation.simulate(scenario, out, parameters, believe=believe, **options)

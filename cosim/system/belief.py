@@ -1,0 +1,98 @@
+"""What controllers and observers believe of the plant: the model of a parameter set, by names.
+
+An FMU believes in a plant if it has parameters of the same names as the plant's (``m``, ``X_u``, ...),
+or a parameter described as ``estimate at the start of NAME``, from which it learns. It gets the whole
+model: of what the file does not name, the start value of the plant's FMU. ``delta_NAME`` adds to
+``NAME``.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import InputError
+from ..fmu.fmu_model import Model, Value, Variable
+from ..formats.ssv import ParameterSet
+from .system import System
+
+ADDITION, ESTIMATE, ADDED = "delta_", "estimate at the start of ", ", added"
+
+# Instance -> parameter -> value and its origin.
+Chosen = dict[str, dict[str, tuple[Value, str]]]
+
+
+def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> None:
+    """Give a model to all that believe in it.
+
+    Args:
+        system: receives warnings of what nothing can believe.
+        path: of the parameter set.
+        given: its content.
+        chosen: start values by instance; is changed.
+
+    Raises:
+        InputError: the plant is not here, or nothing believes in it.
+    """
+    if not given.values:
+        system.warnings.append(f"'{path}' is the nominal model: beliefs stay as they are")
+        return
+    believers, used = set(), set()
+    for model_name in given.values:
+        plant = next((m for m in system.models.values() if m.name == model_name), None)
+        if plant is None:
+            raise InputError(f"'{path}' tells of a model '{model_name}', which does not run here")
+        model = _Believed(plant, path, given)
+        for name, fmu in system.models.items():
+            if fmu is plant:
+                continue
+            for v, value, names in model.of(fmu):
+                chosen[name][v.name] = (value, f"belief '{path}'")
+                believers.add(name)
+                used.update((model_name, used_name) for used_name in names)
+    if not believers:
+        raise InputError(f"'{path}': no FMU here believes anything of {', '.join(given.values)}")
+    system.warnings.append(f"{', '.join(sorted(believers))} believe the model of '{path}'")
+    unused = [f"{m}.{n}" for m, values in given.values.items() for n in values if (m, n) not in used]
+    if unused:
+        system.warnings.append(f"'{path}': nothing here can believe {', '.join(unused)}")
+
+
+class _Believed:
+    """The model of a parameter set: the plant's start values, and what the set says otherwise."""
+
+    def __init__(self, plant: Model, path: Path, given: ParameterSet) -> None:
+        self._plant = {n: v for n, v in plant.variables.items() if _coefficient(v)}
+        where = f"'{path}': {plant.name}."
+        self._given: dict[str, float] = {}
+        for name, parameter in given.values[plant.name].items():
+            if name not in plant.variables:
+                raise InputError(f"{where}{name} does not exist")
+            self._given[name] = given.number(parameter, plant.variables[name].unit, where + name)
+
+    def of(self, fmu: Model) -> Iterator[tuple[Variable, float, list[str]]]:
+        """Parameters of an FMU, what it believes of each, and the names of the set that say so."""
+        parameters = [v for v in fmu.variables.values() if v.causality == "parameter"]
+        estimates = {v.name: v.description.removeprefix(ESTIMATE) for v in parameters}
+        for v in parameters:
+            name = estimates[v.name]
+            if name == v.description:  # no estimate
+                known = v.name in self._plant and v.unit == self._plant[v.name].unit
+                if known and f"{v.name}{ADDED}" in estimates.values():
+                    yield v, self._base(v.name), [v.name]
+                elif known:
+                    yield v, self._sum(v.name), [v.name, ADDITION + v.name]
+            elif name.endswith(ADDED) and name.removesuffix(ADDED) in self._plant:
+                change = ADDITION + name.removesuffix(ADDED)
+                yield v, self._given.get(change, 0.0), [change]
+            elif name in self._plant:
+                yield v, self._sum(name), [name, ADDITION + name]
+
+    def _base(self, name: str) -> float:
+        return self._given.get(name, float(self._plant[name].start or 0.0))
+
+    def _sum(self, name: str) -> float:
+        return self._base(name) + self._given.get(ADDITION + name, 0.0)
+
+
+def _coefficient(v: Variable) -> bool:
+    """Whether a parameter is one of the model: initial states are fixed, coefficients tunable."""
+    return v.causality == "parameter" and v.type == "Real" and v.variability == "tunable"

@@ -1,0 +1,54 @@
+"""One entry point for all commands: ``cybership NAME ...`` is ``python -m MODULE ...``."""
+
+import runpy
+import sys
+
+from .subcommands import SUBCOMMANDS
+
+USAGE = """usage: cybership COMMAND [...]
+
+{commands}
+
+'cybership COMMAND --help' tells more; begin with 'cybership demo' or 'cybership run ellipse'.
+Shipped scenarios may be named without a path.
+Exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted."""
+
+
+def usage() -> str:
+    """The text of ``cybership --help``."""
+    lines = (f"  {name:11}{command.purpose}" for name, command in SUBCOMMANDS.items())
+    return USAGE.format(commands="\n".join(lines))
+
+
+def main() -> int:
+    """Run the command that is named; the exit code if there is none to run."""
+    name = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if name in ("-h", "--help", "help"):
+        print(usage())
+        return 0
+    if name == "--version":
+        from importlib.metadata import version
+
+        print(f"cybership {version('cybership')}")
+        return 0
+    if name not in SUBCOMMANDS:
+        from cosim.errors import nearest
+
+        print(f"error: no command '{name}'{nearest(name, SUBCOMMANDS)}", file=sys.stderr)
+        return 2
+    sys.argv = [f"cybership {name}", *sys.argv[2:]]
+    try:
+        # As python -m does it: what a command does before its imports happens here, too.
+        runpy.run_module(SUBCOMMANDS[name].module, run_name="__main__", alter_sys=True)
+    except ModuleNotFoundError as error:
+        from cosim.command import BAD_INPUT, complain, missing_extra
+
+        if (line := missing_extra(error)) is None:
+            raise
+        complain(line)
+        return BAD_INPUT
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

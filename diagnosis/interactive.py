@@ -1,0 +1,139 @@
+"""The diagnosis from Python: runs from files, and a result that shows itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosim import InputError
+
+from . import session
+from .gathering import gather
+from .identification import DEFAULT, Method
+from .model import Integrals, Model, write_model
+from .progress import Advance, silent
+from .report.content import diagnosis_content
+from .report.notebook import Plots, as_html
+from .report.page import write_report
+from .report.result_keys import DiagnosisContent
+from .report.terminal import summary
+
+if TYPE_CHECKING:
+    import pandas
+
+AXES = ("X", "Y", "N")
+
+
+def load(
+    paths: str | Path | Sequence[str | Path], anyway: bool = False, advance: Advance = silent
+) -> list[Integrals]:
+    """Read and smooth measured runs, as they lie in files.
+
+    Args:
+        paths: files (CSV, Parquet, MATLAB) or folders of logs, one or several.
+        anyway: whether units that no ship's motion can be in are believed.
+        advance: receives the name of each step when it begins.
+
+    Returns:
+        The runs, for :func:`diagnose`, :func:`diagnosis.evaluate` and :class:`diagnosis.Windows`.
+
+    Raises:
+        InputError: a run cannot be used, or is given twice.
+    """
+    return gather([paths] if isinstance(paths, (str, Path)) else paths, advance, anyway)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShownDiagnosis(session.Diagnosis):
+    """What a model lacks; shows itself in a terminal in ten lines, and in a notebook with pictures."""
+
+    @cached_property
+    def content(self) -> DiagnosisContent:
+        """What ``diagnosis.json`` of the command holds."""
+        return diagnosis_content(self, None, [])
+
+    @property
+    def model(self) -> Model:
+        """The learned model; where nothing was learned the initial one."""
+        return self.learned.model
+
+    @property
+    def residual(self) -> pandas.DataFrame:
+        """What the learned model leaves: one row a window of 3 s.
+
+        Columns ``run``, ``held_out``, ``time`` (of the middle) [s], ``X``, ``Y`` [N], ``N`` [N m], and
+        their standard deviations ``X_std``, ...; ``attrs["units"]`` has the units.
+        """
+        import pandas
+
+        parts = []
+        for e, std in zip(self.comparison.evaluations, self.comparison.omega_std, strict=True):
+            columns = {"run": e.name, "held_out": e.held_out, "time": e.integrals.middle}
+            columns |= {axis: e.after.omega[:, k] for k, axis in enumerate(AXES)}
+            columns |= {f"{axis}_std": std[:, k] for k, axis in enumerate(AXES)}
+            parts.append(pandas.DataFrame(columns))
+        frame = pandas.concat(parts, ignore_index=True)
+        units = {"time": "s", "X": "N", "Y": "N", "N": "N.m"}
+        frame.attrs["units"] = units | {f"{axis}_std": units[axis] for axis in AXES}
+        return frame
+
+    @property
+    def plot(self) -> Plots:
+        """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``, ``plot.ranking()``."""
+        return Plots(self.content, self.comparison)
+
+    def to_ssv(self, path: str | Path = "model.ssv", anyway: bool = False) -> Path:
+        """Write the learned model as an SSP parameter set, for ``cosim.simulate(parameters=[...])``.
+
+        Args:
+            path: of the file; an older one is replaced.
+            anyway: whether to write a model that is not sound, see :attr:`sound`.
+
+        Raises:
+            InputError: the model is not sound, or no FMU would take it.
+        """
+        if not (self.sound or anyway):
+            raise InputError("the learned model is not sound, see .stability; anyway=True writes it")
+        write_model(Path(path), self.model)
+        return Path(path)
+
+    def write_report(self, path: str | Path = "report.html") -> Path:
+        """Write the report of ``python -m diagnosis.learn``: one HTML file that needs no other."""
+        c = self.comparison
+        return write_report(path, self.content, c.evaluations, c.omega_std)
+
+    def __repr__(self) -> str:
+        return summary(self.content)
+
+    def _repr_html_(self) -> str:
+        return as_html(self.content, self.plot)
+
+
+def diagnose(
+    runs: Sequence[Integrals],
+    held_out: Sequence[Integrals] = (),
+    prior: float = 0.1,
+    model: Model | None = None,
+    advance: Advance = silent,
+    seed: int = 0,
+    by: str | Method = DEFAULT,
+) -> ShownDiagnosis:
+    """Learn what a model lacks.
+
+    Args:
+        runs: to learn from, see :func:`load`.
+        held_out: runs to test on only.
+        prior: relative standard deviation of every nominal coefficient.
+        model: the initial one; the nominal one by default.
+        advance: receives the name of each step when it begins.
+        seed: of everything random.
+        by: method of identification, or the name of one.
+
+    Raises:
+        InputError: too little data, or a prior that is negative or not finite.
+    """
+    found = session.diagnose(runs, held_out, prior, model, advance, seed, by)
+    return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

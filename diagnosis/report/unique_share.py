@@ -1,0 +1,48 @@
+"""What each finding explains that nothing else does."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from ..assessment.evaluation import Evaluation
+from ..identification.findings import Findings
+from ..model import Model, omega
+
+
+def unique_shares(
+    learned: Findings, start: Model, evaluations: Sequence[Evaluation]
+) -> list[float | None]:
+    """Share of the first sum of squares that comes back without one finding.
+
+    The other findings and the nominal coefficients are fitted anew, and so explain what they can in its
+    place. Of two findings that explain the same, neither has a share of its own.
+
+    Args:
+        learned: the findings and the model with them.
+        start: the initial model.
+        evaluations: of the runs; those held out count if there are any.
+
+    Returns:
+        For each finding, in their order, a share [1], axes weighted by noise; None where the method
+        cannot fit without it.
+    """
+    held_out = [e for e in evaluations if e.held_out]
+    runs = [e.integrals for e in held_out or evaluations]
+
+    def squares(model: Model) -> float:
+        return sum(float(np.sum((omega(w, model) / learned.sigma) ** 2)) for w in runs)
+
+    if learned.keep is None or not learned.effects:
+        return [None] * len(learned.effects)
+    first, last = squares(start), squares(learned.model)
+    found: list[float | None] = []
+    for finding in learned.effects:
+        try:
+            others = learned.keep([f.id for f in learned.effects if f.id != finding.id])
+        except LinAlgError:  # these data do not determine the others alone
+            found.append(None)
+            continue
+        without = others.model if others.effects else others.refitted or start
+        found.append(min(1.0, max(0.0, (squares(without) - last) / first)))
+    return found

@@ -1,0 +1,18 @@
+"""The site of the documentation: ``python -m sphinx -W -b html docs site``."""
+
+from importlib.metadata import version as installed
+
+project = "cybership"
+copyright = "2026, the cybership developers"  # noqa: A001 - the name that Sphinx reads
+release = version = installed("cybership")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+html_theme = "furo"
+html_title = f"cybership {release}"
+exclude_patterns = ["studies/**/results.json"]
+source_suffix = {".md": "markdown"}
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 4
+autodoc_member_order = "alphabetical"
+autodoc_typehints = "description"
+# Links to files of the repository that are no pages: tests/test_docs.py sees that they exist.
+suppress_warnings = ["myst.xref_missing"]

@@ -1,0 +1,250 @@
+"""Where people work: the packages from Python, the command ``cybership``, logs, folders, beliefs."""
+
+import importlib.util
+import json
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.project import ROOT
+
+import cosim
+import diagnosis
+import fmus
+from cosim import run
+from cosim.command import missing_extra
+from cosim.results import draw
+from cosim.results.picture_files import PictureOptions
+from cosim.results.result_files import default_folder
+from cosim.scenario import Roles, load_scenario
+from cosim.system import prepare
+from cybership.__main__ import main, usage
+from cybership.subcommands import SUBCOMMANDS
+from diagnosis import result_folder
+from diagnosis.report import unique_share
+
+SHORT = {"stop": 1.0, "metrics": {}}
+
+
+@pytest.mark.parametrize("package", [cosim, diagnosis, fmus], ids=lambda p: p.__name__)
+def test_public_names_are_complete_and_typed(package):
+    assert dir(package) == sorted(package.__all__)
+    assert (Path(package.__file__).parent / "py.typed").is_file()
+
+
+def test_a_run_by_name_has_log_metrics_and_pictures(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = cosim.simulate("ellipse", seed=3, set=SHORT | {"vessel.m": 15})
+    assert result.folder == Path("results", "ellipse")
+    assert len(result.log) == result.rows == 101
+    assert result.log.attrs["units"]["vessel.u"] == "m/s"
+    assert result.plot("errors")._repr_png_().startswith(b"\x89PNG")
+    assert "<svg" in result.plot().save("track.svg").read_text()
+    ran = json.loads(Path("results/ellipse/log.json").read_text())["scenario"]
+    assert (ran["seed"], ran["fmus"]["vessel"]["parameters"]["m"]) == (3, 15)
+    with pytest.raises(cosim.InputError, match="did you mean 'errors'"):
+        result.plot("error")
+
+
+def described(folder, seed):
+    """A finished run with this seed in a folder; its description."""
+    told = {"scenario": {"name": "x", "seed": seed}, "fmus": {"vessel": {"sha256": "1", "path": "p"}}}
+    if folder is not None:
+        folder.mkdir(parents=True)
+        (folder / "log.json").write_text(json.dumps(told))
+    return told
+
+
+def test_the_default_folder_is_not_that_of_another_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    first, second, third = (described(None, seed) for seed in (1, 2, 3))
+    assert default_folder("x", first) == Path("results/x")
+    described(Path("results/x"), 1)
+    described(Path("results/x_2"), 2)
+    assert default_folder("x", first) == Path("results/x")
+    assert default_folder("x", second) == Path("results/x_2")
+    assert default_folder("x", third) == Path("results/x_3")
+    assert default_folder("x", third, overwrite=True) == Path("results/x")
+    other = first | {"fmus": {"vessel": {"sha256": "2", "path": "p"}}}
+    assert default_folder("x", other) == Path("results/x_3")
+    Path("results/x_3").mkdir()
+    Path("results/x_3/log.json").write_text("not ours")
+    assert default_folder("x", third) == Path("results/x_4")
+
+
+def test_runs_in_threads_wait_for_each_other(tmp_path):
+    found = {}
+
+    def make(seed):
+        found[seed] = cosim.simulate("ellipse", tmp_path / str(seed), seed=seed, set=SHORT).metrics
+
+    threads = [threading.Thread(target=make, args=(seed,)) for seed in (1, 2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {} != found[1] != found[2] != {}
+
+
+def test_a_run_inside_of_a_run_is_refused(tmp_path):
+    def nested(_):
+        cosim.simulate("ellipse", tmp_path / "inner", set=SHORT)
+
+    with pytest.raises(cosim.InputError, match="use processes"):
+        cosim.simulate("ellipse", tmp_path / "outer", set=SHORT, progress=nested)
+
+
+def test_a_plain_script_is_not_run_again_by_its_processes(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "print('once')\n"
+        "from concurrent.futures import ProcessPoolExecutor\n"
+        "from multiprocessing import get_context\n"
+        "from operator import neg\n"
+        "from cosim.process import without_program\n"
+        "with without_program(), ProcessPoolExecutor(1, get_context('spawn')) as pool:\n"
+        "    print(pool.submit(neg, 3).result())\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=ROOT, check=False,
+                          env={"PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert (done.stdout.split(), done.stderr) == (["once", "-3"], "")
+
+
+def test_a_compact_log_has_what_metrics_pictures_and_the_diagnosis_read(ellipse, tmp_path):
+    scenario = tmp_path / "scenario.json"
+    scenario.write_text(json.dumps(ellipse))
+    for name in ("all", "compact"):
+        out = tmp_path / name
+        assert run.main([str(scenario), "--out", str(out), "--log", name, "--quiet", "--no-plots"]) == 0
+    full, compact = tmp_path / "all", tmp_path / "compact"
+    there = cosim.read_log(full).keys() & Roles().columns
+    assert there == cosim.read_log(compact).keys() & Roles().columns
+    assert (full / "metrics.json").read_bytes() == (compact / "metrics.json").read_bytes()
+    assert (compact / "log.csv").stat().st_size < 0.35 * (full / "log.csv").stat().st_size
+    a, b = diagnosis.read(full), diagnosis.read(compact)
+    assert (a.pose == b.pose).all()
+    assert (a.tau_cmd == b.tau_cmd).all()
+
+
+def model_file(path, **values):
+    given = {name: cosim.Parameter(value) for name, value in values.items()}
+    cosim.write_parameters(path, cosim.ParameterSet({"vessel": given}))
+    return path
+
+
+@pytest.mark.parametrize("observer", ["observer_luenberger.fmu", "observer_mdf.fmu"])
+def test_beliefs_are_the_learned_model(ellipse, tmp_path, observer):
+    ellipse["fmus"]["observer"] = {"path": observer}
+    file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0, Y_r=-6.0, V_n=0.1)
+    system = prepare(load_scenario(ellipse), beliefs=[(file, cosim.read_parameters(file))])
+    told = {name: {v.name: x for v, x in values} for name, values in system.parameters.items()}
+    controller = told["controller"]
+    assert controller["X_u"] == pytest.approx(-2.6555)  # the nominal value and the addition
+    assert controller["phi_0_2"] == -6.0  # where adaptation of Y_r starts
+    assert controller["phi_0_6"] == -1.9  # N_r, of which the file says nothing: nominal
+    assert ("X_u" in told["observer"]) == (observer == "observer_luenberger.fmu")
+    assert told["vessel"] == ellipse["fmus"]["vessel"].get("parameters", {})  # the plant is what it was
+    assert any("nothing here can believe vessel.V_n" in w for w in system.warnings)
+    system.close()
+
+
+def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
+    file = model_file(tmp_path / "model.ssv", delta_X_u=-2.0)
+    with pytest.raises(cosim.InputError, match="'vessel', which does not run here"):
+        cosim.simulate(chain, tmp_path / "out", believe=[file])
+    del ellipse["fmus"]["controller"], ellipse["fmus"]["observer"]
+    ellipse |= {"connections": [], "faults": [], "events": []}
+    with pytest.raises(cosim.InputError, match="no FMU here believes anything of vessel"):
+        cosim.simulate(ellipse, tmp_path / "out", believe=[file])
+
+
+def test_every_command_of_cybership_is_a_module_and_told():
+    for name, command in SUBCOMMANDS.items():
+        assert importlib.util.find_spec(command.module) is not None, name
+        assert command.purpose in usage()
+
+
+def test_cybership_names_the_nearest_command_and_imports_little(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["cybership", "lern"])
+    assert main() == 2
+    assert "did you mean 'learn'" in capsys.readouterr().err
+    code = "import sys; sys.argv = ['cybership']; from cybership.__main__ import main; main(); "
+    code += "print(*{'numpy', 'rich', 'pydantic', 'fmpy'} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout.endswith("\n\n")
+
+
+def test_a_missing_library_is_told_with_its_extra():
+    message = missing_extra(ModuleNotFoundError("No module named 'sklearn'", name="sklearn.cross"))
+    assert message == "this needs sklearn: pip install 'cybership[analysis]'"
+    assert missing_extra(ModuleNotFoundError("No module named 'mine'", name="mine")) is None
+
+
+def test_shipped_scenarios_come_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "eight").mkdir()  # a folder of results is no scenario
+    assert load_scenario("eight").name == "eight"
+    assert {"ellipse", "eight", "setpoint"} <= {*cosim.shipped_names()}
+    with pytest.raises(cosim.InputError, match="did you mean 'ellipse'"):
+        load_scenario("elipse.json")
+
+
+def test_a_diagnosis_is_not_laid_over_that_of_other_inputs(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "log.csv").write_text("time\n")
+    usual, hashed = tmp_path / "diagnosis", result_folder.sha256(tmp_path / "a")
+    assert hashed == result_folder.sha256(tmp_path / "a" / "log.csv") != ""
+    inputs = {"a": hashed}
+    assert result_folder.default_folder(usual, inputs) == usual
+    usual.mkdir()
+    assert result_folder.default_folder(usual, inputs) == usual  # empty
+    (usual / "diagnosis.json").write_text("{}")
+    second = tmp_path / "diagnosis_2"
+    assert result_folder.default_folder(usual, inputs) == second  # of unknown inputs
+    assert result_folder.default_folder(usual, inputs, overwrite=True) == usual
+    result_folder.keep_inputs(usual, inputs)
+    assert result_folder.default_folder(usual, inputs) == usual
+    assert result_folder.default_folder(usual, {"b": "other"}) == second
+
+
+def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
+    line = np.linspace(0.0, 1.0, 5)
+    log = {"time": line, "vessel.x": line, "vessel.y": line, "vessel.psi": 0.0 * line}
+    for width in (4.0, 8.0):
+        look = PictureOptions("svg", width=width, style="ggplot")
+        assert [p.name for p in draw({"a": log}, tmp_path, options=look)] == ["trajectory.svg"]
+        svg = (tmp_path / "trajectory.svg").read_text()
+        assert float(re.search(r'width="([\d.]+)pt"', svg)[1]) == pytest.approx(72.0 * width)
+    with pytest.raises(cosim.InputError, match="no style 'gplot'; did you mean 'ggplot'"):
+        draw({"a": log}, tmp_path, options=PictureOptions(style="gplot"))
+
+
+def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
+    """Here a model is the size of the error that it leaves."""
+    monkeypatch.setattr(unique_share, "omega", lambda w, model: np.full((4, 3), model))
+    left = {"a": 0.9, "b": 0.1}  # without it, all else fitted anew; 0.1 with both
+
+    def keep(ids):
+        (gone,) = left.keys() - set(ids)
+        return SimpleNamespace(effects=ids, model=left[gone])
+
+    found = SimpleNamespace(
+        effects=[SimpleNamespace(id="a"), SimpleNamespace(id="b")],
+        model=0.1, sigma=np.ones(3), keep=keep,
+    )  # fmt: skip
+    runs = [SimpleNamespace(held_out=False, integrals=None)]
+    assert unique_share.unique_shares(found, 1.0, runs) == pytest.approx([0.8, 0.0])
+
+
+def test_the_version_is_the_same_everywhere():
+    project = (ROOT / "pyproject.toml").read_text()
+    version = re.search(r'^version = "(.+)"', project, re.M)[1]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text()
