@@ -30,7 +30,6 @@ ACCEPTED = (
     "not for FMI 2.0",
     "no binary for",
     "root may write",
-    "no wine on this machine",
 )
 
 

@@ -2,9 +2,7 @@
 
 import json
 import math
-import shutil
 import subprocess
-import sys
 import zipfile
 from xml.etree import ElementTree
 
@@ -16,8 +14,6 @@ from support.command import command
 from support.project import COMPONENTS, ROOT
 
 from cosim.run import main as run_scenario
-from fmus.build.building import build
-from fmus.build.platforms import native_targets
 from fmus.check.checking import main as check
 from fmus.declare import flatten, width
 
@@ -172,45 +168,23 @@ def test_failing_step_is_an_error_with_its_cause_and_keeps_the_state(native, ope
             vessel.step(0.0, h)
 
 
-def sailed():
-    """The pose of the vessel after what the host in C does."""
+def test_program_in_c_runs_a_vessel_without_python(native, tmp_path):
+    """A process that holds no Python opens the library and prints what it computes."""
+    zipfile.ZipFile(native["vessel"]).extractall(tmp_path)
+    (library,) = tmp_path.glob("binaries/*/vessel.*")
+    guid = ElementTree.parse(tmp_path / "modelDescription.xml").getroot().get("guid")
+    host = tmp_path / "host"
+    source = ROOT / "tests" / "support" / "host.c"
+    subprocess.run([ccode.COMPILER, "-o", host, source, "-ldl"], check=True)
     component = COMPONENTS["vessel"]
+    first = width(component.params)  # value reference of the first input
+    arguments = [host, library, guid, str(first)]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
     i, p = component.inputs(0.5, 0.1, -0.02), component.params()
     state, outputs = component.init(i, p), ()
     for _ in range(1000):
         state, outputs = component.step(state, i, p, 0.01)
-    return flatten(outputs)[:3]
-
-
-def hosted(fmu, folder, compiler, runner=()):
-    """The pose that a program in C finds with the library of an FMU, and what it says of its process."""
-    zipfile.ZipFile(fmu).extractall(folder)
-    (library,) = folder.glob("binaries/*/vessel.*")
-    guid = ElementTree.parse(folder / "modelDescription.xml").getroot().get("guid")
-    host = folder / "host.exe"
-    subprocess.run([*compiler, "-o", host, ROOT / "tests" / "support" / "host.c"], check=True)
-    first = width(COMPONENTS["vessel"].params)  # value reference of the first input
-    arguments = [*runner, host, library, guid, str(first)]
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    *numbers, mapped = done.stdout.split("\n")[:4]
-    return [float(number) for number in numbers], mapped.strip()
-
-
-def test_program_in_c_runs_a_vessel_without_python(native, tmp_path):
-    """A process that holds no Python opens the library and prints what it computes."""
-    pose, mapped = hosted(native["vessel"], tmp_path, [ccode.COMPILER, "-ldl"])
-    assert same_bits(pose, sailed())
+    *numbers, mapped = done.stdout.splitlines()
+    assert same_bits(map(float, numbers), flatten(outputs)[:3])
     assert mapped in ("no Python in this process", "what is mapped cannot be read here")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("wine") is None, reason="no wine on this machine")
-def test_windows_library_gives_nearly_the_same(tmp_path, monkeypatch):
-    pytest.importorskip("ziglang")
-    monkeypatch.setenv("WINEPREFIX", str(tmp_path / "wine"))
-    monkeypatch.setenv("WINEDEBUG", "-all")
-    (fmu,) = build(["vessel"], native=native_targets("win64"))
-    zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu"]
-    pose, _ = hosted(fmu, tmp_path, zig, ["wine"])
-    assert pose == pytest.approx(sailed(), rel=1e-12, abs=1e-12)

@@ -1,17 +1,9 @@
 /* Runs the vessel of a native FMU: LIBRARY GUID FIRST_INPUT. Prints its pose after 1000 steps, and whether Python is here. */
 
+#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#ifdef _WIN32
-#include <windows.h>
-#define dlopen(path, flags) LoadLibraryA(path)
-#define dlsym(library, name) (void *)GetProcAddress(library, name)
-#define dlerror() "it cannot be loaded"
-#else
-#include <dlfcn.h>
-#endif
 
 typedef struct {
     void *logger, *(*allocate)(size_t, size_t);
