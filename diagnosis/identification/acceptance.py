@@ -53,7 +53,7 @@ def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: n
 
     Args:
         first: (K, 3), the first model error.
-        without, left: (K, 3), the model error without the effect and with it.
+        without, left: (K, 3), the model error without the effect and with it, all else the same.
         command: (K, 3), the commanded force.
     """
     fall = np.sum(without**2 - left**2, axis=0)

@@ -103,11 +103,12 @@ def search(
         total = float(np.sum((lacking * t.weight) ** 2))
         ranked = ranked or in_one_order(ranking, best)
         first = best.scored[0]
+        without = best.winner.without(best.starts[first.candidate].values)
         left = best.refined[first.candidate].left
         # As well fitted as the candidates are: what other coefficients give is not an effect's.
         alone = refit(t, at, ranking.nuisance).estimate
         nothing = scored_alone(t, alone)
-        shows = matters(lacking, t.error(alone), left, command)
+        shows = matters(lacking, t.error(without), left, command)
         if not (shows and beyond_chance(nothing, first, total)):
             break
         harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
