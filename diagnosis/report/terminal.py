@@ -112,7 +112,7 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield told(e)
     yield e.equation
     share = _percent(e.share_of_error)
-    alone = "" if e.share_unique is None else f", {_percent(e.share_unique)} by nothing else"
+    alone = "" if e.share_unique is None else f", {_percent(e.share_unique)} that nothing else does"
     yield f"confidence {_percent(e.confidence)}, takes away {share} of the squared error{alone}"
     yield from filter(None, (e.separation, e.advice))
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from ..assessment.evaluation import Evaluation
+from ..decision import MOST_MOVED
 from ..identification.findings import Findings
 from ..model import Model, omega
 
@@ -16,7 +17,8 @@ def unique_shares(
     """Share of the first sum of squares that comes back without one finding.
 
     The other findings and the nominal coefficients are fitted anew, and so explain what they can in its
-    place. Of two findings that explain the same, neither has a share of its own.
+    place; coefficients that would be further than MOST_MOVED from what is believed of them stay as they
+    are. Of two findings that explain the same, neither has a share of its own.
 
     Args:
         learned: the findings and the model with them.
@@ -44,5 +46,8 @@ def unique_shares(
             found.append(None)
             continue
         without = others.model if others.effects else others.refitted or start
+        fitted = learned.model.ship.effects[finding.id].search.by == "regression"
+        if fitted and any(abs(z) > MOST_MOVED for z in others.moved.values()):
+            without = learned.model.plus({name: -value for name, value in finding.values.items()})
         found.append(min(1.0, max(0.0, (squares(without) - last) / first)))
     return found
