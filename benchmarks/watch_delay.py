@@ -1,7 +1,7 @@
 """How soon a failing thruster is noticed, and how often one is told that does not fail.
 
     python -m benchmarks.watch_delay                       # 200 runs
-    python -m benchmarks.watch_delay --runs 24 --out /tmp/watch
+    python -m benchmarks.watch_delay --runs 24 --out results/watch
 
 Half of the runs have no failure. The detector is ``watch_thrusters``; beside it the threshold on the
 losses of thrust that concurrent learning estimates (``controller_cl_improved``), as 7.2.5 proposes. Both
