@@ -108,14 +108,14 @@ def write_loops(
         "measured ship of Figs. 7.11 and 7.12, that of PLS3 the simulated one."
     )
     for run, figure in (
-        ("RBS, ellipse, fault", "7.11, 7.12"),
-        ("CLZ, ellipse", "7.13 to 7.15"),
-        ("RBS, ellipse", "7.16"),
+        ("RBS, ellipse, fault", "Figs. 7.11, 7.12"),
+        ("CLZ, ellipse", "Figs. 7.13 to 7.15"),
+        ("RBS, ellipse", "Fig. 7.16"),
     ):
         names = [n for n in ("SYSID1", "SYSID4", "PLS2", "PLS3", "PLS4") if n in models]
         chosen = {n: runs[f"{n}|{run}"] for n in names}
         label = run.replace(", ", "_")
-        report.figure(f"loop_{label}", tracks(chosen), f"{run}: tracks (Figs. {figure}).")
+        report.figure(f"loop_{label}", tracks(chosen), f"{run}: tracks ({figure}).")
 
 
 def tracks(runs: Mapping[str, Loop]) -> Figure:
