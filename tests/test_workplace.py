@@ -227,20 +227,24 @@ def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
 
 
 def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
-    """Here a model is the size of the error that it leaves."""
-    monkeypatch.setattr(unique_share, "omega", lambda w, model: np.full((4, 3), model))
+    """Here a model is the size of the error that it leaves, and no coefficient moves."""
+    monkeypatch.setattr(unique_share, "omega", lambda w, model: np.full((4, 3), model.error))
     left = {"a": 0.9, "b": 0.1}  # without it, all else fitted anew; 0.1 with both
+    fitted = SimpleNamespace(search=SimpleNamespace(by="regression"))
+
+    def model(error):
+        return SimpleNamespace(error=error, ship=SimpleNamespace(effects={"a": fitted, "b": fitted}))
 
     def keep(ids):
         (gone,) = left.keys() - set(ids)
-        return SimpleNamespace(effects=ids, model=left[gone])
+        return SimpleNamespace(effects=ids, model=model(left[gone]), moved={})
 
     found = SimpleNamespace(
         effects=[SimpleNamespace(id="a"), SimpleNamespace(id="b")],
-        model=0.1, sigma=np.ones(3), keep=keep,
+        model=model(0.1), sigma=np.ones(3), keep=keep,
     )  # fmt: skip
     runs = [SimpleNamespace(held_out=False, integrals=None)]
-    assert unique_share.unique_shares(found, 1.0, runs) == pytest.approx([0.8, 0.0])
+    assert unique_share.unique_shares(found, model(1.0), runs) == pytest.approx([0.8, 0.0])
 
 
 def test_the_version_is_the_same_everywhere():

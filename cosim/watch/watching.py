@@ -19,6 +19,7 @@ from ..process.run_state import CODE, ENDED, INSTANCE, NOTHING, REQUESTS, STATE
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import FrameType
 
 # Two interrupts within this wall time [s] are one: ``timeout`` sends its signal to a process and to its
@@ -37,16 +38,27 @@ def watched() -> None:
     if not hasattr(os, "fork"):
         leave_on_interrupt()
         return
-    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until each process has its own handlers
+    # What nohup has ignored stays so.
+    asked = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    waited = (*asked, signal.SIGCHLD, signal.SIGALRM)
+    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+    for number in waited:
+        signal.signal(number, _no_action)  # what is ignored by default cannot be waited for
     STATE.watched = True
     watching = os.getpid()
     child = os.fork()
     if child:
-        _Watch(child).run()
+        _Watch(child).run(waited)
+    for number in waited:
+        signal.signal(number, signal.SIG_DFL)
     leave_on_interrupt()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
     STATE.keep()
     _end_with(watching)
+
+
+def _no_action(number: int, frame: FrameType | None) -> None:
+    """Handler that does nothing."""
 
 
 def _end_with(watching: int) -> None:
@@ -69,18 +81,26 @@ class _Watch:
     def __init__(self, child: int) -> None:
         self._child = child
         self._last = -ONE_REQUEST
-        for number in SIGNALS:
-            if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup
-                signal.signal(number, self._pass_on)
-        signal.signal(signal.SIGALRM, self._end_hanging)
         for name in INDIFFERENT:
             if hasattr(signal, name):
                 signal.signal(getattr(signal, name), signal.SIG_IGN)
 
-    def run(self) -> None:
-        """Wait for the end of the run, and exit with its code."""
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-        _, status = os.waitpid(self._child, 0)
+    def run(self, waited: Sequence[int]) -> None:
+        """Wait for the end of the run, and exit with its code.
+
+        Args:
+            waited: interrupts, SIGCHLD and SIGALRM; all are blocked.
+        """
+        ended = status = 0
+        while not ended:
+            # Not a handler beside waitpid(): one that is due just before that call would run after it.
+            number = signal.sigwait(waited)
+            if number in SIGNALS:
+                self._pass_on(number)
+            elif number == signal.SIGALRM:
+                self._end_hanging()
+            else:
+                ended, status = os.waitpid(self._child, os.WNOHANG)
         code = STATE.numbers[CODE]
         if not STATE.numbers[ENDED]:
             from .post_mortem import report  # only now: it takes a while to import
@@ -89,7 +109,7 @@ class _Watch:
             code = report(os.waitstatus_to_exitcode(status), STATE.numbers[REQUESTS] > 0)
         os._exit(code)
 
-    def _pass_on(self, number: int, frame: FrameType | None) -> None:
+    def _pass_on(self, number: int) -> None:
         now = time.monotonic()
         if now - self._last < ONE_REQUEST:
             return
@@ -99,7 +119,7 @@ class _Watch:
             signal.setitimer(signal.ITIMER_REAL, GRACE)
         self._send(number)
 
-    def _end_hanging(self, number: int, frame: FrameType | None) -> None:
+    def _end_hanging(self) -> None:
         """After the second interrupt: end a process that is still in a call of an FMU."""
         if STATE.numbers[INSTANCE] == NOTHING:
             signal.setitimer(signal.ITIMER_REAL, GRACE)
