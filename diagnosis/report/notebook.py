@@ -10,6 +10,7 @@ from cosim.results import Drawn
 
 from ..session import Comparison
 from . import figures, formatting, tracks
+from .headline import verdict_title
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import DiagnosisContent, RunErrors
 from .svg import PALETTE, inline, style
@@ -82,7 +83,7 @@ class Plots:
 
 def as_html(content: DiagnosisContent, plots: Plots) -> str:
     """The finding, the errors of all runs, and where the model fails, as a part of a page."""
-    lines = [f"<p><b>{escape(formatting.VERDICTS[content.verdict])}</b></p>"]
+    lines = [f"<p><b>{escape(verdict_title(content.verdict, content.effects))}</b></p>"]
     lines += [f"<p>{escape(text)}</p>" for text in (content.sentence, content.remainder.sentence)]
     rows = "".join(
         f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.effects

@@ -12,7 +12,7 @@ import cosim
 from ..assessment.evaluation import Evaluation
 from ..progress import Advance, silent
 from . import figures, formatting, tracks
-from .headline import told
+from .headline import told, verdict_title
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import Change, ComparisonContent, DiagnosisContent
 from .shape import Curve, curves
@@ -72,7 +72,7 @@ def write_report(
     text = _template().render(
         content=content,
         diagnosis=diagnosis,
-        verdict="" if diagnosis is None else formatting.VERDICTS[diagnosis.verdict],
+        verdict="" if diagnosis is None else verdict_title(diagnosis.verdict, diagnosis.effects),
         title="Model against measurements" if diagnosis is None else "Diagnosis",
         learned=learned,
         figures=drawn,
