@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..command import BAD_INPUT, FAILED, Output, complain, printable, run_command
+from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from .conduct import Progress as Told
@@ -190,12 +190,12 @@ def _names(text: str) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m cosim.campaign",
+        prog=program("cosim.campaign"),
         description="Run a scenario many times, and write one table: runs.parquet.",
-        epilog="examples:  python -m cosim.campaign scenarios/campaigns/gains.campaign.json\n"
-        "           python -m cosim.campaign gains.campaign.json --compare controller --plot\n"
-        "           python -m cosim.campaign campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
-        "           python -m cosim.campaign campaign.json --scheduler tcp://10.0.0.1:8786\n"
+        epilog="examples:  %(prog)s scenarios/campaigns/gains.campaign.json\n"
+        "           %(prog)s gains.campaign.json --compare controller --plot\n"
+        "           %(prog)s campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
+        "           %(prog)s campaign.json --scheduler tcp://10.0.0.1:8786\n"
         "exit codes: 0 done, 2 bad input, 3 every run failed or the workers were lost, 130 interrupted\n"
         "A finished run is never made again: the same command goes on where it was interrupted.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

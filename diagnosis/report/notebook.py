@@ -13,7 +13,7 @@ from . import figures, formatting, tracks
 from .headline import verdict_title
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import DiagnosisContent, RunErrors
-from .svg import PALETTE, inline, style
+from .svg import alone, inline, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,10 +24,7 @@ class Picture(Drawn):
 
     def _repr_svg_(self) -> str:
         with style():
-            text = inline(self.figure, "picture", "picture of a diagnosis")
-        for colour, name in PALETTE.items():
-            text = text.replace(f"var(--{name})", colour)
-        return text
+            return alone(inline(self.figure, "picture", "picture of a diagnosis"))
 
 
 def _drawn(make: "Callable[[], Figure]") -> Picture:
