@@ -42,7 +42,7 @@ LASTS = (
 )
 BRIEF = (
     "repeats with neither place, motion, command nor time, and is over within seconds",
-    "waves, or a disturbance of the measurement",
+    "waves, a disturbance of the measurement, or commands other than those recorded",
 )
 BRIEFLY = 3.0  # s: a window makes what is brief last for 2 s; chosen
 
