@@ -9,20 +9,21 @@ from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
-from ..results.performance import needed
+from ..results.performance import needed, read
 from ..system.system import System
 from .algorithm import Master
 from .value_table import ValueTable
 
 
 class Recorder:
-    """Writes the logged columns in blocks, and keeps the columns of metrics and pictures, logged or not.
+    """Writes the logged columns in blocks, and keeps those of metrics and pictures, logged or not.
 
     Args:
         system: what runs.
         master: its master.
         folder: for the log; None writes none.
         memory: gets the log in place of a folder.
+        pictures: whether pictures will be drawn.
 
     Attributes:
         pending: the rows that are not written yet.
@@ -30,14 +31,19 @@ class Recorder:
     """
 
     def __init__(
-        self, system: System, master: Master, folder: Path | None, memory: LogInMemory | None = None
+        self,
+        system: System,
+        master: Master,
+        folder: Path | None,
+        memory: LogInMemory | None = None,
+        pictures: bool = False,
     ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
         self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
-        self._kept_names = needed(self._names, system.scenario.roles)
+        self._kept_names = (needed if pictures else read)(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
         self._kept = np.empty((1 + len(self._kept_names), 1 + system.steps))
         self._count = 0  # rows in it
@@ -92,5 +98,5 @@ class Recorder:
             self._writer.close()
 
     def kept(self) -> dict[str, np.ndarray]:
-        """The columns for metrics and pictures, at every step."""
+        """The columns for metrics, and for pictures if there will be some, at every step."""
         return dict(zip(["time", *self._kept_names], self._kept[:, : self._count], strict=True))

@@ -93,7 +93,9 @@ def simulate(
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
                 show(f"note: another run is in '{first}'; this one goes to '{given}'")
-            result, recorder = _run(system, folder, description, realtime, show, progress, pool)
+            result, recorder = _run(
+                system, folder, description, realtime, show, progress, pool, pictures
+            )
         finally:
             owner.leave_copies()
             if pool is None:
@@ -119,6 +121,7 @@ def _run(
     show: Callable[[str], None],
     progress: Callable[[float], None],
     pool: InstancePool | None,
+    pictures: bool,
 ) -> tuple[Result, Recorder | None]:
     """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log."""
     scenario, owner = system.scenario, Owner()
@@ -145,7 +148,7 @@ def _run(
             owner.leave_copies()
             _clear(folder, show)
             result, recorder = _record(
-                system, master, folder, realtime, progress, description, interrupted
+                system, master, folder, realtime, progress, description, interrupted, pictures
             )
         finally:
             master.close()
@@ -172,12 +175,13 @@ def _record(
     progress: Callable[[float], None],
     sidecar: dict[str, Any],
     interrupted: Callable[[], bool],
+    pictures: bool,
 ) -> tuple[Result, Recorder]:
     """Run to the end; returns how it ended, and the recorder."""
     result = Result("running", folder, warnings=system.warnings)
     try:
         write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
-        recorder = Recorder(system, master, folder)
+        recorder = Recorder(system, master, folder, pictures=pictures)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     STATE.numbers[LOGGING] = 1

@@ -4,7 +4,7 @@ The error is that of the true ship, not of its measurement. The scenario names t
 the target and the force (:class:`cosim.scenario.Roles`).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +55,13 @@ def needed(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
     return [name for name in names if name in known]
 
 
+def read(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
+    """Those of the given column names that metrics use, in the given order."""
+    given = list(names)
+    known = {*roles.of("pose", "velocity", "target"), *_commanded(given, roles)}
+    return [name for name in given if name in known]
+
+
 def wrap(angle: np.ndarray) -> np.ndarray:
     """Angles [rad] brought to (-pi, pi]."""
     return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
@@ -71,7 +78,7 @@ def cross_track(x: np.ndarray, y: np.ndarray, target: Sequence[np.ndarray]) -> n
     return -np.sin(psi_t) * (x - x_t) + np.cos(psi_t) * (y - y_t)
 
 
-def _commanded(log: Log, roles: Roles) -> tuple[str, ...]:
+def _commanded(log: Container[str], roles: Roles) -> tuple[str, ...]:
     """Columns of the commanded force: after limits where that is logged."""
     return roles.force if all(name in log for name in roles.force) else roles.requested_force
 
