@@ -5,7 +5,7 @@ the target and the force (:class:`cosim.scenario.Roles`).
 """
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
@@ -163,23 +163,28 @@ def tracking(log: Log, roles: Roles = DEFAULT_ROLES) -> dict[str, np.ndarray]:
     }
 
 
-def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Running integral by the trapezoidal rule."""
-    total = np.zeros_like(time)
-    np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time), out=total[1:])
+def _integral(steps: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Running integral by the trapezoidal rule; ``steps`` are the times between the values [s]."""
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * (values[1:] + values[:-1]) * steps, out=total[1:])
     return total
 
 
-def _accumulate(part: Log, errors: Log, roles: Roles) -> dict[str, np.ndarray]:
-    """The metrics of :func:`over_time` from one window of a log and its tracking."""
-    time, e = errors["time"], errors["cross_track"]
-    ise = _integral(time, e * e)
-    iae = _integral(time, np.abs(e))
-    work = _integral(time, errors["P"])
-    # The sum of the changes, so that no step size enters.
-    wear = np.cumsum(_change([part[name] for name in _commanded(part, roles)]))
+def _integrals(part: Log, errors: Log, roles: Roles) -> list[np.ndarray]:
+    """ISE, IAE, W and I_tau_dot as they grow, from one window of a log and its tracking."""
+    steps, e = np.diff(errors["time"]), errors["cross_track"]
+    return [
+        _integral(steps, e * e),
+        _integral(steps, np.abs(e)),
+        _integral(steps, errors["P"]),
+        # The sum of the changes, so that no step size enters.
+        np.cumsum(_change([part[name] for name in _commanded(part, roles)])),
+    ]
+
+
+def _with_products(ise: Any, iae: Any, work: Any, wear: Any) -> dict[str, Any]:
+    """The metrics that integrals give, which are arrays or numbers."""
     return {
-        "time": time,
         "ISE": ise,
         "IAE": iae,
         "W": work,
@@ -213,7 +218,8 @@ def over_time(
     """
     part = _window(log, start, stop, roles)
     with np.errstate(over="ignore", invalid="ignore"):
-        return _accumulate(part, tracking(part, roles), roles)
+        integrals = _integrals(part, tracking(part, roles), roles)
+        return {"time": part["time"], **_with_products(*integrals)}
 
 
 def compute(
@@ -241,7 +247,8 @@ def compute(
     part = _window(log, start, stop, roles)
     with np.errstate(over="ignore", invalid="ignore"):
         errors = tracking(part, roles)
-        found = {name: float(values[-1]) for name, values in _accumulate(part, errors, roles).items()}
+        totals = _with_products(*(values[-1] for values in _integrals(part, errors, roles)))
+        found = {name: float(total) for name, total in totals.items()}
         found["e_pos_rms"] = _rms(errors["e_pos"])
         found["e_pos_max"] = float(np.max(errors["e_pos"]))
         found["cross_track_rms"] = _rms(errors["cross_track"])
