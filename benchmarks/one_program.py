@@ -1,9 +1,10 @@
 """What do FMUs and a master cost beside one C program? ``python -m benchmarks.one_program``.
 
-Runs scenarios/ellipse.json without faults: with native FMUs in this master, and as one program made of the
-components' plain C (``fmus.build --native --source``), which passes values in memory. The master logs
-nothing but one signal at the start and the end; then all signals at the start and the end, for which it
-takes all outputs from the FMUs at each step. With these both must end with the same outputs to the bit.
+Runs scenarios/ellipse.json without faults: with native FMUs in this master, and as one program made of
+the components' plain C (``fmus.build --native --source``), which passes values in memory. The master
+logs nothing but one signal at the start and the end; then all signals at the start and the end, for
+which it takes all outputs from the FMUs at each step. With these both must end with the same outputs to
+the bit.
 Processor time of the steps alone, in turns.
 """
 

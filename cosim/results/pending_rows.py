@@ -15,8 +15,9 @@ from ..files import write_all
 from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
 from .log import cut_to_rows, format_rows
 
-# Rows that are written together: at least so many, as the cost of a call is then small beside that of the
-# rows, and more of narrow ones, up to so many numbers (256 KiB); chosen: a processor keeps them at hand.
+# Rows that are written together: at least so many, as the cost of a call is then small beside that of
+# the rows, and more of narrow ones, up to so many numbers (256 KiB); chosen: a processor keeps these at
+# hand.
 FEWEST, NUMBERS = 256, 2**15
 
 
