@@ -78,7 +78,8 @@ def bare(content: dict[str, Any]) -> None:
     system = prepare(cosim.load_scenario(scenario))
     pool = InstancePool({model.sha256 for model in system.models.values()})
     for seed in content["axes"]["seed"]["values"]:
-        varied = prepare(cosim.load_scenario({**scenario, "seed": seed}), models=system.models)
+        loaded = cosim.load_scenario({**scenario, "seed": seed})
+        varied = prepare(loaded, models=system.models, unlogged=system.models)
         master = Master(varied, lambda _: None, pool=pool)
         recorder = Recorder(varied, master, None)
         recorder.take(0.0)

@@ -17,7 +17,7 @@ from fmus.fmi.trace import TraceError
 from fmus.native.c_text import number
 from fmus.native.program import program
 from fmus.native.tape import Branch, Call, Kernels, Tape
-from fmus.ops import floor, kernel, when, where
+from fmus.ops import cos, exp, floor, kernel, sin, when, where
 from fmus.signals import Force, Nothing
 
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
@@ -147,6 +147,27 @@ def test_branch_and_kernel_are_recorded_as_such():
     assert chosen[1] is b
     assert len(tape.kernels.recordings) == 1
     assert heavy(3.0, 2.0) == (7.0, True)
+
+
+def test_same_operation_on_the_same_numbers_is_recorded_once_where_it_is_in_force():
+    tape = Tape(Kernels())
+    x = tape.variable("state[0]")
+    first = sin(x)
+    assert sin(x) is first
+    assert cos(x) is not first
+    assert tape.variable("state[0]") is x
+    assert x * 0.0 is not x * -0.0
+    inside = []
+
+    def branch():
+        inside.append(sin(x) + exp(x))
+        return inside[0]
+
+    when(x > 0.0, branch, lambda: x)
+    assert inside[0].args[0] is first, "what came before holds in a branch"
+    assert exp(x) is not inside[0].args[1], (
+        "a branch that may not be taken gives nothing to what follows"
+    )
 
 
 def test_value_of_another_branch_or_function_is_refused():

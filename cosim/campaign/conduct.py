@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
@@ -221,6 +221,7 @@ class _only_one:  # noqa: N801 - used as a function
         self._lock.release()
 
 
+@cache
 def _versions() -> dict[str, str]:
     names = ("cybership", "fmpy", "numpy", "scipy", "pandas", "distributed")
     return {"python": platform.python_version()} | {n: importlib.metadata.version(n) for n in names}

@@ -26,7 +26,7 @@ from ..files import atomic_write
 FOLDER = Path(__file__).parent
 SOURCES = ("loop.c", "rows.c", "powers.py")
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
-OPTIONS = ("-std=c99", "-O2", "-w", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+OPTIONS = ("-std=c99", "-O3", "-w", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 SYSTEM = ("gcc", "cc", "clang")
 # Longest wait for another process that compiles, and for a compiler [s]; chosen: zig compiles what every
 # program needs when it is used first, which takes minutes.

@@ -62,7 +62,11 @@ def run_in_memory(
     """
     # Unlike a run in real time this one may stop for garbage: collecting all of it before each run would
     # cost more than the run.
-    system = prepare(scenario, models=pool.models(scenario))
+    models = pool.models(scenario)
+    # The project's own FMUs see to it themselves that all their outputs are finite. Without a log
+    # nothing of them is read but what other FMUs and the metrics need.
+    own = {name for name, model in models.items() if model.sha256 in pool.resettable}
+    system = prepare(scenario, models=models, unlogged=() if keep else own)
     log = LogInMemory(["time", *system.logged]) if keep else None
     with interruptible() as interrupted:
         master = Master(system, lambda _: None, interrupted, pool)

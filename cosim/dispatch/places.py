@@ -33,6 +33,8 @@ class ThisProcess:
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         for job in jobs:
             copy_all(self._work.folder, [(name, self._files.paths[name]) for name in job.files])
+            for name in self._files.fmus.keys() & set(job.files):
+                self._work.pool.know(self._work.folder / name, self._files.fmus[name])
             self._work.pool.resettable |= self._files.resettable
             yield job, self._work.run(job.content, job.task)
 

@@ -19,12 +19,14 @@ class Files:
         resettable: SHA-256 of the FMUs that may be reset for another run: those that the project has
             built itself, whose instances hold all that they know.
         origins: SHA-256 -> how the scenario names it.
+        fmus: name by content -> what has been read of the FMU.
     """
 
     def __init__(self) -> None:
         self.paths: dict[str, Path] = {}
         self.resettable: set[str] = set()
         self.origins: dict[str, str] = {}
+        self.fmus: dict[str, Model] = {}
         # By path and whether the project's own FMUs are compiled.
         self._models: dict[tuple[str, bool], Model] = {}
         self._tables: dict[Path, str] = {}
@@ -51,7 +53,8 @@ class Files:
 
     def _add(self, path: str, native: bool, model: Model, folder: Path) -> None:
         self._models[path, native] = model
-        self.paths[f"{model.sha256}.fmu"] = model.path
+        name = f"{model.sha256}.fmu"
+        self.paths[name], self.fmus[name] = model.path, model
         self.origins[model.sha256] = path
         if PurePath(path).name == path and model.path.parent != folder:
             self.resettable.add(model.sha256)

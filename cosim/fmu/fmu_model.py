@@ -1,5 +1,6 @@
 """An FMI 2.0 co-simulation FMU: its archive and its description."""
 
+import copy
 import hashlib
 import io
 import math
@@ -99,6 +100,12 @@ class Model:
         self.sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
         self._folder = folder
         self._scratch: Scratch | None = None
+
+    def copied_to(self, path: Path) -> "Model":
+        """The same FMU in a copy of its file, which need not be read again."""
+        model = copy.copy(self)
+        model.path, model._folder, model._scratch = path, None, None
+        return model
 
     def _read_variables(self) -> dict[str, Variable]:
         """All variables by name, in the order of the description."""

@@ -9,23 +9,21 @@ from ..compiled.library import asks_for_plain_loop
 from ..errors import SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
-from ..results.performance import needed
+from ..results.performance import needed, read
 from ..system.system import System
 from .algorithm import Master
 from .value_table import ValueTable
 
-# Rows of the kept columns in one piece of memory; chosen: a piece of a dozen columns is about 1.6 MB.
-CHUNK = 2**14
-
 
 class Recorder:
-    """Writes the logged columns in blocks, and keeps the columns of metrics and pictures, logged or not.
+    """Writes the logged columns in blocks, and keeps those of metrics and pictures, logged or not.
 
     Args:
         system: what runs.
         master: its master.
         folder: for the log; None writes none.
         memory: gets the log in place of a folder.
+        pictures: whether pictures will be drawn.
 
     Attributes:
         pending: the rows that are not written yet.
@@ -33,16 +31,22 @@ class Recorder:
     """
 
     def __init__(
-        self, system: System, master: Master, folder: Path | None, memory: LogInMemory | None = None
+        self,
+        system: System,
+        master: Master,
+        folder: Path | None,
+        memory: LogInMemory | None = None,
+        pictures: bool = False,
     ) -> None:
         self.columns = ["time", *system.logged]
         table = master.table
         self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
-        self._kept_names = needed(self._names, system.scenario.roles)
+        self._kept_names = (needed if pictures else read)(self._names, system.scenario.roles)
         self._kept_slots = self._slots(table, self._kept_names)
-        self._kept = _Columns(len(self._kept_names))
+        self._kept = np.empty((1 + len(self._kept_names), 1 + system.steps))
+        self._count = 0  # rows in it
         logged = self._slots(table, system.logged)
         self.pending = PendingRows(table.row, logged, system.scenario.log.every)
         self.take = self.pending.take
@@ -82,7 +86,9 @@ class Recorder:
             times, taken = times[: k + 1], taken[: k + 1]
         if self._writer is not None:
             self._writer.write(self.pending.logged(len(times)))
-        self._kept.append(times, taken, self._kept_slots)
+        first, self._count = self._count, self._count + len(times)
+        self._kept[0, first : self._count] = times
+        self._kept[1:, first : self._count] = taken[:, self._kept_slots].T
         self.pending.clear()
         if message:
             raise SimulationError(message)
@@ -92,39 +98,5 @@ class Recorder:
             self._writer.close()
 
     def kept(self) -> dict[str, np.ndarray]:
-        """The columns for metrics and pictures, at every step."""
-        return dict(zip(["time", *self._kept_names], self._kept.all(), strict=True))
-
-
-class _Columns:
-    """Times and some columns of rows that come in blocks.
-
-    Args:
-        width: how many columns.
-    """
-
-    def __init__(self, width: int) -> None:
-        self._full: list[np.ndarray] = []
-        self._last = np.empty((1 + width, CHUNK))
-        self._count = 0
-
-    def append(self, times: np.ndarray, rows: np.ndarray, slots: np.ndarray) -> None:
-        """Take a block of at most CHUNK rows.
-
-        Args:
-            times: [s], shape (rows,).
-            rows: shape (rows, signals).
-            slots: of the columns.
-        """
-        first, end = self._count, self._count + len(times)
-        if end > CHUNK:
-            self._full.append(self._last[:, :first])
-            self._last = np.empty_like(self._last)
-            first, end = 0, len(times)
-        self._last[0, first:end] = times
-        self._last[1:, first:end] = rows.T[slots]
-        self._count = end
-
-    def all(self) -> np.ndarray:
-        """Times [s] and columns, shape (1 + width, rows)."""
-        return np.concatenate([*self._full, self._last[:, : self._count]], axis=1)
+        """The columns for metrics, and for pictures if there will be some, at every step."""
+        return dict(zip(["time", *self._kept_names], self._kept[:, : self._count], strict=True))

@@ -90,11 +90,13 @@ def simulate(
             usual = default_folder(scenario.name, description, overwrite)
             given = usual if out is None else Path(out)
             folder = Path(os.path.abspath(given))
-            note = ""
+            moved = ""
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
-                note = f"note: another run is in '{first}'; this one goes to '{given}'"
-            result, recorder = _run(system, folder, note, description, realtime, show, progress, pool)
+                moved = f"note: another run is in '{first}'; this one goes to '{given}'"
+            result, recorder = _run(
+                system, folder, moved, description, realtime, show, progress, pool, pictures
+            )
         finally:
             owner.leave_copies()
             if pool is None:
@@ -115,16 +117,17 @@ def simulate(
 def _run(
     system: System,
     folder: Path,
-    note: str,
+    moved: str,
     description: dict[str, Any],
     realtime: float | None,
     show: Callable[[str], None],
     progress: Callable[[float], None],
     pool: InstancePool | None,
+    pictures: bool,
 ) -> tuple[Result, Recorder | None]:
     """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log.
 
-    ``note`` is shown as soon as nothing can refuse the run any more.
+    ``moved`` is shown as soon as nothing can refuse the run any more.
     """
     scenario, owner = system.scenario, Owner()
     for note in scenario.notes:
@@ -142,15 +145,15 @@ def _run(
                 raise KeyboardInterrupt from None
             if isinstance(error, InputError):
                 raise
-            _clear(folder, note, show)
+            _clear(folder, moved, show)
             told = {"status": "failed", "rows": 0, "message": str(error)}
             write_json(folder / logs.SIDECAR, {**description, **told})
             return Result("failed", folder, message=str(error), warnings=system.warnings), None
         try:
             owner.leave_copies()
-            _clear(folder, note, show)
+            _clear(folder, moved, show)
             result, recorder = _record(
-                system, master, folder, realtime, progress, description, interrupted
+                system, master, folder, realtime, progress, description, interrupted, pictures
             )
         finally:
             master.close()
@@ -159,16 +162,16 @@ def _run(
         return result, recorder
 
 
-def _clear(folder: Path, note: str, show: Callable[[str], None]) -> None:
-    """Make the result folder, without what an earlier run left there, and show the note on it."""
+def _clear(folder: Path, moved: str, show: Callable[[str], None]) -> None:
+    """Make the result folder, without what an earlier run left there, and say if it is another one."""
     try:
         if (folder / logs.SIDECAR).exists():
             show(f"note: replaces the earlier run in '{folder}'")
         clear_results(folder)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
-    if note:
-        show(note)
+    if moved:
+        show(moved)
 
 
 def _record(
@@ -179,12 +182,13 @@ def _record(
     progress: Callable[[float], None],
     sidecar: dict[str, Any],
     interrupted: Callable[[], bool],
+    pictures: bool,
 ) -> tuple[Result, Recorder]:
     """Run to the end; returns how it ended, and the recorder."""
     result = Result("running", folder, warnings=system.warnings)
     try:
         write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
-        recorder = Recorder(system, master, folder)
+        recorder = Recorder(system, master, folder, pictures=pictures)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
     STATE.numbers[LOGGING] = 1

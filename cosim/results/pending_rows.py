@@ -15,8 +15,15 @@ from ..files import write_all
 from ..process.run_state import LAYOUT, STATE, STEPS, TAKEN
 from .log import cut_to_rows, format_rows
 
-# Rows that are written together; chosen: the cost of a call is small beside that of the rows.
-BLOCK = 256
+# Rows that are written together: at least so many, as the cost of a call is then small beside that of
+# the rows, and more of narrow ones, up to so many numbers (256 KiB); chosen: a processor keeps these at
+# hand.
+FEWEST, NUMBERS = 256, 2**15
+
+
+def _room(width: int) -> int:
+    """How many rows of so many signals are written together."""
+    return max(FEWEST, NUMBERS // (1 + width))
 
 
 class PendingRows:
@@ -38,12 +45,12 @@ class PendingRows:
 
     def __init__(self, row: np.ndarray, slots: np.ndarray, every: int) -> None:
         width = len(row)
-        memory, self._counts = STATE.pending(8 * BLOCK * (1 + width))
+        self.room = _room(width)
+        memory, self._counts = STATE.pending(8 * self.room * (1 + width))
         self.instants, self.taken = _parts(memory, width)
         self.count = np.frombuffer(self._counts, np.int32)[TAKEN : TAKEN + 1]
         self.finite = np.zeros(1, np.int64)
-        self.room = BLOCK
-        self._doubles = memory[: 8 * BLOCK].cast("d")
+        self._doubles = memory[: 8 * self.room].cast("d")
         self._slots, self._every = slots, every
         layout = {"width": width, "slots": slots.tolist(), "every": every}
         STATE.write(LAYOUT, json.dumps(layout))
@@ -52,13 +59,14 @@ class PendingRows:
     def _make_take(self, row: np.ndarray) -> Callable[[float], bool]:
         # What runs every step keeps what it needs in its own scope, where Python finds it fastest.
         times, taken, counts = self._doubles, self.taken, self._counts
+        last = self.room - 1
 
         def take(t: float) -> bool:
             count = counts[TAKEN]
             taken[count] = row
             times[count] = t
             counts[TAKEN] = count + 1
-            return count == BLOCK - 1
+            return count == last
 
         return take
 
@@ -81,9 +89,10 @@ class PendingRows:
 
 
 def _parts(memory: memoryview, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times, shape (BLOCK,), and rows, shape (BLOCK, width)."""
-    numbers = np.frombuffer(memory, count=BLOCK * (1 + width))
-    return numbers[:BLOCK], numbers[BLOCK:].reshape(BLOCK, width)
+    """Times, shape (room,), and rows, shape (room, width)."""
+    room = _room(width)
+    numbers = np.frombuffer(memory, count=room * (1 + width))
+    return numbers[:room], numbers[room:].reshape(room, width)
 
 
 def _logged(times: np.ndarray, taken: np.ndarray, slots: np.ndarray, every: int, before: int) -> Rows:

@@ -4,8 +4,8 @@ The error is that of the true ship, not of its measurement. The scenario names t
 the target and the force (:class:`cosim.scenario.Roles`).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Container, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
@@ -55,6 +55,13 @@ def needed(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
     return [name for name in names if name in known]
 
 
+def read(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
+    """Those of the given column names that metrics use, in the given order."""
+    given = list(names)
+    known = {*roles.of("pose", "velocity", "target"), *_commanded(given, roles)}
+    return [name for name in given if name in known]
+
+
 def wrap(angle: np.ndarray) -> np.ndarray:
     """Angles [rad] brought to (-pi, pi]."""
     return angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
@@ -71,7 +78,7 @@ def cross_track(x: np.ndarray, y: np.ndarray, target: Sequence[np.ndarray]) -> n
     return -np.sin(psi_t) * (x - x_t) + np.cos(psi_t) * (y - y_t)
 
 
-def _commanded(log: Log, roles: Roles) -> tuple[str, ...]:
+def _commanded(log: Container[str], roles: Roles) -> tuple[str, ...]:
     """Columns of the commanded force: after limits where that is logged."""
     return roles.force if all(name in log for name in roles.force) else roles.requested_force
 
@@ -156,23 +163,28 @@ def tracking(log: Log, roles: Roles = DEFAULT_ROLES) -> dict[str, np.ndarray]:
     }
 
 
-def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Running integral by the trapezoidal rule."""
-    total = np.zeros_like(time)
-    np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time), out=total[1:])
+def _integral(steps: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Running integral by the trapezoidal rule; ``steps`` are the times between the values [s]."""
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * (values[1:] + values[:-1]) * steps, out=total[1:])
     return total
 
 
-def _accumulate(part: Log, errors: Log, roles: Roles) -> dict[str, np.ndarray]:
-    """The metrics of :func:`over_time` from one window of a log and its tracking."""
-    time, e = errors["time"], errors["cross_track"]
-    ise = _integral(time, e * e)
-    iae = _integral(time, np.abs(e))
-    work = _integral(time, errors["P"])
-    # The sum of the changes, so that no step size enters.
-    wear = np.cumsum(_change([part[name] for name in _commanded(part, roles)]))
+def _integrals(part: Log, errors: Log, roles: Roles) -> list[np.ndarray]:
+    """ISE, IAE, W and I_tau_dot as they grow, from one window of a log and its tracking."""
+    steps, e = np.diff(errors["time"]), errors["cross_track"]
+    return [
+        _integral(steps, e * e),
+        _integral(steps, np.abs(e)),
+        _integral(steps, errors["P"]),
+        # The sum of the changes, so that no step size enters.
+        np.cumsum(_change([part[name] for name in _commanded(part, roles)])),
+    ]
+
+
+def _with_products(ise: Any, iae: Any, work: Any, wear: Any) -> dict[str, Any]:
+    """The metrics that integrals give, which are arrays or numbers."""
     return {
-        "time": time,
         "ISE": ise,
         "IAE": iae,
         "W": work,
@@ -206,7 +218,8 @@ def over_time(
     """
     part = _window(log, start, stop, roles)
     with np.errstate(over="ignore", invalid="ignore"):
-        return _accumulate(part, tracking(part, roles), roles)
+        integrals = _integrals(part, tracking(part, roles), roles)
+        return {"time": part["time"], **_with_products(*integrals)}
 
 
 def compute(
@@ -234,7 +247,8 @@ def compute(
     part = _window(log, start, stop, roles)
     with np.errstate(over="ignore", invalid="ignore"):
         errors = tracking(part, roles)
-        found = {name: float(values[-1]) for name, values in _accumulate(part, errors, roles).items()}
+        totals = _with_products(*(values[-1] for values in _integrals(part, errors, roles)))
+        found = {name: float(total) for name, total in totals.items()}
         found["e_pos_rms"] = _rms(errors["e_pos"])
         found["e_pos_max"] = float(np.max(errors["e_pos"]))
         found["cross_track_rms"] = _rms(errors["cross_track"])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -135,11 +135,18 @@ class Windows:
             self._start = self._after(self._stop)
         return t < self._stop - TIME_TOLERANCE
 
-    def next(self, times: np.ndarray, k: int) -> int:
-        """The first of the times, from the k-th on, that may be in one; their number if none may."""
-        if k < len(times) and times[k] < self._stop - TIME_TOLERANCE:
-            return k
-        return max(k, int(np.searchsorted(times, self._start - TIME_TOLERANCE)))
+    def ahead(self, times: np.ndarray) -> Iterator[tuple[int, int]]:
+        """Which of the times are in one: the first, and the one behind the last, of each span."""
+        k = 0
+        while k < len(times):
+            if self(float(times[k])):
+                # Up to the end or the beginning of the next one all is as it is now.
+                change = min(self._stop, self._start) - TIME_TOLERANCE
+                end = max(k + 1, int(np.searchsorted(times, change)))
+                yield k, end
+                k = end
+            else:
+                k = max(k + 1, int(np.searchsorted(times, self._start - TIME_TOLERANCE)))
 
 
 class Within(PlanAhead):
@@ -157,8 +164,7 @@ class Within(PlanAhead):
         return self._row() if self._windows(t) else None
 
     def ahead(self, times: np.ndarray, acts: np.ndarray, numbers: np.ndarray) -> None:
-        k = self._windows.next(times, 0)
-        while k < len(times):
-            if self._windows(float(times[k])):
-                acts[k], numbers[k] = 1, self._row()
-            k = self._windows.next(times, k + 1)
+        for first, end in self._windows.ahead(times):
+            acts[first:end] = 1
+            for k in range(first, end):
+                numbers[k] = self._row()

@@ -47,6 +47,11 @@ class InstancePool:
                 self._models[path] = Model(path)
         return {name: self._models[path] for name, path in paths.items()}
 
+    def know(self, path: Path, model: Model) -> None:
+        """Take what has been read of the FMU elsewhere for that of a copy of its file."""
+        if path not in self._models:
+            self._models[path] = model.copied_to(path)
+
     def take(self, name: str, model: Model, entry: FmuEntry, on_message: OnMessage) -> Instance:
         """An instance in the state after instantiation.
 

@@ -1,7 +1,7 @@
 """Preparation of a system: a scenario checked against its FMUs. Nothing runs before this is done."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from ..errors import InputError
@@ -31,6 +31,7 @@ def prepare(
     only_own: bool = False,
     models: Mapping[str, Model] | None = None,
     beliefs: Overrides = (),
+    unlogged: Collection[str] = (),
 ) -> System:
     """Read the FMUs of a scenario and check all that can be checked without running.
 
@@ -40,6 +41,7 @@ def prepare(
         only_own: whether to refuse FMUs with programs that were not built on this computer.
         models: the FMU of each instance, where they have been read before.
         beliefs: parameter sets of what other FMUs believe of the models that these name.
+        unlogged: instances of which nothing is logged, whatever the scenario says.
 
     Raises:
         InputError: the first error.
@@ -59,7 +61,7 @@ def prepare(
     check_faults(system)
     check_events(system)
     check_roles(system)
-    _choose_signals(system)
+    _choose_signals(system, unlogged)
     if scenario.algorithm == "gauss_seidel":
         system.order, late = newest_first(system)
         system.warnings += late
@@ -103,7 +105,7 @@ def _count_steps(system: System) -> None:
         system.every[name] = every
 
 
-def _choose_signals(system: System) -> None:
+def _choose_signals(system: System, unlogged: Collection[str]) -> None:
     """Choose the signals of the value table: connected, logged, or used by metrics, faults or events."""
     available = _numbers(system)
     flowing = [name for name, v in available.items() if v.causality in ("input", "output")]
@@ -119,6 +121,7 @@ def _choose_signals(system: System) -> None:
                     raise InputError(f"log.signals[{k}]: {name} is of type String, not a number")
                 if name not in system.logged:
                     system.logged.append(name)
+    system.logged = [name for name in system.logged if name.partition(".")[0] not in unlogged]
     needed = {*system.logged}
     needed |= set(system.scenario.roles.metric_inputs).intersection(available)
     for c in system.connections:

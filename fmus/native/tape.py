@@ -3,11 +3,13 @@
 :mod:`fmus.fmi.trace` keeps expressions, which is enough to see what depends on what. Code that behaves
 like the Python function to the bit, its failures included, needs the order of the operations as well,
 and which of them belong to a branch: ``when`` becomes a branch here, and a function marked as ``kernel``
-is recorded once and called.
+is recorded once and called. An operation that is done again on the same numbers, which gives the same
+bits, is recorded at the first time only: compilers do so with all but the functions of libm.
 """
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -117,10 +119,22 @@ class Tape:
         self.kernels = kernels
         self.body = self.block = Block()
         self._open = {id(self.body)}
+        # What has been done so far in the open blocks, the innermost first.
+        self._done: ChainMap[Any, Value] = ChainMap()
 
     def variable(self, name: str, condition: bool = False) -> Value:
         """A value from outside."""
-        return Value(self, "variable", (name,), condition)
+        return self._once("variable", (name,), condition)
+
+    def _once(self, name: str, args: Sequence[Any], condition: bool) -> Value:
+        """The value of an operation: of the same one before, if there was one, else a new one."""
+        key = name, tuple([id(x) if isinstance(x, Value) else repr(x) for x in args])
+        value = self._done.get(key)
+        if value is None:
+            value = self._done[key] = Value(self, name, args, condition)
+            if name != "variable":
+                self.block.append(value)
+        return value
 
     def recording(self, results: list[Any]) -> Recording:
         """All that is recorded, as a function with these results."""
@@ -134,9 +148,7 @@ class Tape:
             known, other = args if isinstance(args[0], bool) else args[::-1]
             return known if known is _DECIDED[name] else other
         condition = name in _CONDITIONS or (name == "where" and all(map(is_condition, args[1:])))
-        value = Value(self, name, args, condition)
-        self.block.append(value)
-        return value
+        return self._once(name, args, condition)
 
     def branch(self, condition: Value, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
         """Record a branch; gives what is there behind it, in the shape that both cases have."""
@@ -162,6 +174,7 @@ class Tape:
 
     def _inner(self, case: Callable[[], Any]) -> tuple[Block, Any]:
         outer, self.block = self.block, Block()
+        before, self._done = self._done, self._done.new_child()
         self._open.add(id(self.block))
         try:
             result = case()
@@ -169,7 +182,7 @@ class Tape:
             return self.block, result
         finally:
             self._open.remove(id(self.block))
-            self.block = outer
+            self.block, self._done = outer, before
 
     def call(self, function: Callable[..., Any], args: tuple[Any, ...]) -> Any:
         """Record a call of a kernel, which is recorded itself at its first call."""

@@ -27,8 +27,8 @@ from .layout import STRUCTURES, FmuLayout, LoopLayout, address, lay_out_fmu, ope
 from .rounding import round_to_places
 
 # Base steps whose times and chances are planned at once; chosen: the cost of a plan is small beside
-# that of the steps, and the wait for it not noticed.
-HORIZON = 2048
+# that of the steps, and the wait for it, some ms, not noticed.
+HORIZON = 8192
 # Why a block ended, as loop.c has it.
 AT_END, FULL, DUE, PUT, STEP, GET = range(6)
 
