@@ -29,15 +29,8 @@ def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
     """The numbers of one trial."""
     names = ("position", "along", "cross_track", "heading", "lag", "inside", "omega_X", "iae", "work")
     names += ("iaew", "iaewwt", "swing")
-    header = [
-        "controller",
-        "lost",
-        "position [m]",
-        "along the ship [m]",
-        "cross-track [m]",
-        "heading [rad]",
-        "z1_x [m]",
-    ]
+    header = ["controller", "lost", "position [m]", "along the ship [m]", "cross-track [m]"]
+    header += ["heading [rad]", "z1_x [m]"]
     header += ["inside by [m]", "ω in surge [N]", "IAE", "W", "IAEW", "IAEWWT", "swing [rad/s]"]
     report.text(f"**{label(*key)}**")
     rows = [[LABELS[c], str(lost(r)), *(str(mean(r, n)) for n in names)] for c, r in runs.items()]
@@ -107,8 +100,8 @@ def study(
     report.heading("The trials")
     report.text(
         "Means over the seeds with their 95 % intervals, over the runs that kept up with the target; "
-        "`lost` is how many did not. Position and z1_x over the second half, others from 20 s on. z1_x is "
-        "the controller's, of the estimated pose; the part of the distance along the ship is the true one."
+        "`lost` is how many did not. Position, its part along the ship, and z1_x over the second half, "
+        "others from 20 s on. z1_x is the controller's, of the estimated pose, the rest is true."
     )
     for key, runs in found.trials.items():
         table(report, key, runs)
