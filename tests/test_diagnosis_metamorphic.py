@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from support.cases import in_part
 from support.measured import commands, jumps, sail, slow_swings, smoothed
 
-from diagnosis import Model, Windows
+from diagnosis import Model, Windows, integrals
+from diagnosis.model import omega
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
 # Commands, delay of the thrusters [s], noise.
@@ -104,3 +106,29 @@ def test_preprocessing_does_not_decide_the_result(kind, change):
     assert bool(told) <= bool(KINDS[kind][1]), "no delay is told where there is none"
     if told:
         assert other.delay == pytest.approx(LATE, abs=0.05)
+
+
+def silent(run):
+    """(n,), rows in two holes of 1.5 s."""
+    return np.logical_or(*[np.abs(run.time - at * run.time[-1]) < 0.75 for at in (0.31, 0.64)])
+
+
+def holed(run):
+    """Rows are missing."""
+    return run.rows(np.flatnonzero(~silent(run)))
+
+
+def unheard(run):
+    """Commands are missing, and held."""
+    tau = pd.DataFrame(np.where(silent(run)[:, None], np.nan, run.tau_cmd)).ffill().to_numpy()
+    return replace(run, tau_cmd=tau, held=silent(run))
+
+
+@pytest.mark.parametrize("change", [holed, unheard])
+def test_hole_in_the_commands_spoils_no_window(change):
+    run, _ = sail(SECONDS, H, given=jumps)
+    run = thinned(run, 2)
+    whole, other = (integrals(smoothed(r)) for r in (run, change(run)))
+    assert whole.middle.size - 28 <= other.middle.size < whole.middle.size - 12
+    rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (whole, other)]
+    assert (rms[1] <= 1.5 * rms[0]).all()

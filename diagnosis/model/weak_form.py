@@ -17,7 +17,7 @@ from fmus.vessel import vessel
 
 from ..data.reading import Run
 from ..smoothing import Smoothed
-from ..smoothing.smoother import breaks
+from ..smoothing.smoother import breaks, silences
 from .prediction import at_rest, true_motion
 from .ship_model import Model
 from .thrust import Response, thrust
@@ -102,7 +102,7 @@ def places(t: np.ndarray) -> np.ndarray:
 
 
 def integrals(smoothed: Smoothed) -> Integrals:
-    """The windows of a run in which at least half of the samples are there and thrusters at work."""
+    """The windows of a run with half of the samples or more, all commands, and thrusters at work."""
     run = smoothed.track.run
     t = run.time
     middles = t[0] + WIDTH / 2 + EVERY * places(t)
@@ -114,10 +114,11 @@ def integrals(smoothed: Smoothed) -> Integrals:
     last = np.searchsorted(t, middles + WIDTH / 2, side="right")
     count = last - first
     # Stretches know nothing of each other: no window lies in two.
-    parts = np.cumsum(np.concatenate([[0], breaks(t, smoothed.track)]))
+    parts = np.cumsum(np.concatenate([[0], breaks(np.arange(t.size), smoothed.track)]))
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole
+        & (silences(run)[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
         & (gone[last] == gone[first])
         & (2 * (fresh[last] - fresh[first]) >= count)

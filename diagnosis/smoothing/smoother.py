@@ -15,7 +15,7 @@ from scipy.linalg import LinAlgError
 from cosim import InputError
 from fmus.frames import rotate_to_body
 
-from ..data import Counts, Track
+from ..data import Counts, Run, Track
 from ..data.cleaning import noise
 from .command_motion import IDLE, CommandResponse, Commands
 from .command_response import with_commands
@@ -26,6 +26,9 @@ from .spline import Knots, basis, inverse_band, knots, roughness, variance
 
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
 BREAK = 3.0
+# s, or ALONE periods of the log if that is longer: over a longer gap between commands none is known.
+# Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
+HELD, ALONE = 0.5, 5.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
@@ -120,7 +123,7 @@ def smooth(track: Track, driven: bool = True) -> Smoothed:
 def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     """Smooth a run by some of its rows."""
     time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
-    grid = knots(*stretches(time[rows], track), max(SPACING, track.period))
+    grid = knots(*stretches(rows, track), max(SPACING, track.period))
     inside = within(grid, time)
     dense = rows[inside[rows]]
     z = track.pose[dense] - origin
@@ -166,14 +169,29 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     )
 
 
-def breaks(time: np.ndarray, track: Track) -> np.ndarray:
-    """(n - 1,): which gaps between times (n,) [s] of a run are too long to be bridged."""
-    return np.diff(time) > max(BREAK, 10.0 * track.period)
+def silences(run: Run) -> np.ndarray:
+    """(n,), number of the part of a run that each row lies in; odd parts are without commands."""
+    given = run.time if run.held is None else run.time[~run.held]
+    if given.size < 2:
+        return np.ones(run.time.size, int)
+    silent = np.diff(given) > max(HELD, ALONE * float(np.median(np.diff(run.time))))
+    last, next_one = given[:-1][silent], given[1:][silent]
+    return np.searchsorted(last, run.time, "left") + np.searchsorted(next_one, run.time, "right")
 
 
-def stretches(time: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
-    """Start and end [s] of the parts of a run between long gaps that have enough samples."""
-    cut = np.flatnonzero(breaks(time, track))
+def breaks(rows: np.ndarray, track: Track) -> np.ndarray:
+    """(n - 1,): between which of some rows (n,) of a run too much is missing to be bridged.
+
+    Where a pose is missing, the commands lead over the gap; where they are missing, too, nothing does.
+    """
+    long = np.diff(track.run.time[rows]) > max(BREAK, 10.0 * track.period)
+    return long | (np.diff(silences(track.run)[rows]) > 0)
+
+
+def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
+    """Start and end [s], since the run's, of the parts between long gaps that have enough samples."""
+    time = track.run.time[rows] - track.run.time[0]
+    cut = np.flatnonzero(breaks(rows, track))
     first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
     enough = last - first + 1 >= FEWEST
     if not enough.any():
