@@ -20,6 +20,7 @@ __all__ = [
     "complain",
     "missing_extra",
     "printable",
+    "program",
     "run_command",
 ]
 
@@ -62,6 +63,11 @@ def _cut(text: str, longest: int) -> str:
 def complain(message: object, kind: str = "error: ") -> None:
     """Say on standard error why the command ends, in one line."""
     print(f"{kind}{printable(str(message))}", file=sys.stderr, flush=True)
+
+
+def program(module: str) -> str:
+    """The name of a command in its usage line: ``cybership NAME`` if that began it."""
+    return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
 
 
 def missing_extra(error: ModuleNotFoundError) -> str | None:

@@ -30,9 +30,10 @@ def nearest(name: str, known: Iterable[str]) -> str:
         Text to append to a message; empty if nothing is known.
     """
     known = list(known)
-    near = difflib.get_close_matches(name, known, 1, SIMILAR)
+    folded = {each.casefold(): each for each in reversed(known)}
+    near = difflib.get_close_matches(name.casefold(), folded, 1, SIMILAR)
     if near:
-        return f"; did you mean '{near[0]}'?"
+        return f"; did you mean '{folded[near[0]]}'?"
     if not known:
         return ""
     shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")

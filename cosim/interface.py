@@ -11,7 +11,7 @@ if __name__ == "__main__":
 import argparse
 from collections.abc import Iterable, Sequence
 
-from .command import BAD_INPUT, Output, complain, printable, run_command
+from .command import BAD_INPUT, Output, complain, printable, program, run_command
 from .errors import InputError
 from .fmu.fmu_model import Variable
 from .scenario.load import load_scenario
@@ -22,11 +22,11 @@ from .system.system import System
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m cosim.interface",
+        prog=program("cosim.interface"),
         description="Tables of what each FMU of a scenario gets and gives: names, units, descriptions, "
         "and where values come from and go to.",
-        epilog="examples:  python -m cosim.interface scenarios/ellipse.json\n"
-        "           python -m cosim.interface system.ssp > interface.md",
+        epilog="examples:  %(prog)s scenarios/ellipse.json\n"
+        "           %(prog)s system.ssp > interface.md",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file, SSP archive or OSP directory")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, run_command
+from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, program, run_command
 from .errors import InputError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
@@ -142,15 +142,15 @@ def _folder(text: str) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m cosim.run",
+        prog=program("cosim.run"),
         description="Run a co-simulation scenario: log.csv, log.json, metrics.json and pictures.",
-        epilog="examples:  python -m cosim.run scenarios/ellipse.json\n"
-        "           python -m cosim.run scenarios/ellipse.json --out /tmp/e --no-plots\n"
-        "           python -m cosim.run scenarios/ellipse.json --parameters model.ssv\n"
-        "           python -m cosim.run theirs.json --only-own\n"
-        "           python -m cosim.run scenarios/ellipse.json --set vessel.m=15 --seed 3\n"
-        "           python -m cosim.run scenarios/ellipse.json --set controller=./mine.fmu\n"
-        "           python -m cosim.run system.ssp --stop 100\n"
+        epilog="examples:  %(prog)s scenarios/ellipse.json\n"
+        "           %(prog)s scenarios/ellipse.json --out /tmp/e --no-plots\n"
+        "           %(prog)s scenarios/ellipse.json --parameters model.ssv\n"
+        "           %(prog)s theirs.json --only-own\n"
+        "           %(prog)s scenarios/ellipse.json --set vessel.m=15 --seed 3\n"
+        "           %(prog)s scenarios/ellipse.json --set controller=./mine.fmu\n"
+        "           %(prog)s system.ssp --stop 100\n"
         "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -38,8 +38,9 @@ def main() -> int:
         return 2
     sys.argv = [f"cybership {name}", *sys.argv[2:]]
     try:
-        # As python -m does it: what a command does before its imports happens here, too.
-        runpy.run_module(SUBCOMMANDS[name].module, run_name="__main__", alter_sys=True)
+        # As python -m does it: what a command does before its imports happens here, too. But sys.argv[0]
+        # stays the name of the command, by which usage lines call it.
+        runpy.run_module(SUBCOMMANDS[name].module, run_name="__main__")
     except ModuleNotFoundError as error:
         from cosim.command import BAD_INPUT, complain, missing_extra
 

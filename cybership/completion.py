@@ -5,18 +5,30 @@ import sys
 from cosim import shipped_names
 from cybership.subcommands import SUBCOMMANDS
 
-BASH = """_cybership() {{
-    local word="${{COMP_WORDS[COMP_CWORD]}}"
+# One match a line, as names of files may have blanks. Options are those of the usage line, which ends at
+# the first blank line of the help; what follows names options of other commands as well.
+BASH = r"""_cybership() {{
+    local IFS=$'\n' word="${{COMP_WORDS[COMP_CWORD]}}" before="${{COMP_WORDS[COMP_CWORD-1]}}" usage=""
     if [ "$COMP_CWORD" -eq 1 ]; then
-        COMPREPLY=($(compgen -W "{commands}" -- "$word"))
-    elif [ "${{word:0:1}}" = "-" ]; then
-        local help="$("${{COMP_WORDS[0]}}" "${{COMP_WORDS[1]}}" --help 2> /dev/null)"
-        local known="$(grep -oE -- '--[a-z][a-z-]*' <<< "$help")"
-        COMPREPLY=($(compgen -W "$known" -- "$word"))
+        COMPREPLY=($(compgen -W $'{commands}\n--help\n--version' -- "$word"))
+        return
+    fi
+    if [ "${{word:0:1}}" = "-" ] || [ "${{before:0:2}}" = "--" ]; then
+        usage="$("${{COMP_WORDS[0]}}" "${{COMP_WORDS[1]}}" --help 2> /dev/null | sed '/^$/q')"
+    fi
+    if [ "${{word:0:1}}" = "-" ]; then
+        COMPREPLY=($(compgen -W "$(grep -oE -- '--[a-z][a-z-]*' <<< "$usage")" -- "$word"))
+        return
+    fi
+    local values="$(grep -oE -- "$before [{{][a-z,]+" <<< "$usage" | grep -oE '[a-z,]+$')"
+    if [ -n "$values" ]; then
+        COMPREPLY=($(compgen -W "${{values//,/$'\n'}}" -- "$word"))
+    elif [ "${{COMP_WORDS[1]}}" = completion ]; then
+        COMPREPLY=($(compgen -W $'bash\nzsh\nfish' -- "$word"))
     else
         COMPREPLY=($(compgen -f -- "$word"))
-        if [ "${{COMP_WORDS[1]}}" = run ]; then
-            COMPREPLY+=($(compgen -W "{scenarios}" -- "$word"))
+        if [ "${{COMP_WORDS[1]}}" = run ] && [ "${{before:0:1}}" != "-" ]; then
+            COMPREPLY+=($(compgen -W $'{scenarios}' -- "$word"))
         fi
     fi
 }}
@@ -25,7 +37,8 @@ complete -o filenames -F _cybership cybership
 FISH = """complete -c cybership -n __fish_use_subcommand -f -a '{commands}'
 complete -c cybership -n '__fish_seen_subcommand_from run' -a '{scenarios}'
 """
-SHELLS = {"bash": BASH, "zsh": f"autoload -U +X bashcompinit && bashcompinit\n{BASH}", "fish": FISH}
+ZSH = "autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n"
+SHELLS = {"bash": BASH, "zsh": f"{ZSH}{BASH}", "fish": FISH}
 
 
 def main(arguments: list[str]) -> int:
@@ -33,7 +46,8 @@ def main(arguments: list[str]) -> int:
     if len(arguments) != 1 or arguments[0] not in SHELLS:
         print("usage: cybership completion bash|zsh|fish\n", __doc__, file=sys.stderr)
         return 2
-    names = {"commands": " ".join(SUBCOMMANDS), "scenarios": " ".join(shipped_names())}
+    between = " " if arguments[0] == "fish" else r"\n"
+    names = {"commands": between.join(SUBCOMMANDS), "scenarios": between.join(shipped_names())}
     print(SHELLS[arguments[0]].format(**names), end="")
     return 0
 

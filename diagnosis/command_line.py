@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rich.console import Console, RenderableType
 
 from cosim import InputError
-from cosim.command import BAD_INPUT, Output, complain
+from cosim.command import BAD_INPUT, Output, complain, program
 from cosim.interrupts import Held
 from fmus.declare import DeclarationError
 from fmus.effects import STANDARD
@@ -34,7 +34,7 @@ class Done(NamedTuple):
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with the options that both commands have."""
     made = argparse.ArgumentParser(
-        prog=f"python -m diagnosis.{name}",
+        prog=program(f"diagnosis.{name}"),
         description=description,
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -71,7 +71,7 @@ def analysis_parser(
         fewest: ``+``: one run at the least; ``*``: none.
     """
     made = argparse.ArgumentParser(
-        prog=f"python -m diagnosis.{name}",
+        prog=program(f"diagnosis.{name}"),
         description=description,
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -93,7 +93,7 @@ def analysis_parser(
 def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
     made = argparse.ArgumentParser(
-        prog=f"python -m diagnosis.{name}",
+        prog=program(f"diagnosis.{name}"),
         description=description,
         epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -153,8 +153,6 @@ def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
         return None
     inputs = inputs_of(options)
     options.out = default_folder(options.usual, inputs, options.overwrite)
-    if options.out != options.usual:
-        complain(f"another result is in '{options.usual}'; this one goes to '{options.out}'", "note: ")
     return inputs
 
 
@@ -198,6 +196,9 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
         interrupts.hold()  # the files are there: what was found is shown
         if inputs is not None:
             keep_inputs(options.out, inputs)
+            if options.out != options.usual:
+                note = f"another result is in '{options.usual}'; this one is in '{options.out}'"
+                complain(note, "note: ")
         output = Output(highlight=False, markup=False)
         for part in done.shown:
             output.print(part)

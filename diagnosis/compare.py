@@ -52,8 +52,8 @@ def _parser() -> argparse.ArgumentParser:
     made = parser(
         "compare",
         "Compare a model with measured runs: how large its error is, and where.",
-        "examples:  python -m diagnosis.compare run1.csv run2.csv\n"
-        "           python -m diagnosis.compare results/ellipse --model model.ssv --out results/after\n"
+        "examples:  %(prog)s run1.csv run2.csv\n"
+        "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
     )
     made.add_argument(

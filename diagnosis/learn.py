@@ -81,9 +81,9 @@ def _parser() -> argparse.ArgumentParser:
     made = parser(
         "learn",
         "Learn from measured runs which physical effect a model lacks, and how sure that is.",
-        "examples:  python -m diagnosis.learn run1.csv run2.csv --test run3.csv\n"
-        "           python -m diagnosis.learn results/hidden_drag --prior 0 --out results/found\n"
-        "           python -m diagnosis.learn run1.csv --effects my_effects.py\n"
+        "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
+        "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
+        "           %(prog)s run1.csv --effects my_effects.py\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
         "            130 interrupted (nothing is written)",
     )

@@ -42,8 +42,8 @@ def _parser() -> argparse.ArgumentParser:
     made = analysis_parser(
         "pca",
         "Principal components of model error, velocity and force, and the samples that are outliers.",
-        "examples:  python -m diagnosis.pca results/ellipse\n"
-        "           python -m diagnosis.pca run1.csv run2.csv --components 4 --out results/outliers\n"
+        "examples:  %(prog)s results/ellipse\n"
+        "           %(prog)s run1.csv run2.csv --components 4 --out results/outliers\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "mdf",
     )

@@ -69,8 +69,8 @@ def _parser() -> argparse.ArgumentParser:
     made = analysis_parser(
         "pls",
         "Regress the model error on velocity and force by partial least squares, with cross-validation.",
-        "examples:  python -m diagnosis.pls results/ellipse\n"
-        "           python -m diagnosis.pls run1.csv run2.csv --recipe PLS2 --stable --out results/2\n"
+        "examples:  %(prog)s results/ellipse\n"
+        "           %(prog)s run1.csv run2.csv --recipe PLS2 --stable --out results/2\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters results/pls/model.ssv\n"
         "recipes:   PLS1 to PLS4 of Table 7.2; nominal, continuous: 3.2.2, 3.2.3\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",

@@ -48,8 +48,8 @@ def _parser() -> argparse.ArgumentParser:
         "replay",
         "Feed a measured run to an observer and a controller open loop: what they made of it, with the "
         "signals that were lost in transmission.",
-        "examples:  python -m diagnosis.replay results/ellipse --controller abs\n"
-        "           python -m diagnosis.replay run.csv --controller cl_win_eps --scenario "
+        "examples:  %(prog)s results/ellipse --controller abs\n"
+        "           %(prog)s run.csv --controller cl_win_eps --scenario "
         "scenarios/eight.json\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
     )

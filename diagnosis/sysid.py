@@ -56,8 +56,8 @@ def _parser() -> argparse.ArgumentParser:
     made = analysis_parser(
         "sysid",
         "Identify the coefficients of (7.1)-(7.5) by repeated passes of concurrent learning over runs.",
-        "examples:  python -m diagnosis.sysid results/ellipse --test results/eight\n"
-        "           python -m diagnosis.sysid --recipe SYSID4 --out results/sysid4\n"
+        "examples:  %(prog)s results/ellipse --test results/eight\n"
+        "           %(prog)s --recipe SYSID4 --out results/sysid4\n"
         "           python -m cosim.run scenarios/ellipse.json --parameters results/sysid4/model.ssv\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "smoothed",

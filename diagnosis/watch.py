@@ -43,8 +43,8 @@ def _parser() -> argparse.ArgumentParser:
     return open_loop_parser(
         "watch",
         "Tell whether a thruster has lost force during a measured run: which, when, how sure.",
-        "examples:  python -m diagnosis.watch results/ellipse\n"
-        "           python -m diagnosis.watch run.csv --observer kalman --out results/thrusters\n"
+        "examples:  %(prog)s results/ellipse\n"
+        "           %(prog)s run.csv --observer kalman --out results/thrusters\n"
         "The same in a closed loop: watch_thrusters.fmu, fed like a controller, and with the force by\n"
         '["thrusters.tau_cmd_*", "watch.tau_cmd_*"].\n'
         "exit codes: 0 done (also where none fails), 2 bad input, 130 interrupted (nothing is written)",

@@ -1,15 +1,23 @@
-"""The site of the documentation: ``python -m sphinx -W -b html docs site``."""
+"""The site of the documentation: ``python -m sphinx -W -b html docs site``.
+
+The notebooks run while it is built; ``-D nb_execution_mode=off`` leaves that out.
+"""
 
 from importlib.metadata import version as installed
 
 project = "cybership"
 copyright = "2026, the cybership developers"  # noqa: A001 - the name that Sphinx reads
 release = version = installed("cybership")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
 html_theme = "furo"
 html_title = f"cybership {release}"
 exclude_patterns = ["studies/**/results.json"]
-source_suffix = {".md": "markdown"}
+source_suffix = {".md": "myst-nb"}
+nb_execution_mode = "force"
+nb_execution_in_temp = True  # what a notebook writes goes with it
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600  # s for a cell; chosen: far above the seconds that one takes
+nb_merge_streams = True
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 4
 autodoc_member_order = "alphabetical"

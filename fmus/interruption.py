@@ -1,4 +1,4 @@
-"""Ctrl-C and requests to terminate, for the commands of this package."""
+"""Ctrl-C, requests to terminate and the usage line, for the commands of this package."""
 
 import os
 import signal
@@ -31,6 +31,11 @@ def _raise(*_: object) -> NoReturn:
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
+
+
+def program(module: str) -> str:
+    """The name of a command in its usage line: ``cybership NAME`` if that began it."""
+    return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
 
 
 def run_interruptible(main: Callable[[], int]) -> NoReturn:

@@ -76,7 +76,7 @@ def test_gap_is_told():
     keep = np.r_[0:400, 500:N]
     track = clean(base().rows(keep))
     assert track.counts().samples == keep.size
-    assert track.notes == ("1 gaps, the longest 2.02 s at 7.98 s",)
+    assert track.notes == ("a gap of 2.02 s, 7.98 s from the start",)
 
 
 def test_rows_between_two_measurements_are_no_freeze():

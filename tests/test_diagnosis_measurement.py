@@ -1,6 +1,7 @@
 """Reading measured runs: every form of file gives the same run, and every mistake one line."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -108,6 +109,33 @@ def test_names_units_and_axes_are_told_in_a_file_beside(tmp_path):
     np.testing.assert_allclose(run.tau_cmd, TAU_CMD, atol=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_date_stamps_feet_and_any_factor(tmp_path, kind):
+    stamps = pd.Timestamp("2026-11-20T09:30:00Z") + pd.to_timedelta(TIME, unit="s")
+    other = with_tau().assign(time=stamps, x=POSE[:, 0] / 0.3048, y=POSE[:, 1] / 7.0)
+    columns = {"x": {"name": "x", "unit": "ft"}, "y": {"name": "y", "factor": 7.0}}
+    path = tmp_path / f"a.{kind}"
+    if kind == "csv":
+        other.to_csv(path, index=False, date_format="%Y-%m-%dT%H:%M:%S.%fZ")
+    else:
+        other.to_parquet(path)
+    (tmp_path / f"a.{kind}.json").write_text(json.dumps({"columns": columns}))
+    run = diagnosis.read(path)
+    np.testing.assert_allclose(run.time, TIME - TIME[0], atol=1e-6)
+    np.testing.assert_allclose(run.pose, POSE, atol=1e-9)
+
+
+def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):
+    t = np.arange(0.0, 20.0, 0.05)
+    turning = np.mod(10.0 * t, 360.0)
+    run = pd.DataFrame({"time": t, "x": 0.1 * t, "y": 0.0 * t + 0.01 * np.sin(t), "Hdg [deg]": turning})
+    run = run.assign(**dict.fromkeys(TAU, np.sin(t)))
+    run.to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv.json").write_text(json.dumps({"columns": {"psi": "Hdg [deg]"}}))
+    with pytest.raises(cosim.InputError, match=re.escape('"psi": {"name": "Hdg [deg]", "unit": "deg"}')):
+        diagnosis.clean(diagnosis.read(tmp_path / "a.csv"))
+
+
 def test_of_a_log_only_what_a_ship_would_tell_is_read(ellipse, tmp_path):
     result = cosim.simulate(cosim.load_scenario(ellipse), tmp_path / "first")
     log = cosim.read_log(result.folder)
@@ -179,9 +207,11 @@ def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
         ({"columns": {"u1": "x"}}, "no column 'u2'"),
         ({"colums": {}}, "colums: Extra inputs are not permitted; did you mean 'columns'?"),
         ({"columns": {"x": {"unit": "m"}}}, "columns.x.name: Field required"),
+        ({"columns": {"x": {"name": "x", "faktor": 2}}}, "columns.x.faktor: Extra inputs are not permitted; did you mean 'factor'?"),
+        ({"columns": {"x": {"name": "x", "factor": 0}}}, "x.factor is not zero"),
         ([1], "valid dictionary"),
     ],
-)
+)  # fmt: skip
 def test_wrong_layout_is_refused_with_one_line(tmp_path, layout, message):
     with_tau().to_csv(tmp_path / "mine.csv", index=False)
     (tmp_path / "mine.csv.json").write_text(json.dumps(layout))

@@ -8,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
+import cosim
 import diagnosis.assessment
 import diagnosis.identification
 import diagnosis.model
 import diagnosis.smoothing
+import fmus
 
 ROOT = Path(__file__).parents[1]
 SYMBOLS = (ROOT / "docs" / "symbols.md").read_text(encoding="utf-8")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.md"))
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md")), *NOTEBOOKS]
 
 
 def rows():
@@ -71,6 +74,23 @@ def modules_with_constants():
 @pytest.mark.parametrize(("name", "value"), [*constants()])
 def test_constants_of_the_diagnosis_are_those_of_the_page(name, value):
     assert float(value) in [getattr(module, name, None) for module in modules_with_constants()]
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda p: p.name)
+def test_a_notebook_is_in_the_index_and_uses_public_names(page):
+    """The site runs them; here is what can be told without."""
+    assert f"notebooks/{page.stem}\n" in (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    cells = re.findall(r"```\{code-cell\} ipython3\n(.*?)```\n", page.read_text("utf-8"), re.DOTALL)
+    assert cells
+    code = ast.parse("\n".join(re.sub(r"^!.*", "", cell, flags=re.MULTILINE) for cell in cells))
+    ours = {"cosim": cosim, "diagnosis": diagnosis, "fmus": fmus}
+    for node in ast.walk(code):
+        if (
+            isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and node.value.id in ours
+        ):
+            assert node.attr in ours[node.value.id].__all__, ast.unparse(node)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)

@@ -1,5 +1,6 @@
 """The report: one page that needs no other file, and how a browser shows it."""
 
+import base64
 import html
 import os
 import re
@@ -8,6 +9,7 @@ import subprocess
 from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -164,6 +166,22 @@ class Page(HTMLParser):
         return [value for name, value in self.attributes if name in names]
 
 
+def saved(page):
+    """What the links of pictures hold."""
+    return [link for link in page.values("href") if link.startswith("data:image/svg+xml;base64,")]
+
+
+def test_every_picture_can_be_saved_as_a_file(report):
+    page = Page(report)
+    links, names = saved(page), page.values("download")
+    assert len(links) == len(set(names)) == page.tags["svg"]
+    for link, name in zip(links, names, strict=True):
+        text = base64.b64decode(link.partition(",")[2]).decode()
+        assert ElementTree.fromstring(text).tag == "{http://www.w3.org/2000/svg}svg"
+        assert "var(--" not in text  # the colours of the page, which is not there
+        assert name.endswith(".svg")
+
+
 def test_page_is_whole_by_itself(report):
     page = Page(report)
     assert not page.open
@@ -172,7 +190,7 @@ def test_page_is_whole_by_itself(report):
     ids = page.values("id")
     assert ids
     assert len(set(ids)) == len(ids)
-    references = page.values("href", "xlink:href", "src")
+    references = [r for r in page.values("href", "xlink:href", "src") if r not in saved(page)]
     references += [
         f"#{name}"
         for v in page.values("clip-path", "style")

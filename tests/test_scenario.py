@@ -257,6 +257,12 @@ def test_missing_scenario_suggests_the_nearest_file(tmp_path):
     assert "did you mean 'ellipse.json'?" in refused(tmp_path / "elipse.json")
 
 
+def test_shipped_scenario_comes_before_a_file_of_another_kind(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ellipse.csv.json").write_text("{}")
+    assert "did you mean 'ellipse'?" in refused("elipse")
+
+
 def one_fmu(path, **entry):
     return {"name": "one", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": str(path), **entry}}}
 

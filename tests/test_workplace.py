@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,17 +17,20 @@ from support.project import ROOT
 import cosim
 import diagnosis
 import fmus
-from cosim import run
+from cosim import command, run
 from cosim.command import missing_extra
+from cosim.master import simulation
 from cosim.results import draw
 from cosim.results.picture_files import PictureOptions
 from cosim.results.result_files import default_folder
 from cosim.scenario import Roles, load_scenario
 from cosim.system import prepare
+from cybership import completion
 from cybership.__main__ import main, usage
 from cybership.subcommands import SUBCOMMANDS
-from diagnosis import result_folder
+from diagnosis import command_line, result_folder
 from diagnosis.report import unique_share
+from fmus import interruption
 
 SHORT = {"stop": 1.0, "metrics": {}}
 
@@ -75,6 +79,35 @@ def test_the_default_folder_is_not_that_of_another_run(tmp_path, monkeypatch):
     Path("results/x_3").mkdir()
     Path("results/x_3/log.json").write_text("not ours")
     assert default_folder("x", third) == Path("results/x_4")
+
+
+def test_a_run_that_is_refused_has_no_note_on_its_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    described(Path("results/ellipse"), 1)
+    heard = []
+    with monkeypatch.context() as patch:
+        patch.setattr(simulation, "find_spec", lambda name: None)
+        with pytest.raises(cosim.InputError, match="needs pyarrow"):
+            cosim.simulate("ellipse", set=SHORT | {"log.format": "parquet"}, show=heard.append)
+    assert not any("another run" in note for note in heard)
+    assert not Path("results/ellipse_2").exists()
+    cosim.simulate("ellipse", set=SHORT, show=heard.append)
+    told = f"note: another run is in '{Path('results/ellipse')}'; this one goes to"
+    assert f"{told} '{Path('results/ellipse_2')}'" in heard
+
+
+def test_a_diagnosis_that_is_refused_has_no_note_on_its_folder(tmp_path, capsys):
+    usual = tmp_path / "diagnosis"
+    usual.mkdir()
+    (usual / "diagnosis.json").write_text("{}")
+
+    def refuse(options, advance):
+        raise cosim.InputError("no such run")
+
+    for work, code in ((refuse, 2), (lambda options, advance: command_line.Done(0, []), 0)):
+        options = SimpleNamespace(out=None, usual=usual, overwrite=False)
+        assert command_line.run(work, options) == code
+        assert ("another result is in" in capsys.readouterr().err) == (code == 0)
 
 
 def test_runs_in_threads_wait_for_each_other(tmp_path):
@@ -164,9 +197,9 @@ def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
 
 
 def test_every_command_of_cybership_is_a_module_and_told():
-    for name, command in SUBCOMMANDS.items():
-        assert importlib.util.find_spec(command.module) is not None, name
-        assert command.purpose in usage()
+    for name, told in SUBCOMMANDS.items():
+        assert importlib.util.find_spec(told.module) is not None, name
+        assert told.purpose in usage()
 
 
 def test_cybership_names_the_nearest_command_and_imports_little(capsys, monkeypatch):
@@ -179,6 +212,40 @@ def test_cybership_names_the_nearest_command_and_imports_little(capsys, monkeypa
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
     )
     assert done.stdout.endswith("\n\n")
+
+
+def test_usage_lines_name_the_command_that_was_called(monkeypatch):
+    for program in (command.program, interruption.program):
+        monkeypatch.setattr(sys, "argv", ["cosim/run.py", "--help"])
+        assert program("cosim.run") == "python -m cosim.run"
+        monkeypatch.setattr(sys, "argv", ["cybership run", "--help"])
+        assert program("cosim.run") == "cybership run"
+    done = subprocess.run(
+        [sys.executable, "-m", "cybership", "metrics", "--help"],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    )  # fmt: skip
+    assert done.stdout.startswith("usage: cybership metrics [-h]")
+    assert "\n  cybership metrics results/ellipse --json\n" in done.stdout
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_completes_commands_options_values_scenarios_and_files(tmp_path, capsys):
+    """The printed function, in bash, with a command that only has a usage line."""
+    (tmp_path / "my run.json").write_text("{}")
+    assert completion.main(["bash"]) == 0
+    script = capsys.readouterr().out + (
+        "cybership() { printf 'usage: cybership run [--log {all,compact}] [--no-plots]\\n'; "
+        "printf '\\nexamples: cybership plots --width 3\\n'; }\n"
+        'tried() { COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMPREPLY=(); _cybership; '
+        "(IFS='|'; echo \"${COMPREPLY[*]}\"); }\n"
+        "tried cybership cam; tried cybership run --; tried cybership run --log c; "
+        "tried cybership run guid; tried cybership run my; tried cybership run --out guid\n"
+    )
+    done = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    expected = ["campaign", "--log|--no-plots", "compact", "guidance_fault", "my run.json", ""]
+    assert (done.stdout.splitlines(), done.stderr) == (expected, "")
 
 
 def test_a_missing_library_is_told_with_its_extra():

@@ -9,17 +9,18 @@ if __name__ == "__main__":
 
 import argparse
 import os
+import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..command import BAD_INPUT, FAILED, Output, complain, printable, run_command
+from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from .conduct import Progress as Told
@@ -33,6 +34,8 @@ USUAL = ("e_pos_rms", "cross_track_rms", "heading_rms", "W", "I_tau_dot")
 
 # Width that no table reaches [characters].
 WIDE = 10_000
+
+LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal; chosen
 
 # Messages of failed runs that are shown; chosen: the table has all.
 MESSAGES = 3
@@ -62,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.keep_logs,
                 options.stop_when,
                 lambda text: None if options.quiet else console.print(printable(text), markup=False),
-                _on(bar) if visible else lambda ended, failed, of: None,
+                _on(bar) if visible else _lines(console, options.quiet),
             )
         failed = made.query("status == 'failed'")
         for message, count in Counter(failed["message"]).most_common(MESSAGES):
@@ -94,6 +97,24 @@ def _on(bar: Progress) -> Told:
     return progress
 
 
+def _lines(console: Console, quiet: bool) -> Told:
+    """A line every half a minute, where there is no terminal."""
+    started = told = time.monotonic()
+    before: int | None = None  # ended in an earlier call of the command
+
+    def progress(ended: int, failed: int, of: int) -> None:
+        nonlocal told, before
+        now, before = time.monotonic(), ended if before is None else before
+        if quiet or now - told < LINE_EVERY or ended == before:
+            return
+        told = now
+        left = (now - started) * (of - ended) / (ended - before)
+        said = f" ({failed} failed)" if failed else ""
+        console.print(f"{ended} of {of} runs{said}, about {left:.0f} s left", markup=False)
+
+    return progress
+
+
 def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) -> None:
     """What is made of the table on request: the Pareto set, differences, pictures."""
     from .campaign_file import LoadedCampaign
@@ -116,16 +137,23 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
                 *(str(row[key]) for key in ("value", "against", "metric", "pairs")),
                 f"{row['difference']:.3g} ± {row['half']:.2g}",
                 "{percent:+.2f} ({percent_low:+.2f} to {percent_high:+.2f})".format(**row),
+                _better(row),
             ]
             for row in found.to_dict("records")
         ]
-        header = [options.compare, "against", "metric", "pairs", "difference", "percent"]
-        _print("paired differences with 95 % intervals", header, rows)
+        header = [options.compare, "against", "metric", "pairs", "difference", "percent", "better"]
+        _print("paired differences with 95 % intervals; of all metrics less is better", header, rows)
     if options.plot:
         from .charts import draw_campaign
 
         for path in draw_campaign(made, axes, over, metrics, out, options.compare):
             print(path)
+
+
+def _better(row: Mapping[Hashable, Any]) -> str:
+    """Which of two values is better: one is if the interval of the difference is on one side of zero."""
+    low, high = row["difference"] - row["half"], row["difference"] + row["half"]
+    return str(row["value"]) if high < 0.0 else str(row["against"]) if low > 0.0 else "not known"
 
 
 def _write(found: pandas.DataFrame, path: Path) -> None:
@@ -162,12 +190,12 @@ def _names(text: str) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m cosim.campaign",
+        prog=program("cosim.campaign"),
         description="Run a scenario many times, and write one table: runs.parquet.",
-        epilog="examples:  python -m cosim.campaign scenarios/campaigns/gains.campaign.json\n"
-        "           python -m cosim.campaign gains.campaign.json --compare controller --plot\n"
-        "           python -m cosim.campaign campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
-        "           python -m cosim.campaign campaign.json --scheduler tcp://10.0.0.1:8786\n"
+        epilog="examples:  %(prog)s scenarios/campaigns/gains.campaign.json\n"
+        "           %(prog)s gains.campaign.json --compare controller --plot\n"
+        "           %(prog)s campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
+        "           %(prog)s campaign.json --scheduler tcp://10.0.0.1:8786\n"
         "exit codes: 0 done, 2 bad input, 3 every run failed or the workers were lost, 130 interrupted\n"
         "A finished run is never made again: the same command goes on where it was interrupted.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -11,6 +11,7 @@ from ..results.performance import METRICS
 from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
+from ..scenario.shipped import find_scenario
 from ..scenario.strict import Strict
 
 # Columns of the table that are no axes.
@@ -88,7 +89,10 @@ class Sobol(Strict):
 class Campaign(Strict):
     """Many runs: a scenario, what differs between them, and how the values are combined."""
 
-    scenario: str = Field(min_length=1, description="path, relative to the campaign file")
+    scenario: str = Field(
+        min_length=1,
+        description="path, relative to the campaign file, or the name of a shipped scenario",
+    )
     axes: dict[str, Axis] = Field(min_length=1, description="by the name of their column in the table")
     design: Literal["grid", "list"] | Latin | Sobol = Field(
         "grid", description="all combinations, the k-th value of each axis together, or a sample"
@@ -151,7 +155,7 @@ class LoadedCampaign:
             raise InputError(_message(error, shown)) from None
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"{shown} cannot be written as JSON: {error}") from None
-        self.base: Scenario = load_scenario(self.folder / self.campaign.scenario)
+        self.base: Scenario = load_scenario(find_scenario(self.campaign.scenario, self.folder))
         dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
         taken: dict[tuple[str, ...], str] = {}
         for name, axis in self.campaign.axes.items():

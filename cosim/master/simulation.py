@@ -90,10 +90,11 @@ def simulate(
             usual = default_folder(scenario.name, description, overwrite)
             given = usual if out is None else Path(out)
             folder = Path(os.path.abspath(given))
+            note = ""
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
-                show(f"note: another run is in '{first}'; this one goes to '{given}'")
-            result, recorder = _run(system, folder, description, realtime, show, progress, pool)
+                note = f"note: another run is in '{first}'; this one goes to '{given}'"
+            result, recorder = _run(system, folder, note, description, realtime, show, progress, pool)
         finally:
             owner.leave_copies()
             if pool is None:
@@ -114,13 +115,17 @@ def simulate(
 def _run(
     system: System,
     folder: Path,
+    note: str,
     description: dict[str, Any],
     realtime: float | None,
     show: Callable[[str], None],
     progress: Callable[[float], None],
     pool: InstancePool | None,
 ) -> tuple[Result, Recorder | None]:
-    """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log."""
+    """Instantiate, initialise and run; returns how it ended, and the recorder if there is a log.
+
+    ``note`` is shown as soon as nothing can refuse the run any more.
+    """
     scenario, owner = system.scenario, Owner()
     for note in scenario.notes:
         show(f"note: {note}")
@@ -137,13 +142,13 @@ def _run(
                 raise KeyboardInterrupt from None
             if isinstance(error, InputError):
                 raise
-            _clear(folder, show)
+            _clear(folder, note, show)
             told = {"status": "failed", "rows": 0, "message": str(error)}
             write_json(folder / logs.SIDECAR, {**description, **told})
             return Result("failed", folder, message=str(error), warnings=system.warnings), None
         try:
             owner.leave_copies()
-            _clear(folder, show)
+            _clear(folder, note, show)
             result, recorder = _record(
                 system, master, folder, realtime, progress, description, interrupted
             )
@@ -154,14 +159,16 @@ def _run(
         return result, recorder
 
 
-def _clear(folder: Path, show: Callable[[str], None]) -> None:
-    """Make the result folder, without what an earlier run left there."""
+def _clear(folder: Path, note: str, show: Callable[[str], None]) -> None:
+    """Make the result folder, without what an earlier run left there, and show the note on it."""
     try:
         if (folder / logs.SIDECAR).exists():
             show(f"note: replaces the earlier run in '{folder}'")
         clear_results(folder)
     except OSError as error:
         raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
+    if note:
+        show(note)
 
 
 def _record(

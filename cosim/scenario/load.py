@@ -50,7 +50,8 @@ def load_scenario(
         json.dumps(content, ensure_ascii=False).encode()
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
-        hint = nearest(path.name, near) if near else nearest(path.stem, shipped_names())
+        shipped = shipped_names() if path.name == str(source) else []
+        hint = nearest(path.name, [*shipped, *near])
         raise InputError(f"no such scenario: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None

@@ -18,12 +18,12 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in shipped_folder().glob("*.json"))
 
 
-def find_scenario(source: str | Path) -> Path:
-    """The file of a scenario: a path, or the bare name of a shipped one.
+def find_scenario(source: str | Path, folder: Path = Path()) -> Path:
+    """The file of a scenario: a path relative to a folder, or the bare name of a shipped one.
 
     A file of that name, or a folder that is a system, comes first; any other folder does not count.
     """
-    path = Path(source)
+    path = folder / source
     is_there = path.is_file() or (path / OSP_STRUCTURE).is_file()
     if not is_there and path.name == str(source) and path.name in shipped_names():
         return shipped_folder() / f"{path.name}.json"

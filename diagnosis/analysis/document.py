@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import cosim
 
 from ..report import formatting
-from ..report.svg import inline, style
+from ..report.svg import data_uri, inline, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,6 +83,7 @@ def write_document(path: Path, document: Document) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["data_uri"] = data_uri
     with style():
         drawn = {
             (k, j): Markup(inline(plot.figure, f"plot-{k}-{j}", plot.caption))

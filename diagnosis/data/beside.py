@@ -36,7 +36,8 @@ def line_beside(
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
         flip = column.flip != (sign < 0.0)
-        other = {"name": name or column.name, "unit": unit, "flip": flip, "offset": sign * column.offset}
+        other = {"name": name or column.name, "unit": unit, "factor": column.factor, "flip": flip}
+        other["offset"] = sign * column.offset
         columns[signal] = Column.model_validate(other).model_dump(exclude_defaults=True)
         if columns[signal].get("unit") in SI:
             del columns[signal]["unit"]

@@ -97,7 +97,7 @@ def clean(run: Run, anyway: bool = False) -> Track:
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
     period = float(np.median(np.diff(run.time[fresh])))
-    refuse_time(row, seconds, where)
+    refuse_time(row, seconds, where, run.called)
     steps = np.minimum(np.diff(run.time), GAP)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
@@ -110,10 +110,10 @@ def clean(run: Run, anyway: bool = False) -> Track:
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
     pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
-    refuse_units(run.time[fresh], pose[fresh], where, anyway)
+    refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called)
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
     _moves(pose[fresh], where)
-    notes += _gaps(run.time[fresh], period)
+    notes += _gaps(run.time[fresh] - run.time[0], period)
     return Track(run, pose, frozen, dropped, between, period, out, tuple(notes))
 
 
@@ -184,9 +184,10 @@ def noise(values: np.ndarray) -> np.ndarray:
 
 
 def _gaps(time: np.ndarray, period: float) -> list[str]:
-    """A line for the gaps of half a second and more, if there are any."""
+    """A line for the gaps of half a second and more between times since the start, if there are any."""
     dt = np.diff(time)
     long = dt > max(0.5, LONG * period)
     if not long.any():
         return []
-    return [f"{long.sum()} gaps, the longest {dt.max():.4g} s at {time[dt.argmax()]:.4g} s"]
+    longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"
+    return [f"a gap of {longest}" if long.sum() == 1 else f"{long.sum()} gaps, the longest {longest}"]

@@ -39,7 +39,7 @@ ALL = (*TAU, *THREE, *FIVE, *POWER)
 # Factor to SI of every unit that a quantity may be in.
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254},
     "angle": {"rad": 1.0, "deg": 0.017453292519943295},
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
@@ -63,6 +63,11 @@ class Column(BaseModel):
 
     name: str = Field(description="the column's name in the file")
     unit: str | None = Field(default=None, description="its unit; SI if not said")
+    factor: float = Field(
+        default=1.0,
+        allow_inf_nan=False,
+        description="by which its numbers are multiplied to be in that unit",
+    )
     flip: bool = Field(default=False, description="whether its axis points the other way")
     offset: float = Field(
         default=0.0, allow_inf_nan=False, description="what is added, in its unit, after the flip"
@@ -91,6 +96,8 @@ class Layout(BaseModel):
         for key, column in value.items():
             if key not in QUANTITY:
                 raise ValueError(f"'{key[:SHOWN]}' is not a signal of a run{nearest(key, QUANTITY)}")
+            if column.factor == 0.0:
+                raise ValueError(f"{key}.factor is not zero")
             units = UNITS[QUANTITY[key]]
             if column.unit is not None and column.unit not in units:
                 raise ValueError(
@@ -116,7 +123,8 @@ LOG = _log()
 
 def to_si(values: Any, signal: str, column: Column) -> Any:
     """Numbers of a column as the signal they stand for, in SI."""
-    flipped = -values if column.flip else values
+    scaled = column.factor * values
+    flipped = -scaled if column.flip else scaled
     with np.errstate(over="ignore"):  # an infinite number is no measurement, and counts as dropped
         return (flipped + column.offset) * UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
 
@@ -135,7 +143,7 @@ def read_layout(path: Path) -> Layout | None:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part)[:SHOWN] for part in first["loc"])
-        known = (*Layout.model_fields, *Column.model_fields)
+        known = Column.model_fields if "columns" in first["loc"] else Layout.model_fields
         hint = nearest(str(first["loc"][-1]), known) if first["type"] == "extra_forbidden" else ""
         text = first["msg"].removeprefix("Value error, ")
         raise InputError(f"'{beside}': {place}: {text}{hint}") from None

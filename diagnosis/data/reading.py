@@ -5,13 +5,13 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.io import loadmat
 
 from cosim import InputError
 from cosim.errors import nearest
@@ -20,6 +20,7 @@ from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import refuse_separator
 from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
+from .matlab_files import read_matlab
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
@@ -29,13 +30,6 @@ READ_INTERRUPTED = "Calling read(nbytes) on source failed"
 # N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
 # below where sums of squares overflow.
 MOST_FORCE, MOST_POWER = 1e9, 1e3
-MATLAB = "cse1_data"
-MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
-# Two power settings: by hand that of the bow first, in dynamic positioning that of the VSP first.
-MATLAB_POWER = slice(12, 14)
-# The settings in dynamic positioning, at which the thrusters give their nominal force.
-FULL_VSP, FULL_BOW = 0.4, 0.5
-SAME_COMMAND = 1e-6  # of the full command; a difference below is rounding in the file
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +46,7 @@ class Run:
         power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
+        called: signal -> its column in the file, where that has another name.
     """
 
     name: str
@@ -63,13 +58,14 @@ class Run:
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
+    called: Mapping[str, str] = field(default_factory=dict)
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
         parts = (self.u, self.five, self.power, self.held)
         u, five, power, held = (None if part is None else part[keep] for part in parts)
         always = self.time[keep], self.pose[keep], self.tau_cmd[keep]
-        return Run(self.name, *always, u, five, power, self.notes, held)
+        return Run(self.name, *always, u, five, power, self.notes, held, self.called)
 
 
 def propellers(five: np.ndarray) -> np.ndarray:
@@ -105,8 +101,8 @@ def read(path: str | Path) -> Run:
         near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     name = path.absolute().parent.name if path.name in LOGS else path.stem
-    columns = _matlab(path) if path.suffix == ".mat" else _tabular(path)
-    return _run(name, columns, f"'{path}'")
+    columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path)
+    return replace(_run(name, columns, f"'{path}'"), called=called)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
@@ -148,39 +144,8 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
 
 
-def _matlab(path: Path) -> dict[str, np.ndarray]:
-    """Signals of one of NTNU's files: one matrix, one column for each sample."""
-    try:
-        data = np.asarray(loadmat(path)[MATLAB], float)
-        if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop or not data.size:
-            raise ValueError(f"a matrix of shape {data.shape}")
-    except KeyError:
-        raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
-    except Exception as error:  # a broken file makes the reader stumble in many ways
-        raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE], *_power(data)]
-    return dict(zip(("time", *POSE, *FIVE, *POWER), rows, strict=True))
-
-
-def _power(data: np.ndarray) -> np.ndarray:
-    """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
-
-    The settings hold for stretches. In those that a controller steers, both VSP have the same sway
-    command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
-    limit.
-    """
-    bow, vsp = data[MATLAB_POWER]
-    alike = np.abs(data[MATLAB_FIVE][1] - data[MATLAB_FIVE][3]) < SAME_COMMAND
-    stretch = np.cumsum(
-        np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
-    )
-    steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
-    vsp, bow = np.where(steered, (bow, vsp), (vsp, bow))
-    return np.array([(np.maximum(vsp, 0.0) / FULL_VSP) ** 2, np.maximum(bow, 0.0) / FULL_BOW])
-
-
-def _tabular(path: Path) -> dict[str, np.ndarray]:
-    """Signals of a CSV or Parquet file."""
+def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Signals of a CSV or Parquet file, and the names of their columns where these are others."""
     given = read_layout(path)
     try:
         names = _names(path, given or Layout())
@@ -201,8 +166,21 @@ def _tabular(path: Path) -> dict[str, np.ndarray]:
         column = layout.column(signal)
         if table.columns.tolist().count(column.name) > 1:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
-        columns[signal] = to_si(_numbers(table[column.name], f"'{path}'"), signal, column)
-    return columns
+        stamps = _seconds(table[column.name]) if signal == "time" else None
+        numbers = _numbers(table[column.name], f"'{path}'") if stamps is None else stamps
+        columns[signal] = numbers if stamps is not None else to_si(numbers, signal, column)
+    return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
+
+
+def _seconds(cells: pd.Series) -> np.ndarray | None:
+    """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
+    dated = pd.api.types.is_datetime64_any_dtype(cells)
+    if not dated and pd.to_numeric(cells, errors="coerce").notna().any():
+        return None
+    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
+    if stamps.isna().all() or (stamps.isna() & cells.notna()).any():
+        return None
+    return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 
 def _names(path: Path, layout: Layout) -> list[str]:

@@ -1,6 +1,7 @@
 """Units that a run cannot be in, whatever the ship."""
 
 import json
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,13 +21,14 @@ FARTHEST = 1e9  # m, rad; beyond is no place on earth
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 
 
-def refuse_time(row: float, seconds: float, where: str) -> None:
+def refuse_time(row: float, seconds: float, where: str, called: Mapping[str, str]) -> None:
     """Refuse a time in another unit than said.
 
     Args:
         row: median time between two rows [s].
         seconds: length of the run [s].
         where: what messages call the run.
+        called: signal -> its column in the file, where that has another name.
 
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
@@ -35,7 +37,7 @@ def refuse_time(row: float, seconds: float, where: str) -> None:
         much = "rare" if row > RAREST else "frequent"
         raise InputError(
             f"{where}: a sample each {row:.4g} s is too {much}; is the time in another unit?"
-            f"{_unit_of_time(row)}"
+            f"{_unit_of_time(row, called)}"
         )
     if seconds > LONGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
@@ -48,7 +50,9 @@ def _refuse_nowhere(pose: np.ndarray, where: str) -> None:
         raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
 
 
-def refuse_units(time: np.ndarray, pose: np.ndarray, where: str, anyway: bool) -> None:
+def refuse_units(
+    time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
+) -> None:
     """Refuse units that no ship's motion can be in.
 
     Args:
@@ -56,6 +60,7 @@ def refuse_units(time: np.ndarray, pose: np.ndarray, where: str, anyway: bool) -
         pose: (n, 3), as it was read.
         where: what messages call the run.
         anyway: whether every speed is believed.
+        called: signal -> its column in the file, where that has another name.
 
     Raises:
         InputError: it goes or turns too fast, or is nowhere.
@@ -70,7 +75,8 @@ def refuse_units(time: np.ndarray, pose: np.ndarray, where: str, anyway: bool) -
     speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
     if speed > FASTEST:
         raise InputError(
-            f"{where} goes {speed:.3g} m/s: is its position in mm? {_say('x', 'mm')}; {GO_ON}"
+            f"{where} goes {speed:.3g} m/s: is its position in mm? "
+            f"{_say(('x', 'y'), 'mm', called)}; {GO_ON}"
         )
     psi = pose[:, 2]
     if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
@@ -80,18 +86,18 @@ def refuse_units(time: np.ndarray, pose: np.ndarray, where: str, anyway: bool) -
     if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
         raise InputError(
             f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg? "
-            f"{_say('psi', 'deg')}; {GO_ON}"
+            f"{_say(('psi',), 'deg', called)}; {GO_ON}"
         )
 
 
-def _say(signal: str, unit: str) -> str:
+def _say(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
     """The line that tells a unit."""
-    columns = {s: {"name": s, "unit": unit} for s in (("x", "y") if signal == "x" else (signal,))}
+    columns = {s: {"name": called.get(s, s), "unit": unit} for s in signals}
     return f"Then put {json.dumps({'columns': columns})} into the .json file beside it"
 
 
-def _unit_of_time(row: float) -> str:
+def _unit_of_time(row: float, called: Mapping[str, str]) -> str:
     """A sentence with the unit in which a row each so many seconds is one of a usual measurement."""
     units = ((unit, row * size) for unit, size in UNITS["time"].items() if unit != "s")
     likely = [unit for unit, period in units if USUAL[0] <= period < USUAL[1]]
-    return f" {_say('time', likely[0])}" if likely else ""
+    return f" {_say(('time',), likely[0], called)}" if likely else ""

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from fmus.effects import Effect, EffectSet
 from fmus.effects.text import Found
 
@@ -40,8 +42,17 @@ def equation(
 
 def _coefficient(symbol: str, value: float, unit: str, interval: tuple[float, float] | None) -> str:
     """Such as ``δ = 0.3 m (0.29 to 0.31)``."""
-    text = f"{symbol} = {value:.3g}" + (f" {unit}" if unit != "1" else "")
-    return text if interval is None else f"{text} ({interval[0]:.3g} to {interval[1]:.3g})"
+    digits = 3 if interval is None else _digits(*interval)
+    text = f"{symbol} = {value:.{digits}g}" + (f" {unit}" if unit != "1" else "")
+    return text if interval is None else f"{text} ({interval[0]:.{digits}g} to {interval[1]:.{digits}g})"
+
+
+def _digits(low: float, high: float) -> int:
+    """Significant digits, three or more, in which the ends of an interval differ in two places."""
+    size, width = max(abs(low), abs(high)), high - low
+    if not (0.0 < width < np.inf and np.isfinite(size)):
+        return 3
+    return int(np.clip(np.ceil(np.log10(size / width)) + 2.0, 3.0, 9.0))
 
 
 def tell_apart(one: Effect, other: Effect) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from .finding_text import listed
+from .formatting import VERDICTS
 from .result_keys import EffectResult, SuspectResult
 
 # Confidence from which on a finding is told as a fact; chosen: nobody may act on less as on one.
@@ -10,6 +11,7 @@ SURE = 0.8
 NOTHING_FOUND = "Nothing is missing that these data show."
 TOO_LITTLE = "What is missing is more than noise, but too little to matter."
 UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
+UNSURE = "Something is missing, and what it is, is not sure"  # heading of findings of which none is
 
 
 MOST_NAMED = 4  # of the coefficients; chosen
@@ -37,6 +39,12 @@ def possibility(e: EffectResult) -> str:
 def told(e: EffectResult) -> str:
     """A finding in a sentence, as a fact or as a possibility."""
     return e.sentence if is_sure(e) else possibility(e)
+
+
+def verdict_title(verdict: str, effects: Sequence[EffectResult]) -> str:
+    """A verdict as a heading, which claims no more than the findings do."""
+    unsure = verdict == "found" and not any(is_sure(e) for e in effects)
+    return UNSURE if unsure else VERDICTS[verdict]
 
 
 def headline(

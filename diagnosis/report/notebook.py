@@ -10,9 +10,10 @@ from cosim.results import Drawn
 
 from ..session import Comparison
 from . import figures, formatting, tracks
+from .headline import verdict_title
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import DiagnosisContent, RunErrors
-from .svg import PALETTE, inline, style
+from .svg import alone, inline, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,10 +24,7 @@ class Picture(Drawn):
 
     def _repr_svg_(self) -> str:
         with style():
-            text = inline(self.figure, "picture", "picture of a diagnosis")
-        for colour, name in PALETTE.items():
-            text = text.replace(f"var(--{name})", colour)
-        return text
+            return alone(inline(self.figure, "picture", "picture of a diagnosis"))
 
 
 def _drawn(make: "Callable[[], Figure]") -> Picture:
@@ -82,7 +80,7 @@ class Plots:
 
 def as_html(content: DiagnosisContent, plots: Plots) -> str:
     """The finding, the errors of all runs, and where the model fails, as a part of a page."""
-    lines = [f"<p><b>{escape(formatting.VERDICTS[content.verdict])}</b></p>"]
+    lines = [f"<p><b>{escape(verdict_title(content.verdict, content.effects))}</b></p>"]
     lines += [f"<p>{escape(text)}</p>" for text in (content.sentence, content.remainder.sentence)]
     rows = "".join(
         f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.effects

@@ -12,11 +12,11 @@ import cosim
 from ..assessment.evaluation import Evaluation
 from ..progress import Advance, silent
 from . import figures, formatting, tracks
-from .headline import told
+from .headline import told, verdict_title
 from .profiles import QUANTITIES, binned_errors
 from .result_keys import Change, ComparisonContent, DiagnosisContent
 from .shape import Curve, curves
-from .svg import inline, style
+from .svg import data_uri, inline, style
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -28,10 +28,11 @@ NO_ORIGIN: Mapping[str, object] = {}
 
 
 class Drawing(NamedTuple):
-    """A figure of the page: its ``<svg>`` element and its caption."""
+    """A figure of the page: its ``<svg>`` element, its caption, and its name as a file."""
 
     svg: "Markup"
     caption: str
+    key: str
 
 
 def write_report(
@@ -72,7 +73,7 @@ def write_report(
     text = _template().render(
         content=content,
         diagnosis=diagnosis,
-        verdict="" if diagnosis is None else formatting.VERDICTS[diagnosis.verdict],
+        verdict="" if diagnosis is None else verdict_title(diagnosis.verdict, diagnosis.effects),
         title="Model against measurements" if diagnosis is None else "Diagnosis",
         learned=learned,
         figures=drawn,
@@ -96,7 +97,7 @@ def _template() -> "Template":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, told)
+    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, told, data_uri)
     environment.filters |= {f.__name__: f for f in filters}
     environment.globals["times"] = formatting.times
     return environment.get_template("page.html")
@@ -116,7 +117,7 @@ def _provenance(content: ComparisonContent | DiagnosisContent) -> Iterator[tuple
 def _draw(figure: "Figure", key: str, label: str, caption: str) -> Drawing:
     from markupsafe import Markup
 
-    return Drawing(Markup(inline(figure, key, label)), caption)
+    return Drawing(Markup(inline(figure, key, label)), caption, key)
 
 
 def _label(e: Evaluation, learned: bool) -> str:

@@ -1,5 +1,6 @@
 """Matplotlib's figures as SVG elements of a web page: real text, the page's colours, unique ids."""
 
+import base64
 import io
 import re
 from collections.abc import Iterator
@@ -43,6 +44,7 @@ STYLE: dict[Any, Any] = {
 
 SVG, XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 HREF = f"{{{XLINK}}}href"
+DIGITS = re.compile(r"(\.\d\d)\d+")  # of a path's coordinates: what follows 0.01 pt cannot be seen
 LEFT_OUT = {
     f"{{{SVG}}}metadata",
     f"{{{SVG}}}style",
@@ -85,8 +87,22 @@ def inline(figure: "Figure", key: str, label: str) -> str:
         for name in ("style", "fill", "stroke"):
             if name in element.attrib:
                 element.set(name, _coloured(element.attrib[name]))
+        if "d" in element.attrib:
+            element.set("d", DIGITS.sub(r"\1", element.attrib["d"]))
     ElementTree.register_namespace("", SVG)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def alone(svg: str) -> str:
+    """A picture of :func:`inline` as a file of its own, in the colours of a bright page."""
+    for colour, name in PALETTE.items():
+        svg = svg.replace(f"var(--{name})", colour)
+    return svg
+
+
+def data_uri(svg: str) -> str:
+    """Address that holds the file of a picture, for a link by which a reader saves it."""
+    return "data:image/svg+xml;base64," + base64.b64encode(alone(svg).encode()).decode()
 
 
 def _prefix(root: ElementTree.Element, key: str) -> None:

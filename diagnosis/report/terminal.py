@@ -8,8 +8,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from .formatting import VERDICTS
-from .headline import is_sure, told
+from .headline import is_sure, told, verdict_title
 from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, RunErrors
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
@@ -57,7 +56,7 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
 def summary(r: DiagnosisContent) -> str:
     """The result in at most ten lines."""
     sure = sorted(r.effects, key=lambda e: not is_sure(e))[:MAX_SUMMARY]
-    lines = [f"{r.verdict}: {VERDICTS[r.verdict]}"]
+    lines = [f"{r.verdict}: {verdict_title(r.verdict, r.effects)}"]
     lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in sure] or [f"  {r.sentence}"]
     lines += [f"  {r.remainder.sentence}"]
     for e in r.errors[:MAX_SUMMARY]:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD, EffectSet
-from ..interruption import run_interruptible
+from ..interruption import program, run_interruptible
 from . import ledger
 from .building import build, cache_folder, export
 from .finding import BuildError, load, which
@@ -25,18 +25,18 @@ from .start_values_file import read_starts
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; prints the path of each FMU, one a line, in the order asked for."""
     parser = argparse.ArgumentParser(
-        prog="python -m fmus.build",
+        prog=program("fmus.build"),
         description="Build the project's FMUs, or an FMU from a component file of your own.",
-        epilog="examples:  python -m fmus.build\n"
-        "           python -m fmus.build vessel controller_abs --out fmu\n"
-        "           python -m fmus.build my_controller.py --out fmu\n"
-        "           python -m fmus.build --list vessel\n"
-        "           python -m fmus.build vessel --effects my_effects.py --out fmu\n"
-        "           python -m fmus.build --parameters model.ssv --out fmu\n"
-        "           python -m fmus.build --native --parameters model.ssv --out fmu\n"
-        "           python -m fmus.build --native vessel --target linux64,win64,darwin64 --out fmu\n"
-        "           python -m fmus.build --native vessel thrusters --source firmware\n"
-        "           python -m fmus.build --verify fmu/vessel.fmu",
+        epilog="examples:  %(prog)s\n"
+        "           %(prog)s vessel controller_abs --out fmu\n"
+        "           %(prog)s my_controller.py --out fmu\n"
+        "           %(prog)s --list vessel\n"
+        "           %(prog)s vessel --effects my_effects.py --out fmu\n"
+        "           %(prog)s --parameters model.ssv --out fmu\n"
+        "           %(prog)s --native --parameters model.ssv --out fmu\n"
+        "           %(prog)s --native vessel --target linux64,win64,darwin64 --out fmu\n"
+        "           %(prog)s --native vessel thrusters --source firmware\n"
+        "           %(prog)s --verify fmu/vessel.fmu",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..build import BuildError, build
 from ..declare import DeclarationError
+from ..interruption import program
 from .examine import examine
 from .fmu import Fmu
 from .registry import RULES, Rule, in_order
@@ -121,12 +122,12 @@ def _count(text: str) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m fmus.check",
+        prog=program("fmus.check"),
         description="Check FMI 2.0 co-simulation FMUs, ours or anybody's, against the standard.",
-        epilog="examples:  python -m fmus.check\n"
-        "           python -m fmus.check mine.fmu other.fmu\n"
-        "           python -m fmus.check vessel --json\n"
-        "           python -m fmus.check mine.fmu --no-run\n"
+        epilog="examples:  %(prog)s\n"
+        "           %(prog)s mine.fmu other.fmu\n"
+        "           %(prog)s vessel --json\n"
+        "           %(prog)s mine.fmu --no-run\n"
         "exit codes: 0 no findings, 1 findings, 2 bad input (the rest is checked), 130 interrupted\n"
         "An FMU is a program, and checking it runs it: --no-run only reads it.",
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..declare import DeclarationError, Variable
+from ..interruption import program
 from . import STANDARD
 from .effect import Effect
 from .effect_set import EffectSet
@@ -70,9 +71,9 @@ ORDER = ["force", "inertia", "actuator", "environment", "measurement"]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m fmus.effects",
+        prog=program("fmus.effects"),
         description="Print the table of all model effects as Markdown.",
-        epilog="example:  python -m fmus.effects my_effects.py",
+        epilog="example:  %(prog)s my_effects.py",
     )
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="effects of your own")
     effects = STANDARD
