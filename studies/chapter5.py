@@ -144,13 +144,15 @@ def differences(report: Report, by_path: Mapping[str, Table]) -> None:
 def pictures(report: Report, seconds: float | None, jobs: int | None) -> None:
     """The five pictures of 5.1 for both groups of controllers on both paths, and Fig. 5.7."""
     singular: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    logs = report.folder / "logs"
+    contents = {
+        f"{path}/{name}": vary(content, log={"signals": "all"})
+        for path in PATHS
+        for name, content in variants(path, seconds)["mdf"].items()
+    }
+    run_all(contents, [0], done, logs, jobs)
     for path in PATHS:
-        contents = {
-            n: vary(c, log={"signals": "all"}) for n, c in variants(path, seconds)["mdf"].items()
-        }
-        logs = report.folder / "logs" / path
-        run_all(contents, [0], done, logs, jobs)
-        read = {name: cosim.read_log(logs / name / "0") for name in contents}
+        read = {name: cosim.read_log(logs / path / name / "0") for name in CONTROLLERS}
         for group, names in (("variants", FOUR), ("against", OLD)):
             folder = report.folder / f"{path}_{group}"
             shown = {name.removeprefix("controller_"): read[name] for name in names}
@@ -197,8 +199,8 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
     report.text(
         "With errors formed anew, twenty stored samples drive the estimates and the one of this instant "
         "adds little: whether that is ε or z2 makes no great difference any more. The printed form "
-        "winds up with weight 1; with the weight of footnote 1, on the ellipse with true states, it "
-        "does not, and gives the thesis' order (`python -m studies.store_weight`, four weights)."
+        "winds up with weight 1; with the weight of footnote 1 it does not on the ellipse, and gives "
+        "the thesis' order there with true states (`python -m studies.store_weight`, four weights)."
     )
     report.heading("What the thesis concludes, and what comes out here")
     rows = [*claims(by_path), *store_claims(by_path), *goals(by_path)]

@@ -46,7 +46,8 @@ def lag_and_noise(found: Runs) -> Row:
         (True, False): "lag reproduced, less noise not",
         (False, True): "less noise reproduced, lag not",
     }.get((lags, quiet), "not reproduced")
-    return said, verdict, f"u, rich without freezes: {numbers}"
+    gains = "K_1 = 6 1/s, K_2 = 9 1/s²; others: `python -m studies.observer_gains`"
+    return said, verdict, f"u, rich without freezes, {gains}: {numbers}"
 
 
 def held(found: Runs) -> Row:
@@ -100,7 +101,7 @@ def write(report: Report, found: Runs) -> None:
     """The table of claims, and what is new here: how far the Kalman filter is ahead."""
     rows = [claim(found) for claim in (lag_and_noise, held, spikes, robust, wrap, stuck)]
     report.heading("What the thesis says, and what comes out here")
-    report.table(["thesis", "here", "numbers"], rows)
+    report.table(["thesis", "here", "numbers"], rows, words=True)
     report.result("claims", [dict(zip(("thesis", "here", "numbers"), row, strict=True)) for row in rows])
     report.heading("The Kalman filter beside the best of the others")
     report.text(

@@ -17,7 +17,7 @@ from fmus.controller.models import SURGE
 
 from . import sysid4
 from .lap_pictures import errors_picture, force_picture, path_picture
-from .monte_carlo import Content, Interval, interval, paired, run_all, shipped, vary
+from .monte_carlo import Content, Interval, interval, paired, run_all, run_each, shipped, vary
 from .outcome import AXES, LEARNED_FROM, Log, missing, rms, true_states
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
@@ -172,15 +172,13 @@ def coefficients(report: Report, found: Found) -> None:
 
 def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> Path:
     """Run everything and write the report; returns its path."""
-    todo = variants(seconds)
-    found: dict[str, dict[str, list[Lap]]] = {}
+    todo = {f"{s}/{name}": c for s, each in variants(seconds).items() for name, c in each.items()}
+    more = {key: [] if key.startswith("true/") else seeds[1:] for key in todo}
     logs = out / "logs"
     with progress(len(CONTROLLERS) * (2 * len(seeds) + 1), "improved") as advance:
-        for sense, contents in todo.items():
-            first = run_all(contents, seeds[:1], last_lap, logs / sense, jobs, advance)
-            more = seeds[1:] if sense != "true" else ()
-            rest = run_all(contents, more, last_lap, None, jobs, advance)
-            found[sense] = {name: first[name] + rest[name] for name in contents}
+        first = run_all(todo, seeds[:1], last_lap, logs, jobs, advance)
+        rest = run_each(todo, more, last_lap, None, jobs, advance)
+    found = {s: {n: first[f"{s}/{n}"] + rest[f"{s}/{n}"] for n in CONTROLLERS} for s in SENSES}
     report = Report(out, "The improved controller (7.5)", seeds)
     report.text(
         "Two laps of the ellipse at 0.08 m/s, gains of Table 5.1; SYSID4 of Table 7.1 in the plant. "

@@ -101,7 +101,8 @@ class Sailed(NamedTuple):
         lost: 1 where the run broke off or the ship fell back by more than LOST, else 0.
         position: distance to the target, RMS over the second half [m].
         cross_track, heading: RMS of e [m] and of the heading error [rad].
-        first, lag: z1_x [m], mean over the first and the second half.
+        first, lag: z1_x [m], by the observer, mean over the first and the second half.
+        along: part of the distance to the target along the ship, RMS over the second half [m].
         inside: how far inside of the path the ship is, mean over the second half [m].
         omega_X: model error in surge, (7.7) with the force after clipping, mean magnitude [N].
         omega_Y: the same in sway, mean [N]; positive pushes to starboard.
@@ -117,6 +118,7 @@ class Sailed(NamedTuple):
     heading: float
     first: float
     lag: float
+    along: float
     inside: float
     omega_X: float
     omega_Y: float
@@ -129,7 +131,7 @@ class Sailed(NamedTuple):
     frequency: float
 
 
-BROKEN = Sailed(1.0, *[float("nan")] * 15)
+BROKEN = Sailed(1.0, *[float("nan")] * 16)
 
 
 def inside(log: Log, part: np.ndarray) -> float:
@@ -151,7 +153,8 @@ def sailed(run: FinishedRun) -> Sailed:
     t = log["time"]
     settled, half = t >= min(SETTLED, 0.5 * t[-1]), t >= 0.5 * t[-1]
     m, z1_x, h = run.metrics, log["controller.z1_x"], t[1] - t[0]
-    distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
+    north, east = (log[f"vessel.{a}"] - log[f"guidance.{a}_t"] for a in "xy")
+    distance, psi = np.hypot(north, east), log["vessel.psi"]
     swing = quick(log["vessel.r"], h, SLOW)[settled]
     # Of the control model, whatever parameters the plant has; omega_star of the vessel is of its own.
     motion = np.column_stack([log[name] for name in MOTION])[settled]
@@ -165,6 +168,7 @@ def sailed(run: FinishedRun) -> Sailed:
         heading=m["heading_rms"],
         first=float(z1_x[settled & ~half].mean()) if (settled & ~half).any() else float("nan"),
         lag=float(z1_x[half].mean()),
+        along=rms((np.cos(psi) * north + np.sin(psi) * east)[half]),
         inside=inside(log, half),
         omega_X=float(np.abs(omega[:, 0]).mean()),
         omega_Y=float(omega[:, 1].mean()),

@@ -55,6 +55,13 @@ def judged(shares: Mapping[str, Interval]) -> str:
     return "undecided"
 
 
+def worse(shares: Mapping[str, Interval]) -> str:
+    """Reproduced where every share is surely above 1, reversed where surely below, else mixed."""
+    return judged(
+        {k: Interval(1.0 / s.mean, 1.0 / s.high, 1.0 / (s.low or 1e-9)) for k, s in shares.items()}
+    )
+
+
 def listed(shares: Mapping[str, Interval]) -> str:
     """Intervals with the names of their runs."""
     return "; ".join(f"{run}: {value}" for run, value in shares.items())

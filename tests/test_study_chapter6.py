@@ -11,7 +11,17 @@ from diagnosis import Model
 from diagnosis.model import write_model
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
-from studies import chapter6, lessons, margin, observations, store_contents, sysid4, trials
+from studies import (
+    causes,
+    chapter6,
+    chapter6_runs,
+    lessons,
+    margin,
+    observations,
+    store_contents,
+    sysid4,
+    trials,
+)
 from studies.estimates_replayed import parameters
 from studies.found import FAULTY, REGULAR, Found, share
 from studies.monte_carlo import shipped, vary
@@ -112,7 +122,7 @@ def test_spike_is_distinguished_from_the_end_of_a_freeze():
 
 @pytest.mark.parametrize("name", ["controller_cl_svd_eps", "controller_cl_win_z2"])
 def test_replayed_controller_stores_what_it_stored_in_the_run(name, tmp_path):
-    content = trials.scenario(SLOW._replace(seconds=12.0), name, parameters=chapter6.OPEN)
+    content = trials.scenario(SLOW._replace(seconds=12.0), name, parameters=chapter6_runs.OPEN)
     spikes = {**trials.SPIKES, "at": [8.0]}
     del spikes["rate"]
     faults = [f for f in content["faults"] if f["kind"] != "spikes"] + [spikes]
@@ -162,8 +172,10 @@ def test_swift_gains_bear_less_delay():
 
 
 def sailed(**values):
-    zero = trials.Sailed(*[0.0] * 16)
-    return zero._replace(**{"position": 0.25, "lag": -0.25, "first": -0.25, "swing": 0.01} | values)
+    zero = trials.Sailed(*[0.0] * 17)
+    return zero._replace(
+        **{"position": 0.25, "along": 0.25, "lag": -0.25, "first": -0.25, "swing": 0.01} | values
+    )
 
 
 def made_up(regular=None, faulty=None):
@@ -257,7 +269,7 @@ def test_spikes_are_the_cause_where_they_are():
         found = made_up(given | cl)._replace(
             eight={("no blocker", False): calm, ("blocker", True): calm}
         )
-        return lessons.eight(found)
+        return causes.eight(found)
 
     assert verdict(30.0, 3.0).here == "reproduced"
     assert "CLE 0.3 [0.3, 0.3] without spikes" in verdict(30.0, 3.0).numbers

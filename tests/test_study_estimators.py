@@ -10,7 +10,7 @@ from scipy.io import savemat
 from support.project import ROOT
 
 from cosim import InputError
-from studies import basin, estimators
+from studies import basin, estimators, observer_gains
 from studies.claims import ahead
 from studies.estimates_replayed import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
 
@@ -56,6 +56,20 @@ def test_lag_is_found():
     log = {"time": t, "vessel.u": np.sin(t)}
     assert lag(log, {"u": np.sin(t - 0.23)}, "u") == pytest.approx(0.23)
     assert lag(log, {"u": np.sin(t)}, "u") == 0.0
+
+
+@pytest.mark.parametrize("gains", [(9.0, 1.0), (50.0, 0.7)])
+def test_nonlinear_observer_lags_by_its_gains(gains):
+    t = np.arange(1000) * H
+    log = circle(10.0) | {
+        "observer.x_m": 0.005 * t**2,
+        "observer.y_m": 0.0 * t,
+        "observer.psi_m": 0.0 * t,
+    }
+    named = observer_gains.gains(*gains)
+    found = replay(observer("nonlinear"), log, **named)
+    late = (0.01 * t - found["u"])[-1] / 0.01
+    assert late == pytest.approx(named["k1_x"] / named["k2_u"], abs=2 * H)
 
 
 def test_freezes_and_wraps_are_found_where_they_are():

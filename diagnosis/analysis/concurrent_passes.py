@@ -87,8 +87,8 @@ def material(s: Samples) -> Material:
     return Material(F, s.omega, np.where(beta & (dt < GAP), dt, 0.0), stored)
 
 
-def one_pass(phi: np.ndarray, m: Material) -> np.ndarray:
-    """The estimate (14,) after a run."""
+def one_pass(phi: np.ndarray, m: Material, gamma: np.ndarray = GAMMA) -> np.ndarray:
+    """The estimate (14,) after a run, with gains (14,)."""
     window: deque[int] = deque(maxlen=SIZE)
     Q, b = np.zeros((phi.size, phi.size)), np.zeros(phi.size)
     for F, y, dt, stored, k in zip(m.F, m.y, m.dt, m.stored, range(m.dt.size), strict=True):
@@ -99,9 +99,9 @@ def one_pass(phi: np.ndarray, m: Material) -> np.ndarray:
             Q, b = A.T @ A, A.T @ m.y[rows].ravel()
         if dt > 0.0:
             # Explicit Euler with h Gamma trace(Q) <= 1, as in the controllers.
-            trace = GAMMA @ (np.diag(Q) + np.sum(F * F, axis=0))
+            trace = gamma @ (np.diag(Q) + np.sum(F * F, axis=0))
             pace = dt / max(1.0, dt * trace)
-            phi = phi + pace * GAMMA * (F.T @ (y - F @ phi) + b - Q @ phi)
+            phi = phi + pace * gamma * (F.T @ (y - F @ phi) + b - Q @ phi)
     return phi
 
 
