@@ -19,6 +19,16 @@ class SimulationError(Exception):
     """The simulation itself failed; what was logged is kept. Exit code 3."""
 
 
+def most_alike(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is a name but for case, else the one most like it; None if none is similar."""
+    known = list(known)
+    folded = {each.casefold(): each for each in reversed(known)}
+    if name.casefold() in folded:
+        return folded[name.casefold()]
+    near = difflib.get_close_matches(name, known, 1, SIMILAR)
+    return near[0] if near else None
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint at the known name most like a wrong one, or at what there is.
 
@@ -30,10 +40,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
         Text to append to a message; empty if nothing is known.
     """
     known = list(known)
-    folded = {each.casefold(): each for each in reversed(known)}
-    near = difflib.get_close_matches(name.casefold(), folded, 1, SIMILAR)
-    if near:
-        return f"; did you mean '{folded[near[0]]}'?"
+    near = most_alike(name, known)
+    if near is not None:
+        return f"; did you mean '{near}'?"
     if not known:
         return ""
     shown = ", ".join(known[:LISTED]) + (", ..." if len(known) > LISTED else "")

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import InputError, nearest
+from ..errors import InputError, most_alike, nearest
 from ..formats.systems import is_system, read_system
 from . import faults
 from .roles import Roles
@@ -51,7 +51,8 @@ def load_scenario(
     except FileNotFoundError:
         near = [p.name for p in path.parent.glob("*.json")] if path.parent.is_dir() else []
         shipped = shipped_names() if path.name == str(source) else []
-        hint = nearest(path.name, [*shipped, *near])
+        meant = most_alike(path.stem, shipped)
+        hint = nearest(path.stem, shipped) if meant or not near else nearest(path.name, near)
         raise InputError(f"no such scenario: '{path}'{hint}") from None
     except InputError as error:
         raise InputError(f"'{path}': {error}") from None
