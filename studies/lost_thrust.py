@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim.dispatch import FinishedRun
-from diagnosis.analysis.concurrent_passes import GAMMA, explained, material, one_pass
-from diagnosis.analysis.samples import SETTLED, Samples, model_error
+from diagnosis.analysis import GAMMA, SETTLED, Samples, explained, material, model_error, one_pass
 
 from . import sysid4
 from .monte_carlo import Content, run_all, shipped, vary

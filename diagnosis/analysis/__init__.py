@@ -9,21 +9,33 @@ of the model error goes back into the ship by the effect ``linear_map``::
 """
 
 from .analysis_figures import before_and_after, coefficient_bars, loadings, model_error_over_time
-from .concurrent_passes import Identified, explained, identify
+from .concurrent_passes import GAMMA, Identified, explained, identify, material, one_pass
 from .constrained_fit import Stable, nearest_stable
 from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
 from .partial_least_squares import Regressed, regressed
 from .pls_report import correlations
 from .principal_components import PrincipalComponents, fit_components, outliers, removals
 from .recipes import RECIPES, Recipe, recipe
-from .samples import NU, OMEGA, TAU, Samples, gather_samples, joined, model_error, without_outliers
+from .samples import (
+    NU,
+    OMEGA,
+    SETTLED,
+    TAU,
+    Samples,
+    gather_samples,
+    joined,
+    model_error,
+    without_outliers,
+)
 from .table_7_1 import NAMES, TABLE_7_1, plant, row
 
 __all__ = [
+    "GAMMA",
     "NAMES",
     "NU",
     "OMEGA",
     "RECIPES",
+    "SETTLED",
     "TABLE_7_1",
     "TAU",
     "EffectiveThrust",
@@ -45,9 +57,11 @@ __all__ = [
     "identify",
     "joined",
     "loadings",
+    "material",
     "model_error",
     "model_error_over_time",
     "nearest_stable",
+    "one_pass",
     "outliers",
     "plant",
     "recipe",
