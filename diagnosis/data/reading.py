@@ -174,10 +174,14 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
 
 def _seconds(cells: pd.Series) -> np.ndarray | None:
     """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
-    dated = pd.api.types.is_datetime64_any_dtype(cells)
-    if not dated and pd.to_numeric(cells, errors="coerce").notna().any():
+    try:
+        if not pd.api.types.is_datetime64_any_dtype(cells):
+            numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+            if not np.isnan(numbers).all():
+                return None
+        stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
+    except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
         return None
-    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
     if stamps.isna().all() or (stamps.isna() & cells.notna()).any():
         return None
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
