@@ -10,6 +10,7 @@ from support.measured import commands, jumps, sail, slow_swings, smoothed
 
 from diagnosis import Model, Windows, integrals
 from diagnosis.model import omega
+from diagnosis.smoothing.smoother import silences
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
 # Commands, delay of the thrusters [s], noise.
@@ -132,3 +133,11 @@ def test_hole_in_the_commands_spoils_no_window(change):
     assert whole.middle.size - 28 <= other.middle.size < whole.middle.size - 12
     rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (whole, other)]
     assert (rms[1] <= 1.5 * rms[0]).all()
+
+
+def test_commands_that_are_written_when_they_change_are_known_all_the_time():
+    run, _ = sail(SECONDS, H, given=jumps)
+    held = np.ones(run.time.size, bool)
+    held[::100] = False
+    assert (silences(replace(run, held=held)) == 0).all()
+    assert silences(holed(replace(run, held=None))).tolist().count(1) == 0

@@ -170,10 +170,12 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
 
 
 def silences(run: Run) -> np.ndarray:
-    """(n,), number of the part of a run that each row lies in; odd parts are without commands."""
-    given = run.time if run.held is None else run.time[~run.held]
-    if given.size < 2:
-        return np.ones(run.time.size, int)
+    """(n,), number of the part of a run that each row lies in; odd parts are without commands.
+
+    A log in which most commands are missing writes them when they change: there they are held.
+    """
+    sparse = run.held is None or 2 * int(run.held.sum()) > run.time.size
+    given = run.time if sparse else run.time[~run.held]
     silent = np.diff(given) > max(HELD, ALONE * float(np.median(np.diff(run.time))))
     last, next_one = given[:-1][silent], given[1:][silent]
     return np.searchsorted(last, run.time, "left") + np.searchsorted(next_one, run.time, "right")
