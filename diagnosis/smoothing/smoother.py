@@ -174,8 +174,9 @@ def silences(run: Run) -> np.ndarray:
 
     A log in which most commands are missing writes them when they change: there they are held.
     """
-    sparse = run.held is None or 2 * int(run.held.sum()) > run.time.size
-    given = run.time if sparse else run.time[~run.held]
+    given = run.time
+    if run.held is not None and 2 * int(run.held.sum()) <= run.time.size:
+        given = run.time[~run.held]
     silent = np.diff(given) > max(HELD, ALONE * float(np.median(np.diff(run.time))))
     last, next_one = given[:-1][silent], given[1:][silent]
     return np.searchsorted(last, run.time, "left") + np.searchsorted(next_one, run.time, "right")
