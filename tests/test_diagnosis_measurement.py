@@ -115,14 +115,22 @@ def test_date_stamps_feet_and_any_factor(tmp_path, kind):
     other = with_tau().assign(time=stamps, x=POSE[:, 0] / 0.3048, y=POSE[:, 1] / 7.0)
     columns = {"x": {"name": "x", "unit": "ft"}, "y": {"name": "y", "factor": 7.0}}
     path = tmp_path / f"a.{kind}"
-    if kind == "csv":
-        other.to_csv(path, index=False, date_format="%Y-%m-%dT%H:%M:%S.%fZ")
+    if kind == "csv":  # ISO 8601 has the comma as well
+        other.to_csv(path, index=False, date_format="%Y-%m-%dT%H:%M:%S,%fZ")
     else:
         other.to_parquet(path)
     (tmp_path / f"a.{kind}.json").write_text(json.dumps({"columns": columns}))
     run = diagnosis.read(path)
     np.testing.assert_allclose(run.time, TIME - TIME[0], atol=1e-6)
     np.testing.assert_allclose(run.pose, POSE, atol=1e-9)
+
+
+def test_first_stamp_that_is_none_is_told(tmp_path):
+    stamps = (pd.Timestamp("2026-11-20T09:30:00Z") + pd.to_timedelta(TIME, unit="s")).astype(str)
+    with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    refused(tmp_path / "a.csv", "time = 'noon' is no date stamp of ISO 8601")
 
 
 def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):

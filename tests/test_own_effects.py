@@ -128,6 +128,22 @@ def test_an_effect_that_is_linear_in_name_only_is_refused(tmp_path, formula, lin
             STANDARD.plus_file(file)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("N_mine * ship.u", "object is not iterable; a force gets ship.x, ship.y"),
+        ("(0.0, N_mine * ship.u)", "gives 2 numbers; a force gets ship.x"),
+        ("(0.0, 0.0, N_mine * ship.north)", "no attribute 'north'; a force gets ship.x"),
+        ("(0.0, N_mine * ship.v, N_mine)", "gives a force on Y, and is declared for N"),
+    ],
+)
+def test_a_function_that_gives_no_force_is_refused_with_one_line(tmp_path, given, message):
+    file = tmp_path / "mine.py"
+    file.write_text(re.sub(r"return .*", f"return {given}", MOMENT.format(formula="1.0")))
+    with pytest.raises(DeclarationError, match=re.escape(message)):
+        STANDARD.plus_file(file)
+
+
 def test_every_effect_of_the_project_that_is_called_linear_is():
     assert all(is_linear(e) for e in STANDARD.values() if e.linear and e.function)
 

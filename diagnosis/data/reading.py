@@ -19,7 +19,7 @@ from fmus.effects.single_propellers import ASIDE
 from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import refuse_separator
-from .columns import ALL, FIVE, LOG, POSE, POWER, TAU, THREE, Layout, read_layout, signals, to_si
+from .columns import ALL, FIVE, LOG, POSE, POWER, SHOWN, TAU, THREE, Layout, read_layout, signals, to_si
 from .matlab_files import read_matlab
 
 LOGS = ("log.csv", "log.parquet")
@@ -166,24 +166,31 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         column = layout.column(signal)
         if table.columns.tolist().count(column.name) > 1:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
-        stamps = _seconds(table[column.name]) if signal == "time" else None
+        stamps = _seconds(table[column.name], f"'{path}'") if signal == "time" else None
         numbers = _numbers(table[column.name], f"'{path}'") if stamps is None else stamps
         columns[signal] = numbers if stamps is not None else to_si(numbers, signal, column)
     return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
 
 
-def _seconds(cells: pd.Series) -> np.ndarray | None:
+def _seconds(cells: pd.Series, where: str) -> np.ndarray | None:
     """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
     try:
         if not pd.api.types.is_datetime64_any_dtype(cells):
             numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
             if not np.isnan(numbers).all():
                 return None
-        stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
+        dotted = (
+            cells.str.replace(",", ".") if cells.dtype == object or str(cells.dtype) == "str" else cells
+        )
+        stamps = pd.to_datetime(dotted, errors="coerce", utc=True, format="ISO8601")
     except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
         return None
-    if stamps.isna().all() or (stamps.isna() & cells.notna()).any():
+    wrong = np.flatnonzero(stamps.isna() & cells.notna())
+    if stamps.isna().all():
         return None
+    if wrong.size:
+        text = str(cells.iloc[wrong[0]])[:SHOWN]
+        raise InputError(f"{where}: {cells.name} = {text!r} is no date stamp of ISO 8601")
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 

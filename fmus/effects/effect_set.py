@@ -63,10 +63,13 @@ class EffectSet(Mapping[str, Effect]):
         """The set with further effects, of a user's file.
 
         Raises:
-            DeclarationError: an id or a parameter is taken, or an effect is called linear and is not.
+            DeclarationError: an id or a parameter is taken, a function does not give what its kind
+                gives, or an effect is called linear and is not.
         """
         effects = list(effects)
         for e in effects:
+            if e.kind == "force" and e.memory is None:
+                _check_force(e)
             if e.linear and not is_linear(e):
                 raise DeclarationError(
                     f"'{e.id}': twice the coefficient is not twice the effect; "
@@ -127,6 +130,29 @@ _AT = (
         Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5),
     ),
 )
+
+
+def _check_force(e: Effect) -> None:
+    """Refuse a force that cannot be computed, or acts on an axis that is not declared.
+
+    Raises:
+        DeclarationError: with what the function gets and gives.
+    """
+    values = {name: _unit(e, name) for name in e.coefficients}
+    gets = ", ".join(f"ship.{name}" for name in Loaded._fields)
+    form = f"a force gets {gets} and gives three numbers, X, Y and N"
+    for motion, _ in _AT:
+        try:
+            found = _flat(e, (motion,), values)
+        except (AttributeError, TypeError) as error:
+            raise DeclarationError(f"'{e.id}': {error}; {form}") from None
+        except (ValueError, ArithmeticError):  # it has no value there
+            continue
+        if len(found) != len("XYN"):
+            raise DeclarationError(f"'{e.id}' gives {len(found)} numbers; {form}")
+        for axis, force in zip("XYN", found, strict=True):
+            if force and axis not in e.axis:
+                raise DeclarationError(f"'{e.id}' gives a force on {axis}, and is declared for {e.axis}")
 
 
 def is_linear(e: Effect) -> bool:
