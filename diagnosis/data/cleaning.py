@@ -97,7 +97,7 @@ def clean(run: Run, anyway: bool = False) -> Track:
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
     period = float(np.median(np.diff(run.time[fresh])))
-    refuse_time(row, seconds, where, run.called)
+    refuse_time(row, seconds, where, run.called or {})
     steps = np.minimum(np.diff(run.time), GAP)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
@@ -110,7 +110,7 @@ def clean(run: Run, anyway: bool = False) -> Track:
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
     pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
-    refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called)
+    refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
     _moves(pose[fresh], where)
     notes += _gaps(run.time[fresh] - run.time[0], period)

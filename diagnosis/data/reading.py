@@ -6,7 +6,7 @@ files that NTNU publishes of CyberShip Enterprise 1.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -46,7 +46,7 @@ class Run:
         power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
-        called: signal -> its column in the file, where that has another name.
+        called: signal -> its column in the file, of those with another name; None if there is none.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Run:
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
-    called: Mapping[str, str] = field(default_factory=dict)
+    called: Mapping[str, str] | None = None
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
@@ -102,7 +102,7 @@ def read(path: str | Path) -> Run:
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     name = path.absolute().parent.name if path.name in LOGS else path.stem
     columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path)
-    return replace(_run(name, columns, f"'{path}'"), called=called)
+    return replace(_run(name, columns, f"'{path}'"), called=called or None)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
