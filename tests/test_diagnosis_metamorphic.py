@@ -8,9 +8,8 @@ import pytest
 from support.cases import in_part
 from support.measured import commands, jumps, sail, slow_swings, smoothed
 
-from diagnosis import Model, Windows, integrals
+from diagnosis import Model, Windows, clean, integrals
 from diagnosis.model import omega
-from diagnosis.smoothing.smoother import silences
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
 # Commands, delay of the thrusters [s], noise.
@@ -139,5 +138,5 @@ def test_commands_that_are_written_when_they_change_are_known_all_the_time():
     run, _ = sail(SECONDS, H, given=jumps)
     held = np.ones(run.time.size, bool)
     held[::100] = False
-    assert (silences(replace(run, held=held)) == 0).all()
-    assert silences(holed(replace(run, held=None))).tolist().count(1) == 0
+    assert (clean(replace(run, held=held)).silences == 0).all()
+    assert clean(holed(replace(run, held=None))).silences.tolist().count(1) == 0

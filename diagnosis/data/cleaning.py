@@ -19,6 +19,9 @@ SHORTEST = 8.0  # s, of a run: one prediction window
 SPARSE, GAP = 0.05, 30.0
 MOST_OUT = 0.1  # largest share of rows whose time may be out of order (chosen)
 LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate around it (chosen)
+# s, or LONG periods if that is longer: gaps are told, and over one between commands none is known.
+# Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
+HELD = 0.5
 
 
 class Counts(NamedTuple):
@@ -59,6 +62,18 @@ class Track:
     def valid(self) -> np.ndarray:
         """(n,), rows with a new measurement."""
         return ~(self.frozen | self.dropped | self.between)
+
+    @cached_property
+    def silences(self) -> np.ndarray:
+        """(n,), number of the part of the run that each row lies in; odd parts are without commands.
+
+        A log in which most commands are missing writes them when they change: there they are held.
+        """
+        time, held = self.run.time, self.run.held
+        given = time if held is None or 2 * int(held.sum()) > time.size else time[~held]
+        silent = np.diff(given) > max(HELD, LONG * float(np.median(np.diff(time))))
+        last, next_one = given[:-1][silent], given[1:][silent]
+        return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
 
     def counts(self, spikes: int = 0) -> Counts:
         """What became of the samples."""
@@ -186,7 +201,7 @@ def noise(values: np.ndarray) -> np.ndarray:
 def _gaps(time: np.ndarray, period: float) -> list[str]:
     """A line for the gaps of half a second and more between times since the start, if there are any."""
     dt = np.diff(time)
-    long = dt > max(0.5, LONG * period)
+    long = dt > max(HELD, LONG * period)
     if not long.any():
         return []
     longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"

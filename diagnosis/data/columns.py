@@ -123,10 +123,9 @@ LOG = _log()
 
 def to_si(values: Any, signal: str, column: Column) -> Any:
     """Numbers of a column as the signal they stand for, in SI."""
-    scaled = column.factor * values
-    flipped = -scaled if column.flip else scaled
+    factor = -column.factor if column.flip else column.factor
     with np.errstate(over="ignore"):  # an infinite number is no measurement, and counts as dropped
-        return (flipped + column.offset) * UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
+        return (factor * values + column.offset) * UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
 
 
 def read_layout(path: Path) -> Layout | None:

@@ -166,25 +166,22 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         column = layout.column(signal)
         if table.columns.tolist().count(column.name) > 1:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
-        stamps = _seconds(table[column.name], f"'{path}'") if signal == "time" else None
-        numbers = _numbers(table[column.name], f"'{path}'") if stamps is None else stamps
-        columns[signal] = numbers if stamps is not None else to_si(numbers, signal, column)
+        cells, where = table[column.name], f"'{path}'"
+        stamps = _seconds(cells, where) if signal == "time" else None
+        columns[signal] = to_si(_numbers(cells, where), signal, column) if stamps is None else stamps
     return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
 
 
 def _seconds(cells: pd.Series, where: str) -> np.ndarray | None:
     """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
-    try:
-        if not pd.api.types.is_datetime64_any_dtype(cells):
-            numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
-            if not np.isnan(numbers).all():
+    if not pd.api.types.is_datetime64_any_dtype(cells):
+        try:
+            if not np.isnan(np.asarray(pd.to_numeric(cells, errors="coerce"), float)).all():
                 return None
-        dotted = (
-            cells.str.replace(",", ".") if cells.dtype == object or str(cells.dtype) == "str" else cells
-        )
-        stamps = pd.to_datetime(dotted, errors="coerce", utc=True, format="ISO8601")
-    except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
-        return None
+        except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
+            return None
+        cells = cells.astype("string").str.replace(",", ".")
+    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
     wrong = np.flatnonzero(stamps.isna() & cells.notna())
     if stamps.isna().all():
         return None

@@ -17,7 +17,7 @@ from fmus.vessel import vessel
 
 from ..data.reading import Run
 from ..smoothing import Smoothed
-from ..smoothing.smoother import breaks, silences
+from ..smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
 from .ship_model import Model
 from .thrust import Response, thrust
@@ -118,7 +118,7 @@ def integrals(smoothed: Smoothed) -> Integrals:
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
     kept = (
         whole
-        & (silences(run)[np.minimum(first, t.size - 1)] % 2 == 0)
+        & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
         & (gone[last] == gone[first])
         & (2 * (fresh[last] - fresh[first]) >= count)

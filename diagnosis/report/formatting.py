@@ -1,16 +1,9 @@
-"""Numbers, units and verdicts as the page shows them."""
+"""Numbers and units as the page shows them, and its glossary."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-VERDICTS = {
-    "found": "Something is missing, and it was found",
-    "ambiguous": "Something is missing, and more than one cause fits",
-    "coefficients": "Coefficients are wrong, and nothing else is missing",
-    "unexplained": "Something is missing, and nothing known here explains it",
-    "none": "Nothing is missing that these data show",
-}
 # What the page says and means; numbers are those of the contract of the files, docs/diagnosis.md.
 GLOSSARY = (
     (

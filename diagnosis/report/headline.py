@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from .finding_text import listed
-from .formatting import VERDICTS
 from .result_keys import EffectResult, SuspectResult
 
 # Confidence from which on a finding is told as a fact; chosen: nobody may act on less as on one.
@@ -11,6 +10,13 @@ SURE = 0.8
 NOTHING_FOUND = "Nothing is missing that these data show."
 TOO_LITTLE = "What is missing is more than noise, but too little to matter."
 UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
+VERDICTS = {
+    "found": "Something is missing, and it was found",
+    "ambiguous": "Something is missing, and more than one cause fits",
+    "coefficients": "Coefficients are wrong, and nothing else is missing",
+    "unexplained": "Something is missing, and nothing known here explains it",
+    "none": "Nothing is missing that these data show",
+}
 UNSURE = "Something is missing, and what it is, is not sure"  # heading of findings of which none is
 
 

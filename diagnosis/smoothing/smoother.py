@@ -15,7 +15,7 @@ from scipy.linalg import LinAlgError
 from cosim import InputError
 from fmus.frames import rotate_to_body
 
-from ..data import Counts, Run, Track
+from ..data import Counts, Track
 from ..data.cleaning import noise
 from .command_motion import IDLE, CommandResponse, Commands
 from .command_response import with_commands
@@ -26,9 +26,6 @@ from .spline import Knots, basis, inverse_band, knots, roughness, variance
 
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
 BREAK = 3.0
-# s, or ALONE periods of the log if that is longer: over a longer gap between commands none is known.
-# Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
-HELD, ALONE = 0.5, 5.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
@@ -169,26 +166,13 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     )
 
 
-def silences(run: Run) -> np.ndarray:
-    """(n,), number of the part of a run that each row lies in; odd parts are without commands.
-
-    A log in which most commands are missing writes them when they change: there they are held.
-    """
-    given = run.time
-    if run.held is not None and 2 * int(run.held.sum()) <= run.time.size:
-        given = run.time[~run.held]
-    silent = np.diff(given) > max(HELD, ALONE * float(np.median(np.diff(run.time))))
-    last, next_one = given[:-1][silent], given[1:][silent]
-    return np.searchsorted(last, run.time, "left") + np.searchsorted(next_one, run.time, "right")
-
-
 def breaks(rows: np.ndarray, track: Track) -> np.ndarray:
     """(n - 1,): between which of some rows (n,) of a run too much is missing to be bridged.
 
     Where a pose is missing, the commands lead over the gap; where they are missing, too, nothing does.
     """
     long = np.diff(track.run.time[rows]) > max(BREAK, 10.0 * track.period)
-    return long | (np.diff(silences(track.run)[rows]) > 0)
+    return long | (np.diff(track.silences[rows]) > 0)
 
 
 def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
