@@ -43,11 +43,6 @@ typedef struct {
 #define FIRST_OUTPUT (PARAMS + INPUTS)
 #define VARIABLES (FIRST_OUTPUT + OUTPUTS)
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1) /* C has no empty arrays */
-#if defined(__GNUC__) || defined(__clang__)
-#define COPY __builtin_memcpy /* in place where the size is known, which -fno-builtin keeps memcpy from */
-#else
-#define COPY memcpy
-#endif
 #define MOST_PARTS 100000 /* of a long communication step; beyond, somebody has mistaken a unit */
 
 static const char *const categories[] = {"logStatusWarning", "logStatusError", "logAll"};
@@ -55,17 +50,20 @@ enum { WARNING, ERROR, ALL, CATEGORIES };
 
 /* What fmi2GetFMUstate saves. */
 typedef struct {
-    double values[AT_LEAST_ONE(VARIABLES)];
+    double values[AT_LEAST_ONE(FIRST_OUTPUT)];
+    double outputs[AT_LEAST_ONE(OUTPUTS)];
     double state[AT_LEAST_ONE(STATES)];
     int initialising;
 } Saved;
 
 typedef struct {
-    Saved now; /* but for the state, which lies in one of the arrays below */
+    double values[AT_LEAST_ONE(FIRST_OUTPUT)]; /* parameters, then inputs, in the order of the value references */
     double prepared[AT_LEAST_ONE(PREPARED)];
+    /* A step writes where nothing of the present state lies, so that one that fails leaves that as it is. */
+    double outputs[2][AT_LEAST_ONE(OUTPUTS)];
     double states[3][AT_LEAST_ONE(STATES)];
-    int current; /* which of them */
-    double outputs[AT_LEAST_ONE(OUTPUTS)];
+    int shown, current; /* which of them are the present ones */
+    int initialising;
     int is_prepared; /* prepared belongs to the present parameters */
     int stale;       /* state and outputs do not belong to the present start values */
     int failed;      /* no state follows from the start values */
@@ -96,20 +94,22 @@ static void tell(Instance *m, fmi2Status status, const char *format, ...) {
 
 static int is_finite(double x) { return x - x == 0.0; }
 
-/* Parameters, inputs and outputs lie one behind the other, in the order of the value references. */
-static double *params(Instance *m) { return m->now.values; }
-static double *inputs(Instance *m) { return m->now.values + PARAMS; }
-static double *outputs(Instance *m) { return m->now.values + FIRST_OUTPUT; }
+static double *params(Instance *m) { return m->values; }
+static double *inputs(Instance *m) { return m->values + PARAMS; }
+/* What the next step writes. */
+static double *new_outputs(Instance *m) { return m->outputs[1 - m->shown]; }
 
 static void start(Instance *m) {
-    memset(&m->now, 0, sizeof m->now);
+    memset(m->values, 0, sizeof m->values);
+    memset(m->outputs, 0, sizeof m->outputs);
+    memset(m->states, 0, sizeof m->states);
     model_starts(params(m), inputs(m));
-    m->now.initialising = 1;
+    m->initialising = 1;
     m->stale = 1;
     m->failed = 0;
     m->is_prepared = 0;
     m->reached = 0.0;
-    m->current = 0;
+    m->shown = m->current = 0;
 }
 
 static int prepare(Instance *m) {
@@ -130,7 +130,7 @@ static int advance(Instance *m, double h) {
     for (k = 0; k < parts; k++) {
         const int after = others[k % 2];
         if (model_step(params(m), m->prepared, inputs(m), m->states[state], parts > 1 ? h / parts : h,
-                       m->states[after], m->outputs))
+                       m->states[after], new_outputs(m)))
             return -1;
         state = after;
     }
@@ -143,7 +143,7 @@ static void initialise(Instance *m) {
     if (m->failed)
         tell(m, fmi2Error, "initialisation failed: division by zero");
     else
-        memcpy(outputs(m), m->outputs, OUTPUTS * sizeof(double));
+        m->shown = 1 - m->shown;
 }
 
 static fmi2Status refuse(Instance *m, const char *what) {
@@ -203,7 +203,7 @@ EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *m = c;
     if (m->stale) initialise(m);
     if (m->failed) return fmi2Error;
-    m->now.initialising = 0;
+    m->initialising = 0;
     return fmi2OK;
 }
 
@@ -215,15 +215,6 @@ EXPORT fmi2Status fmi2Terminate(fmi2Component c) {
 EXPORT fmi2Status fmi2Reset(fmi2Component c) {
     start(c);
     return fmi2OK;
-}
-
-/* Whether value references follow one another below a limit, so that all values lie side by side. */
-static int side_by_side(const fmi2ValueReference vr[], size_t n, size_t limit) {
-    size_t k;
-    if (n == 0 || vr[0] >= limit || n > limit - vr[0]) return 0;
-    for (k = 1; k < n; k++)
-        if (vr[k] != vr[0] + k) return 0;
-    return 1;
 }
 
 /* Four sums, so that none waits for the one before. */
@@ -242,15 +233,14 @@ static int all_finite(const double *values, size_t n) {
 
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Instance *m = c;
+    const double *shown;
     size_t k;
     if (m->stale) initialise(m);
-    if (side_by_side(vr, n, VARIABLES)) {
-        memcpy(value, m->now.values + vr[0], n * sizeof(double));
-        return fmi2OK;
-    }
+    shown = m->outputs[m->shown];
     for (k = 0; k < n; k++) {
-        if (vr[k] >= VARIABLES) return refuse(m, "there is no variable with this value reference");
-        value[k] = m->now.values[vr[k]];
+        const fmi2ValueReference r = vr[k];
+        if (r >= VARIABLES) return refuse(m, "there is no variable with this value reference");
+        value[k] = r < FIRST_OUTPUT ? m->values[r] : shown[r - FIRST_OUTPUT];
     }
     return fmi2OK;
 }
@@ -260,16 +250,16 @@ static fmi2Status set(Instance *m, fmi2ValueReference vr, double value) {
         tell(m, fmi2Warning, "value reference %u cannot be set", vr);
     } else if (vr >= PARAMS) {
         if (!HOLD_NONFINITE || is_finite(value)) {
-            m->now.values[vr] = value;
+            m->values[vr] = value;
             return fmi2OK;
         }
         tell(m, fmi2Warning, "input %s is %g; it keeps its last value", names[vr], value);
     } else if (!is_finite(value)) {
         tell(m, fmi2Warning, "parameter %s cannot be %g", names[vr], value);
-    } else if (fixed[vr] && !m->now.initialising) {
+    } else if (fixed[vr] && !m->initialising) {
         tell(m, fmi2Warning, "parameter %s is fixed after initialisation", names[vr]);
     } else {
-        m->now.values[vr] = value;
+        m->values[vr] = value;
         m->is_prepared = 0;
         return fmi2OK;
     }
@@ -280,12 +270,9 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], si
     Instance *m = c;
     fmi2Status status = fmi2OK;
     size_t k;
-    if (n && vr[0] >= PARAMS && side_by_side(vr, n, FIRST_OUTPUT) && (!HOLD_NONFINITE || all_finite(value, n)))
-        memcpy(m->now.values + vr[0], value, n * sizeof(double));
-    else
-        for (k = 0; k < n; k++)
-            if (set(m, vr[k], value[k]) != fmi2OK) status = fmi2Warning;
-    if (m->now.initialising) m->stale = 1;
+    for (k = 0; k < n; k++)
+        if (set(m, vr[k], value[k]) != fmi2OK) status = fmi2Warning;
+    if (m->initialising) m->stale = 1;
     return status;
 }
 
@@ -308,6 +295,7 @@ NO_VARIABLES(String)
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_return) {
     Instance *m = c;
+    const double *written;
     int k, after;
     (void)no_return;
     if (!(h >= 0.0 && is_finite(h))) {
@@ -325,35 +313,42 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
         tell(m, fmi2Error, "step at t = %.15g s failed: division by zero", t);
         return fmi2Error;
     }
-    if (!all_finite(m->outputs, OUTPUTS)) {
+    written = new_outputs(m);
+    if (!all_finite(written, OUTPUTS)) {
         char text[512] = "";
         for (k = 0; k < OUTPUTS; k++)
-            if (!is_finite(m->outputs[k]) && strlen(text) + strlen(names[FIRST_OUTPUT + k]) + 3 < sizeof text)
+            if (!is_finite(written[k]) && strlen(text) + strlen(names[FIRST_OUTPUT + k]) + 3 < sizeof text)
                 strcat(strcat(text, *text ? ", " : ""), names[FIRST_OUTPUT + k]);
         tell(m, fmi2Error, "step at t = %.15g s failed: %s not finite", t, text);
         return fmi2Error;
     }
     m->current = after;
-    COPY(outputs(m), m->outputs, OUTPUTS * sizeof(double));
+    m->shown = 1 - m->shown;
     m->reached = t + h;
     return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Instance *m = c;
+    Saved *saved;
     if (m->stale) initialise(m);
-    if (!*state) *state = malloc(sizeof(Saved));
-    if (!*state) return refuse(m, "out of memory");
-    memcpy(m->now.state, m->states[m->current], STATES * sizeof(double));
-    memcpy(*state, &m->now, sizeof(Saved));
+    if (!*state) *state = calloc(1, sizeof(Saved));
+    if (!(saved = *state)) return refuse(m, "out of memory");
+    memcpy(saved->values, m->values, FIRST_OUTPUT * sizeof(double));
+    memcpy(saved->outputs, m->outputs[m->shown], OUTPUTS * sizeof(double));
+    memcpy(saved->state, m->states[m->current], STATES * sizeof(double));
+    saved->initialising = m->initialising;
     return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Instance *m = c;
-    if (!state) return refuse(m, "there is no state to set");
-    memcpy(&m->now, state, sizeof(Saved));
-    memcpy(m->states[m->current], m->now.state, STATES * sizeof(double));
+    const Saved *saved = state;
+    if (!saved) return refuse(m, "there is no state to set");
+    memcpy(m->values, saved->values, FIRST_OUTPUT * sizeof(double));
+    memcpy(m->outputs[m->shown], saved->outputs, OUTPUTS * sizeof(double));
+    memcpy(m->states[m->current], saved->state, STATES * sizeof(double));
+    m->initialising = saved->initialising;
     m->is_prepared = m->stale = m->failed = 0;
     return fmi2OK;
 }
