@@ -29,6 +29,7 @@ ACCEPTED = (
     "no FMUs of other tools",
     "not for FMI 2.0",
     "no binary for",
+    "not on Windows",
     "root may write",
 )
 

@@ -2,10 +2,10 @@
 
 import json
 import math
-import subprocess
 import zipfile
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 from support import ccode
@@ -13,9 +13,11 @@ from support.ccode import same_bits
 from support.command import command
 from support.project import COMPONENTS, ROOT
 
+from benchmarks.windows_numbers import WINE, deviation, host, inputs, stepped
 from cosim.run import main as run_scenario
+from fmus.build import build, native_targets
 from fmus.check.checking import main as check
-from fmus.declare import flatten, width
+from fmus.declare import flatten, packer
 
 pytestmark = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
 NAMES = ["vessel", "thrusters", "observer_mdf", "guidance_ellipse", "controller_abs"]
@@ -168,23 +170,34 @@ def test_failing_step_is_an_error_with_its_cause_and_keeps_the_state(native, ope
             vessel.step(0.0, h)
 
 
-def test_program_in_c_runs_a_vessel_without_python(native, tmp_path):
+@pytest.mark.parametrize("name", NAMES)
+def test_program_in_c_runs_it_without_python(name, native, tmp_path):
     """A process that holds no Python opens the library and prints what it computes."""
-    zipfile.ZipFile(native["vessel"]).extractall(tmp_path)
-    (library,) = tmp_path.glob("binaries/*/vessel.*")
-    guid = ElementTree.parse(tmp_path / "modelDescription.xml").getroot().get("guid")
-    host = tmp_path / "host"
-    source = ROOT / "tests" / "support" / "host.c"
-    subprocess.run([ccode.COMPILER, "-o", host, source, "-ldl"], check=True)
-    component = COMPONENTS["vessel"]
-    first = width(component.params)  # value reference of the first input
-    arguments = [host, library, guid, str(first)]
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    i, p = component.inputs(0.5, 0.1, -0.02), component.params()
-    state, outputs = component.init(i, p), ()
-    for _ in range(1000):
-        state, outputs = component.step(state, i, p, 0.01)
-    *numbers, mapped = done.stdout.splitlines()
-    assert same_bits(map(float, numbers), flatten(outputs)[:3])
+    zipfile.ZipFile(native[name]).extractall(tmp_path / name)
+    component = COMPONENTS[name]
+    rows = inputs(component, 200)
+    program = host("linux64", tmp_path)
+    found, mapped = stepped(program, tmp_path / name, component, rows)
+    pack, p = packer(component.inputs), component.params()
+    state = component.init(pack(rows[0]), p)
+    for row, outputs in zip(rows, found, strict=True):
+        state, expected = component.step(state, pack(row), p, 0.01)
+        assert same_bits(outputs, flatten(expected))
     assert mapped in ("no Python in this process", "what is mapped cannot be read here")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(WINE is None, reason="not on Windows, and Wine is not installed")
+@pytest.mark.parametrize("name", ["vessel", "observer_kalman"])
+def test_library_for_windows_gives_the_same_numbers(name, tmp_path):
+    """Its mathematical library is another one."""
+    pytest.importorskip("ziglang")
+    component, rows = COMPONENTS[name], inputs(COMPONENTS[name])
+    (archive,) = build([name], native=native_targets("linux64,win64"))
+    zipfile.ZipFile(archive).extractall(tmp_path / name)
+    linux, windows = (
+        stepped(host(target, tmp_path), tmp_path / name, component, rows)[0]
+        for target in ("linux64", "win64")
+    )
+    assert np.ptp(linux, axis=0).max() > 0.0
+    assert deviation(windows, linux) <= 1e-12
