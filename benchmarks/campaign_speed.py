@@ -1,13 +1,15 @@
 """What a campaign costs beside its runs: ``python -m benchmarks.campaign_speed``.
 
 The ellipse with faults and metrics, over seeds: the same runs in a bare loop of one process (FMUs loaded
-once and reset), as a campaign in this process, on one worker and on two. Repeats are interleaved; wall
-time, and processor time of all processes. Then what a run costs beside its steps, and the memory of a
-process over many short runs.
+once and reset), as a campaign in this process, on one worker and on two; and in bare loops of two
+processes at once, each with half of the runs, which tells what the second core of this machine is worth.
+Repeats are interleaved; wall time, and processor time of all processes. Then what a run costs beside its
+steps, and the memory of a process over many short runs.
 """
 
 import argparse
 import json
+import multiprocessing
 import os
 import platform
 import resource
@@ -16,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -91,6 +94,15 @@ def bare(content: dict[str, Any]) -> None:
     system.close()
 
 
+def bare_twice(content: dict[str, Any]) -> None:
+    """The same runs in two processes at once, without campaign."""
+    seeds = content["axes"]["seed"]["values"]
+    halves = [{**content, "axes": {"seed": {"values": seeds[first::2]}}} for first in (0, 1)]
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as processes:
+        for _ in processes.map(bare, halves):
+            pass
+
+
 def beside_steps(folder: Path, native: bool) -> float:
     """Processor time [ms] of a run of two steps in a campaign of this process."""
     path = ellipse(folder, native, 0.02, metrics={})
@@ -123,6 +135,7 @@ def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
     path = ellipse(folder, native, options.stop)
     cases: dict[str, Callable[[dict[str, Any]], None]] = {
         "bare loop": bare,
+        "bare loops, 2 processes": bare_twice,
         "campaign, this process": lambda c: campaign(c, 0),
         "campaign, 1 worker": lambda c: campaign(c, 1),
         "campaign, 2 workers": lambda c: campaign(c, 2),

@@ -1,5 +1,7 @@
 """A run of which the metrics are kept, and its log on request."""
 
+import gc
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -8,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from ..errors import SimulationError
 from ..master.algorithm import Master
-from ..master.loop_surroundings import interruptible
+from ..master.loop_surroundings import interruptible, paused_collector
 from ..master.loops.chosen_loop import choose_loop
 from ..master.recorder import Recorder
 from ..master.simulation import UPDATE_INTERVAL, simulate
@@ -60,15 +62,14 @@ def run_in_memory(
         MetricsError: there are no metrics.
         KeyboardInterrupt: the user has asked for the end.
     """
-    # Unlike a run in real time this one may stop for garbage: collecting all of it before each run would
-    # cost more than the run.
     models = pool.models(scenario)
     # The project's own FMUs see to it themselves that all their outputs are finite. Without a log
     # nothing of them is read but what other FMUs and the metrics need.
     own = {name for name, model in models.items() if model.sha256 in pool.resettable}
     system = prepare(scenario, models=models, unlogged=() if keep else own)
     log = LogInMemory(["time", *system.logged]) if keep else None
-    with interruptible() as interrupted:
+    # Collecting all garbage before each run would cost more than the run.
+    with interruptible() as interrupted, paused_collector():
         master = Master(system, lambda _: None, interrupted, pool)
         try:
             recorder = Recorder(system, master, None, log)
@@ -85,12 +86,16 @@ def run_in_memory(
 def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:
     """Run to the end, looking for an interrupt after each step."""
     recorder.take(0.0)
+    due = time.perf_counter() + UPDATE_INTERVAL
     try:
         for _, full in choose_loop(master, recorder.pending, False, UPDATE_INTERVAL).run():
             if full:
                 recorder.flush()
             if interrupted():
                 raise KeyboardInterrupt
+            if time.perf_counter() > due:
+                gc.collect()
+                due = time.perf_counter() + UPDATE_INTERVAL
         recorder.flush()
     except SimulationError:
         if interrupted():  # an FMU may report the interrupt as an error of its own

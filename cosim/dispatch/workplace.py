@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import InputError, SimulationError
 from ..scenario.load import load_scenario
 from ..system.instance_pool import InstancePool
+from .freed_memory import keep_freed_memory
 from .job import Row, Task
 
 
@@ -20,6 +21,7 @@ class Workplace:
     """
 
     def __init__(self, folder: Path) -> None:
+        keep_freed_memory()
         self.folder = folder
         self.pool = InstancePool()
         # FMUs of one process share its working directory, modules and signals.

@@ -40,15 +40,22 @@ _is_first = True  # run of this process
 
 @contextmanager
 def quiet_collector() -> Iterator[None]:
+    """No garbage collection inside the block unless the caller runs it, and one before."""
+    global _is_first
+    if not _is_first:  # before the first run there is nothing to collect that would be worth its time
+        gc.collect()
+    _is_first = False
+    with paused_collector():
+        yield
+
+
+@contextmanager
+def paused_collector() -> Iterator[None]:
     """No garbage collection inside the block unless the caller runs it.
 
     Objects that exist at the start are exempt from it, which makes a collection cheap.
     """
-    global _is_first
     was_enabled = gc.isenabled()
-    if not _is_first:  # before the first run there is nothing to collect that would be worth its time
-        gc.collect()
-    _is_first = False
     gc.freeze()
     gc.disable()
     try:

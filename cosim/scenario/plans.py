@@ -77,17 +77,21 @@ class WhiteNoise(PlanAhead):
     def __init__(self, std: Sequence[float], rng: np.random.Generator) -> None:
         self._std, self._rng = np.array(std), rng
         self._rows = np.empty((0, len(std)))  # drawn ahead and left, the next one is the last
-        self._drawn: list[list[float]] = []  # the same for single calls; not both
+        self._drawn: list[list[float]] = []  # behind these, for single calls
+        self._at_once = 1  # so many become a list the next time: a few calls need no long one
 
     def _next(self) -> np.ndarray:
         """Rows that have not been given, at least one."""
-        left = np.array(self._drawn) if self._drawn else self._rows
+        left = np.concatenate([self._rows, self._drawn]) if self._drawn else self._rows
         self._rows, self._drawn = self._rows[:0], []
         return left if len(left) else self._std * self._rng.standard_normal((DRAWN, len(self._std)))
 
     def __call__(self, t: float) -> Sequence[float]:
         if not self._drawn:
-            self._drawn = self._next().tolist()
+            rows = self._next()
+            kept = max(0, len(rows) - self._at_once)
+            self._rows, self._drawn = rows[:kept], rows[kept:].tolist()
+            self._at_once *= 2
         return self._drawn.pop()
 
     def ahead(self, times: np.ndarray, acts: np.ndarray, numbers: np.ndarray) -> None:
