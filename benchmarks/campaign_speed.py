@@ -135,11 +135,15 @@ def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
     path = ellipse(folder, native, options.stop)
     cases: dict[str, Callable[[dict[str, Any]], None]] = {
         "bare loop": bare,
-        "bare loops, 2 processes": bare_twice,
         "campaign, this process": lambda c: campaign(c, 0),
+    }
+    others: dict[str, Callable[[dict[str, Any]], None]] = {
+        "bare loops, 2 processes": bare_twice,
         "campaign, 1 worker": lambda c: campaign(c, 1),
         "campaign, 2 workers": lambda c: campaign(c, 2),
     }
+    if not options.here:
+        cases |= others
     campaign(axes(path, 1, 0), 0)  # builds the FMUs, and reads all modules
     taken: dict[str, list[Taken]] = {name: [] for name in cases}
     for k in range(options.repeat):
@@ -160,6 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=int, default=8, help="runs of each campaign (8)")
     parser.add_argument("--stop", type=float, default=198.0, help="end of a run [s] (198)")
     parser.add_argument("--repeat", type=int, default=3, help="how often each is timed (3)")
+    parser.add_argument("--here", action="store_true", help="only what runs in this process")
     parser.add_argument("--short", type=int, default=1000, help="runs of 1 s for the memory (1000)")
     parser.add_argument("--python", action="store_true", help="Python FMUs, which are slow (native)")
     options = parser.parse_args(arguments)
