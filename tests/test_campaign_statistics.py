@@ -8,7 +8,7 @@ import pytest
 
 from cosim import InputError
 from cosim.campaign import differences, pareto
-from cosim.campaign.comparison import FEWEST_PAIRS, StopRule, interval
+from cosim.campaign.comparison import FEWEST_PAIRS, StopRule, check_request, interval
 from cosim.campaign.design import Case
 from cosim.dispatch.job import Row
 
@@ -104,6 +104,26 @@ def test_a_rule_that_is_none_is_refused(text, message):
 def test_a_rule_needs_partners():
     with pytest.raises(InputError, match="nothing to compare"):
         StopRule("c W 1", grid("ab", [0, 1])[:3], 0)
+
+
+@pytest.mark.parametrize(
+    ("axis", "metrics", "message"),
+    [
+        ("d", [], "no axis 'd'"),
+        ("c", ["w"], "no metric 'w'.*W"),
+        (None, ["e_pos"], "no metric 'e_pos'.*e_pos_rms"),
+    ],
+)
+def test_what_the_table_cannot_answer_is_refused_before(axis, metrics, message):
+    with pytest.raises(InputError, match=message):
+        check_request(grid("ab", [0, 1]), axis, metrics)
+
+
+def test_only_runs_that_differ_in_the_axis_alone_are_a_pair():
+    every = grid("ab", [0, 1])
+    check_request(every, "c", ["W"])
+    with pytest.raises(InputError, match="no two runs differ"):
+        check_request([every[0], every[-1]], "c", ["W"])
 
 
 @pytest.fixture

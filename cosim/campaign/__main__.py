@@ -23,8 +23,9 @@ from rich.table import Table
 from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
+from ..results.performance import METRICS
 from .conduct import Progress as Told
-from .conduct import result_folder, run_campaign
+from .conduct import demand_packages, result_folder, run_campaign
 
 if TYPE_CHECKING:
     import pandas
@@ -56,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         transient=True,
     )
     try:
+        _check(options)
         with bar if visible else nullcontext():
             made = run_campaign(
                 options.campaign,
@@ -115,6 +117,19 @@ def _lines(console: Console, quiet: bool) -> Told:
     return progress
 
 
+def _check(options: argparse.Namespace) -> None:
+    """Refuse what could not be made of the table, before anything runs."""
+    metrics = [*(options.metrics or ()), *(options.pareto or ())]
+    if options.compare is None and not metrics:
+        return
+    demand_packages()
+    from .campaign_file import LoadedCampaign
+    from .comparison import check_request
+    from .design import cases
+
+    check_request(cases(LoadedCampaign(options.campaign).campaign), options.compare, metrics)
+
+
 def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) -> None:
     """What is made of the table on request: the Pareto set, differences, pictures."""
     from .campaign_file import LoadedCampaign
@@ -131,18 +146,22 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
         _print(f"not beaten in both {' and '.join(options.pareto)}", [*found.columns], rows)
     if options.compare:
         found = differences(made, axes, options.compare, metrics)
+        units = {metric.name: metric.unit for metric in METRICS}
         _write(found, out / "differences.csv")
         rows = [
             [
-                *(str(row[key]) for key in ("value", "against", "metric", "pairs")),
+                *(str(row[key]) for key in ("value", "against", "metric")),
+                units[row["metric"]],
+                str(row["pairs"]),
                 f"{row['difference']:.3g} ± {row['half']:.2g}",
                 "{percent:+.2f} ({percent_low:+.2f} to {percent_high:+.2f})".format(**row),
                 _better(row),
             ]
             for row in found.to_dict("records")
         ]
-        header = [options.compare, "against", "metric", "pairs", "difference", "percent", "better"]
-        _print("paired differences with 95 % intervals; of all metrics less is better", header, rows)
+        header = ["against", "metric", "unit", "pairs", "difference", "percent", "better"]
+        title = "paired differences with 95 % intervals; of all metrics less is better"
+        _print(title, [options.compare, *header], rows)
     if options.plot:
         from .charts import draw_campaign
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,44 @@ def interval(values: Sequence[float]) -> Interval:
 
     half = float(stdtrit(x.size - 1, 0.5 + 0.5 * LEVEL) * x.std(ddof=1) / math.sqrt(x.size))
     return Interval(float(x.mean()), half)
+
+
+UNPAIRED = "no two runs differ in '{}' alone, so that nothing can be compared"
+
+
+def _demand_axis(axis: str, axes: Sequence[str]) -> None:
+    if axis not in axes:
+        raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
+
+
+def _demand_metrics(metrics: Iterable[str]) -> None:
+    names = [metric.name for metric in METRICS]
+    for metric in metrics:
+        if metric not in names:
+            raise InputError(f"no metric '{metric}'{nearest(metric, names)}")
+
+
+def check_request(every: Sequence[Case], axis: str | None, metrics: Iterable[str]) -> None:
+    """Refuse before anything runs what the table could not answer.
+
+    Args:
+        every: all runs.
+        axis: whose values are to be compared; None compares none.
+        metrics: of comparisons, pictures and the Pareto set.
+
+    Raises:
+        InputError: no such axis or metric, or no two runs that differ in the axis alone.
+    """
+    _demand_metrics(metrics)
+    if axis is None:
+        return
+    _demand_axis(axis, list(every[0].shown))
+    seen: dict[str, set[str]] = {}
+    for case in every:
+        others = {name: value for name, value in case.shown.items() if name != axis}
+        seen.setdefault(json.dumps(others, sort_keys=True), set()).add(_shown(case.shown[axis]))
+    if all(len(values) < 2 for values in seen.values()):
+        raise InputError(UNPAIRED.format(axis))
 
 
 class StopRule:
@@ -180,12 +218,12 @@ def differences(
         the geometric mean of the ratio less one, with its interval ``percent_low``, ``percent_high``.
 
     Raises:
-        InputError: no such axis, or nothing to pair.
+        InputError: no such axis or metric, or nothing to pair.
     """
     import pandas
 
-    if axis not in axes:
-        raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
+    _demand_axis(axis, axes)
+    _demand_metrics(metrics)
     others = [name for name in axes if name != axis]
     done = made.query("status == 'done'")
     parts = {value: done.loc[done[axis] == value] for value in dict.fromkeys(made[axis])}
@@ -207,7 +245,7 @@ def differences(
                 row |= {n: 100.0 * float(np.expm1(x)) for n, x in zip(names, ends, strict=True)}
             rows.append(row)
     if not any(row["pairs"] for row in rows):
-        raise InputError(f"no two runs differ in '{axis}' alone, so that nothing can be compared")
+        raise InputError(UNPAIRED.format(axis))
     return pandas.DataFrame(rows)
 
 
@@ -229,9 +267,7 @@ def pareto(
     Raises:
         InputError: no such metric, or no choice is left.
     """
-    for metric in metrics:
-        if metric not in made.columns:
-            raise InputError(f"no metric '{metric}'{nearest(metric, [m.name for m in METRICS])}")
+    _demand_metrics(metrics)
     by = [name for name in axes if name not in over]
     if not by:
         raise InputError("there is one choice only: all axes are averaged over")

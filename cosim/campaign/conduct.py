@@ -75,9 +75,7 @@ def run_campaign(
         SimulationError: the workers were lost; what has finished is kept.
         KeyboardInterrupt: what has finished is kept.
     """
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        raise InputError(f"a campaign needs {', '.join(missing)}: pip install 'cybership[campaign]'")
+    demand_packages()
     loaded = LoadedCampaign(campaign)
     folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
@@ -102,6 +100,17 @@ def run_campaign(
             return work.run(partial(place_for, files, scheduler, workers), told, progress)
     finally:
         files.close()
+
+
+def demand_packages() -> None:
+    """See that what a campaign needs beside the package is installed.
+
+    Raises:
+        InputError: it is not.
+    """
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise InputError(f"a campaign needs {', '.join(missing)}: pip install 'cybership[campaign]'")
 
 
 def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None) -> Path:
