@@ -242,6 +242,46 @@ def test_unreadable_file_is_refused_with_one_line(tmp_path, name, content, messa
     refused(tmp_path / name, message)
 
 
+def as_a_logger_writes_it(path, encoding="utf-8", decimal=".", sep=","):
+    """A table with lines before the names, one of units below them, and a letter that is not ASCII."""
+    table = with_tau().to_csv(index=False, sep=sep, decimal=decimal)
+    names, rows = table.split("\n", 1)
+    units = sep.join("s" if name == "time" else "SI" for name in names.split(sep))
+    path.write_bytes(f"Schlepptank, Länge 12 m\n\n{names}\n{units}\n{rows}".encode(encoding))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize(("decimal", "sep"), [(".", ","), (",", ";")])
+def test_file_of_a_logger_is_read_when_it_was_told(tmp_path, encoding, decimal, sep):
+    """Each refusal gives the whole line for the file beside it; in a few steps the run is there."""
+    path, beside = tmp_path / "a.csv", tmp_path / "a.csv.json"
+    as_a_logger_writes_it(path, encoding, decimal, sep)
+    for _ in ("encoding", "skip and separator", "units_line", "decimal"):
+        try:
+            diagnosis.read(path)
+        except diagnosis.InputError as error:
+            beside.write_text(str(error).partition("put ")[2].partition(" into ")[0])
+    found = diagnosis.read(path)
+    assert {"skip", "units_line"} <= json.loads(beside.read_text()).keys()
+    with_tau().to_csv(tmp_path / "b.csv", index=False)
+    plain = diagnosis.read(tmp_path / "b.csv")
+    assert np.array_equal(found.pose, plain.pose)
+    assert np.array_equal(found.tau_cmd, plain.tau_cmd)
+    assert np.array_equal(found.time, plain.time)
+
+
+def test_number_with_a_comma_is_told_with_its_line(tmp_path):
+    with_tau().to_csv(tmp_path / "a.csv", index=False, sep=";", decimal=",")
+    (tmp_path / "a.csv.json").write_text('{"separator": ";"}')
+    refused(tmp_path / "a.csv", 'put {"separator": ";", "decimal": ","} into')
+
+
+def test_unknown_encoding_is_refused(tmp_path):
+    with_tau().to_csv(tmp_path / "a.csv", index=False)
+    (tmp_path / "a.csv.json").write_text('{"encoding": "latin-99"}')
+    refused(tmp_path / "a.csv", "encoding: 'latin-99' is no encoding")
+
+
 @pytest.mark.parametrize(
     ("sep", "decimal", "line"),
     [

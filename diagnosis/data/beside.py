@@ -1,16 +1,21 @@
 """The line for the file beside a measurement, where it seems to be read otherwise than meant."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from cosim import InputError
 
-from .columns import QUANTITY, SHOWN, UNITS, Column, Layout, read_layout
+from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
 
 SEPARATORS = (";", "\t", "|")  # that a table may have in place of commas
 SI = ("s", "m", "rad", "N", "N.m", "1")  # need not be said
 SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
+PREAMBLE = 200  # lines among which that of the names is looked for; chosen
 
 
 def line_beside(
@@ -61,3 +66,64 @@ def refuse_separator(path: Path, header: str) -> None:
         f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
         f"{separator!r}; put {json.dumps(layout)} into '{path}.json'"
     )
+
+
+def _put(path: Path, layout: Layout, **changes: Any) -> str:
+    """What to put into the file beside a measurement, with what it says now."""
+    told = layout.model_dump(exclude_defaults=True) | changes
+    return f"put {json.dumps(told)} into '{path}.json'"
+
+
+def refuse_encoding(path: Path, layout: Layout) -> None:
+    """Refuse a CSV file whose text is not UTF-8, unless another encoding was told.
+
+    Raises:
+        InputError: with the line that tells the encoding that it may have.
+    """
+    content = path.read_bytes()
+    if layout.encoding == UTF_8 and b"\0" not in content:
+        line = _put(path, layout, encoding="latin-1")
+        raise InputError(f"'{path}' is no text in UTF-8; if it is in Latin-1, {line}")
+
+
+def refuse_preamble(path: Path, layout: Layout, names: Sequence[str]) -> None:
+    """Refuse a CSV file whose names of columns are in a later line than was told.
+
+    Raises:
+        InputError: with the line that tells where they are.
+    """
+    time = layout.column("time").name
+    if time in names:
+        return
+    with path.open(encoding=layout.encoding, errors="replace") as file:
+        for number, line in enumerate(islice(file, PREAMBLE)):
+            for separator in (layout.separator, ",", *SEPARATORS):
+                cells = [cell.strip().strip('"') for cell in line.split(separator)]
+                if number != layout.skip and len(cells) > 1 and time in cells:
+                    changes = {} if separator == layout.separator else {"separator": separator}
+                    told = f"line {number + 1}; {_put(path, layout, skip=number, **changes)}"
+                    raise InputError(f"'{path}' has the names of its columns in {told}")
+
+
+def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
+    """Refuse a CSV file with a line of units below the names, unless that was told.
+
+    Raises:
+        InputError: with the line that tells it.
+    """
+    cells = table.drop(columns=layout.column("time").name, errors="ignore").head(2).astype("string")
+    numbers = cells.apply(lambda column: pd.to_numeric(column.str.replace(",", "."), errors="coerce"))
+    if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
+        return
+    if numbers.iloc[0].isna().all():
+        shown = ", ".join(cells.iloc[0])[:SHOWN]
+        told = _put(path, layout, units_line=True)
+        raise InputError(
+            f"'{path}' has a line of units below the names ({shown}); {told}, with the units of "
+            'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
+        )
+
+
+def decimal_comma(path: Path, layout: Layout) -> str:
+    """The end of a message about a number such as 0,5."""
+    return f"; if a comma begins the decimals, {_put(path, layout, decimal=',')}"

@@ -16,6 +16,7 @@ called, in which unit it is, and how its axis lies::
 Columns that it does not name keep their names and SI units.
 """
 
+import codecs
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from cosim import InputError
 from cosim.errors import nearest
 
+UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
 THREE = ("u_vsp_x", "u_vsp_y", "u_bow")
@@ -81,7 +83,20 @@ class Layout(BaseModel):
 
     separator: str = Field(default=",", min_length=1, max_length=1, description="between two cells")
     decimal: str = Field(default=".", min_length=1, max_length=1, description="the decimal point")
+    encoding: str = Field(default=UTF_8, description="of the text, as Python calls it")
+    skip: int = Field(default=0, ge=0, description="lines before that of the names")
+    units_line: bool = Field(default=False, description="whether the line below the names is of units")
     columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
+
+    @field_validator("encoding")
+    @classmethod
+    def _is_encoding(cls, value: str) -> str:
+        try:
+            return codecs.lookup(value).name
+        except LookupError:
+            raise ValueError(
+                f"'{value[:SHOWN]}' is no encoding; there are utf-8, latin-1, ..."
+            ) from None
 
     @field_validator("columns", mode="before")
     @classmethod

@@ -1,7 +1,6 @@
 """Columns of a measured run beside pose and commands: targets, errors, what a controller asked for."""
 
 from collections.abc import Iterable
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import pandas as pd
 from cosim import InputError
 
 from .columns import Layout, read_layout
+from .csv_tables import csv_table
 from .reading import LOGS
 
 
@@ -33,18 +33,8 @@ def other_columns(path: str | Path, names: Iterable[str]) -> dict[str, np.ndarra
         return {}
     layout = read_layout(path) or Layout()
     try:
-        if path.suffix == ".parquet":
-            table = pd.read_parquet(path)
-        else:
-            table = pd.read_csv(
-                BytesIO(path.read_bytes()),
-                sep=layout.separator,
-                decimal=layout.decimal,
-                usecols=lambda name: str(name).strip() in wanted,
-                encoding="utf-8-sig",
-                skipinitialspace=True,
-                index_col=False,
-            ).rename(columns=str.strip)
+        is_parquet = path.suffix == ".parquet"
+        table = pd.read_parquet(path) if is_parquet else csv_table(path, layout, wanted)
     except (OSError, ValueError) as error:
         text = " ".join(str(error).split())
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None

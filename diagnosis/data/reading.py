@@ -5,9 +5,9 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +18,15 @@ from cosim.errors import nearest
 from fmus.effects.single_propellers import ASIDE
 from fmus.thrusters.allocation import Allocation, thrust
 
-from .beside import refuse_separator
+from .beside import decimal_comma, refuse_preamble, refuse_separator, refuse_units
 from .columns import ALL, FIVE, LOG, POSE, POWER, SHOWN, TAU, THREE, Layout, read_layout, signals, to_si
+from .csv_tables import csv_names, csv_table
 from .matlab_files import read_matlab
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
-# What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
-READ_INTERRUPTED = "Calling read(nbytes) on source failed"
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 # N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
 # below where sums of squares overflow.
 MOST_FORCE, MOST_POWER = 1e9, 1e3
@@ -149,6 +149,8 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     given = read_layout(path)
     try:
         names = _names(path, given or Layout())
+        if path.suffix != ".parquet":
+            refuse_preamble(path, given or Layout(), names)
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
         layout = given or (LOG if LOG.column("x").name in names else Layout())
@@ -168,7 +170,11 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
         cells, where = table[column.name], f"'{path}'"
         stamps = _seconds(cells, where) if signal == "time" else None
-        columns[signal] = to_si(_numbers(cells, where), signal, column) if stamps is None else stamps
+        if stamps is None:
+            numbers = _numbers(cells, where, decimal_comma(path, layout))
+            columns[signal] = to_si(numbers, signal, column)
+        else:
+            columns[signal] = stamps
     return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
 
 
@@ -196,41 +202,26 @@ def _names(path: Path, layout: Layout) -> list[str]:
         from pyarrow import parquet
 
         return list(parquet.read_schema(path).names)
-    first = pd.read_csv(path, sep=layout.separator, nrows=0, encoding="utf-8-sig", index_col=False)
-    return [str(name).strip() for name in first.columns]
+    return csv_names(path, layout)
 
 
 def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
     if path.suffix == ".parquet":
         return pd.read_parquet(path, columns=wanted)
-    content = BytesIO(path.read_bytes())
-    try:
-        return _read_csv(content, layout, wanted)
-    except pd.errors.ParserError as error:
-        if READ_INTERRUPTED in str(error):
-            raise KeyboardInterrupt from error
-        raise
+    table = csv_table(path, layout, wanted)
+    refuse_units(path, layout, table)
+    return table
 
 
-def _read_csv(content: BytesIO, layout: Layout, wanted: list[str]) -> pd.DataFrame:
-    return pd.read_csv(
-        content,
-        sep=layout.separator,
-        decimal=layout.decimal,
-        usecols=lambda name: str(name).strip() in wanted,
-        encoding="utf-8-sig",
-        skipinitialspace=True,
-        index_col=False,
-    ).rename(columns=str.strip)
-
-
-def _numbers(cells: pd.Series, where: str) -> np.ndarray:
-    """A column as floats; empty cells are NaN."""
+def _numbers(cells: pd.Series, where: str, with_comma: str) -> np.ndarray:
+    """A column as floats; empty cells are NaN. ``with_comma``: told of numbers such as 0,5."""
     try:
         numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
         raise InputError(f"{where}: {cells.name} is not a column of numbers") from None
     wrong = np.flatnonzero(np.isnan(numbers) & np.asarray(cells.notna()))
     if wrong.size:
-        raise InputError(f"{where}: {cells.name} = {str(cells.iloc[wrong[0]])[:40]!r} is not a number")
+        text = str(cells.iloc[wrong[0]])[:SHOWN]
+        hint = with_comma if DECIMAL_COMMA.fullmatch(text.strip()) else ""
+        raise InputError(f"{where}: {cells.name} = {text!r} is not a number{hint}")
     return numbers

@@ -1,0 +1,65 @@
+"""CSV files as tables, read as the JSON file beside them says."""
+
+from collections.abc import Collection
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from .beside import refuse_encoding
+from .columns import Layout
+
+# What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
+READ_INTERRUPTED = "Calling read(nbytes) on source failed"
+
+
+def _options(layout: Layout) -> dict[str, Any]:
+    units = [layout.skip + 1] if layout.units_line else []
+    return {
+        "sep": layout.separator,
+        "encoding": layout.encoding,
+        "skiprows": [*range(layout.skip), *units],
+        "index_col": False,
+    }
+
+
+def csv_names(path: Path, layout: Layout) -> list[str]:
+    """The names of the columns.
+
+    Raises:
+        InputError: the text is in another encoding.
+        OSError, ValueError: it cannot be read.
+    """
+    try:
+        first = pd.read_csv(path, nrows=0, **_options(layout))
+    except UnicodeDecodeError:
+        refuse_encoding(path, layout)
+        raise
+    return [str(name).strip() for name in first.columns]
+
+
+def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
+    """The columns of some names, those of them that there are.
+
+    Raises:
+        InputError: the text is in another encoding.
+        OSError, ValueError: it cannot be read.
+        KeyboardInterrupt: the user has asked for the end.
+    """
+    content = BytesIO(path.read_bytes())
+    try:
+        return pd.read_csv(
+            content,
+            usecols=lambda name: str(name).strip() in wanted,
+            decimal=layout.decimal,
+            skipinitialspace=True,
+            **_options(layout),
+        ).rename(columns=str.strip)
+    except UnicodeDecodeError:
+        refuse_encoding(path, layout)
+        raise
+    except pd.errors.ParserError as error:
+        if READ_INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
+        raise
