@@ -28,7 +28,9 @@ def _columns():
 
 
 COLUMNS = _columns()
-LAYOUT = {"separator": ",", "columns": {"x": {"name": "x", "unit": "m", "flip": False, "offset": 0.0}}}
+X = {"name": "x", "unit": "m", "flip": False, "offset": 0.0}
+TEXT = {"encoding": "utf-8", "skip": 0, "units_line": False}
+LAYOUT = {"separator": ",", **TEXT, "columns": {"x": X}}
 
 
 @dataclass

@@ -276,10 +276,11 @@ def test_number_with_a_comma_is_told_with_its_line(tmp_path):
     refused(tmp_path / "a.csv", 'put {"separator": ";", "decimal": ","} into')
 
 
-def test_unknown_encoding_is_refused(tmp_path):
+@pytest.mark.parametrize("encoding", ["latin-99", "zlib", "undefined"])
+def test_unknown_encoding_is_refused(tmp_path, encoding):
     with_tau().to_csv(tmp_path / "a.csv", index=False)
-    (tmp_path / "a.csv.json").write_text('{"encoding": "latin-99"}')
-    refused(tmp_path / "a.csv", "encoding: 'latin-99' is no encoding")
+    (tmp_path / "a.csv.json").write_text(json.dumps({"encoding": encoding}))
+    refused(tmp_path / "a.csv", f"encoding: '{encoding}' is no encoding")
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ class WhiteNoise(PlanAhead):
             rows = self._next()
             kept = max(0, len(rows) - self._at_once)
             self._rows, self._drawn = rows[:kept], rows[kept:].tolist()
-            self._at_once *= 2
+            self._at_once = min(2 * self._at_once, DRAWN)
         return self._drawn.pop()
 
     def ahead(self, times: np.ndarray, acts: np.ndarray, numbers: np.ndarray) -> None:

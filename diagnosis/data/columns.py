@@ -28,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from cosim import InputError
 from cosim.errors import nearest
 
+MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
@@ -84,7 +85,7 @@ class Layout(BaseModel):
     separator: str = Field(default=",", min_length=1, max_length=1, description="between two cells")
     decimal: str = Field(default=".", min_length=1, max_length=1, description="the decimal point")
     encoding: str = Field(default=UTF_8, description="of the text, as Python calls it")
-    skip: int = Field(default=0, ge=0, description="lines before that of the names")
+    skip: int = Field(default=0, ge=0, le=MOST_SKIPPED, description="lines before that of the names")
     units_line: bool = Field(default=False, description="whether the line below the names is of units")
     columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
 
@@ -92,8 +93,9 @@ class Layout(BaseModel):
     @classmethod
     def _is_encoding(cls, value: str) -> str:
         try:
+            "".encode(value)  # there are others than those of texts
             return codecs.lookup(value).name
-        except LookupError:
+        except (LookupError, UnicodeError):
             raise ValueError(
                 f"'{value[:SHOWN]}' is no encoding; there are utf-8, latin-1, ..."
             ) from None
