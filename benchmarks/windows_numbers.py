@@ -14,6 +14,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -80,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.windows_numbers", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="components (all)")
     options = parser.parse_args(arguments)
-    if WINE is None or SYSTEM_COMPILER is None:
+    if None in (WINE, SYSTEM_COMPILER, find_spec("ziglang")):
         print("needs Wine, a C compiler, and zig (pip install 'cybership[native]')")
         return 2
     good = True

@@ -3,6 +3,7 @@
 import json
 import math
 import zipfile
+from importlib.util import find_spec
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,6 +21,7 @@ from fmus.check.checking import main as check
 from fmus.declare import flatten, packer
 
 pytestmark = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+ZIG = find_spec("ziglang") is not None
 NAMES = ["vessel", "thrusters", "observer_mdf", "guidance_ellipse", "controller_abs"]
 
 
@@ -187,11 +189,10 @@ def test_program_in_c_runs_it_without_python(name, native, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(WINE is None, reason="not on Windows, and Wine is not installed")
+@pytest.mark.skipif(WINE is None or not ZIG, reason="not on Windows, and Wine or zig is not installed")
 @pytest.mark.parametrize("name", ["vessel", "observer_kalman"])
 def test_library_for_windows_gives_the_same_numbers(name, tmp_path):
     """Its mathematical library is another one."""
-    pytest.importorskip("ziglang")
     component, rows = COMPONENTS[name], inputs(COMPONENTS[name])
     (archive,) = build([name], native=native_targets("linux64,win64"))
     zipfile.ZipFile(archive).extractall(tmp_path / name)
