@@ -21,6 +21,7 @@ LEVEL = 0.95  # of all intervals; the custom of the field
 # Pairs before a sequential rule may stop; with 10 the coverage is within 2 % of LEVEL for normal
 # differences (tests/test_campaign_statistics.py simulates it), with 2 it is not.
 FEWEST_PAIRS = 10
+UNPAIRED = "no two runs differ in '{}' alone, so that nothing can be compared"
 
 
 class Interval(NamedTuple):
@@ -41,9 +42,6 @@ def interval(values: Sequence[float]) -> Interval:
     return Interval(float(x.mean()), half)
 
 
-UNPAIRED = "no two runs differ in '{}' alone, so that nothing can be compared"
-
-
 def _demand_axis(axis: str, axes: Sequence[str]) -> None:
     if axis not in axes:
         raise InputError(f"no axis '{axis}'{nearest(axis, axes)}")
@@ -54,6 +52,16 @@ def _demand_metrics(metrics: Iterable[str]) -> None:
     for metric in metrics:
         if metric not in names:
             raise InputError(f"no metric '{metric}'{nearest(metric, names)}")
+
+
+def _blocks(every: Sequence[Case], axis: str) -> list[dict[str, Case]]:
+    """The runs that differ in the axis alone, by what the table shows of it."""
+    blocks: dict[str, dict[str, Case]] = {}
+    for case in every:
+        others = {name: value for name, value in case.values.items() if name != axis}
+        block = blocks.setdefault(json.dumps(others, sort_keys=True), {})
+        block[_shown(case.shown[axis])] = case
+    return [*blocks.values()]
 
 
 def check_request(every: Sequence[Case], axis: str | None, metrics: Iterable[str]) -> None:
@@ -71,11 +79,7 @@ def check_request(every: Sequence[Case], axis: str | None, metrics: Iterable[str
     if axis is None:
         return
     _demand_axis(axis, list(every[0].shown))
-    seen: dict[str, set[str]] = {}
-    for case in every:
-        others = {name: value for name, value in case.shown.items() if name != axis}
-        seen.setdefault(json.dumps(others, sort_keys=True), set()).add(_shown(case.shown[axis]))
-    if all(len(values) < 2 for values in seen.values()):
+    if all(len(block) < 2 for block in _blocks(every, axis)):
         raise InputError(UNPAIRED.format(axis))
 
 
@@ -130,21 +134,16 @@ class StopRule:
         self._satisfied = False
 
     def _order(self, text: str, cases: Sequence[Case], seed: int) -> list[dict[str, Case]]:
-        """The runs that differ in the axis alone, by what the table shows of it."""
-        blocks: dict[str, dict[str, Case]] = {}
-        for case in cases:
-            others = {name: value for name, value in case.values.items() if name != self.axis}
-            block = blocks.setdefault(json.dumps(others, sort_keys=True), {})
-            block[_shown(case.shown[self.axis])] = case
+        """The runs that differ in the axis alone, shuffled."""
+        blocks = _blocks(cases, self.axis)
         values = dict.fromkeys(_shown(case.shown[self.axis]) for case in cases)
-        if len(values) < 2 or any(len(block) < len(values) for block in blocks.values()):
+        if len(values) < 2 or any(len(block) < len(values) for block in blocks):
             raise InputError(
                 f"'{text}': nothing to compare: each value of '{self.axis}' has to meet the same values "
                 'of the other axes, in a grid, or with "cross": true in a sample'
             )
         order = np.random.default_rng(seed).permutation(len(blocks))
-        found = [*blocks.values()]
-        return [{name: found[k][name] for name in values} for k in order]
+        return [{name: blocks[k][name] for name in values} for k in order]
 
     def satisfied(self, row: Callable[[int], Row | None]) -> bool:
         """Whether the difference is known.

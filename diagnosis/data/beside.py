@@ -1,6 +1,7 @@
 """The line for the file beside a measurement, where it seems to be read otherwise than meant."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -15,6 +16,7 @@ from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
 SEPARATORS = (";", "\t", "|")  # that a table may have in place of commas
 SI = ("s", "m", "rad", "N", "N.m", "1")  # need not be said
 SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 PREAMBLE = 200  # lines among which that of the names is looked for; chosen
 
 
@@ -46,8 +48,11 @@ def line_beside(
         columns[signal] = Column.model_validate(other).model_dump(exclude_defaults=True)
         if columns[signal].get("unit") in SI:
             del columns[signal]["unit"]
-    line = json.dumps({"columns": columns})
-    return f"; put {line} into '{path}.json'"
+    return f"; {_line(path, {'columns': columns})}"
+
+
+def _line(path: Path, told: Mapping[str, Any]) -> str:
+    return f"put {json.dumps(told)} into '{path}.json'"
 
 
 def refuse_separator(path: Path, header: str) -> None:
@@ -64,14 +69,13 @@ def refuse_separator(path: Path, header: str) -> None:
     layout = {"separator": separator} | ({"decimal": ","} if "," in cells else {})
     raise InputError(
         f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
-        f"{separator!r}; put {json.dumps(layout)} into '{path}.json'"
+        f"{separator!r}; {_line(path, layout)}"
     )
 
 
 def _put(path: Path, layout: Layout, **changes: Any) -> str:
     """What to put into the file beside a measurement, with what it says now."""
-    told = layout.model_dump(exclude_defaults=True) | changes
-    return f"put {json.dumps(told)} into '{path}.json'"
+    return _line(path, layout.model_dump(exclude_defaults=True) | changes)
 
 
 def refuse_encoding(path: Path, layout: Layout) -> None:
@@ -124,6 +128,8 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
         )
 
 
-def decimal_comma(path: Path, layout: Layout) -> str:
-    """The end of a message about a number such as 0,5."""
+def decimal_comma(path: Path, layout: Layout, cell: str) -> str:
+    """The end of a message about a cell that is no number: what to do if it is one such as 0,5."""
+    if not DECIMAL_COMMA.fullmatch(cell.strip()):
+        return ""
     return f"; if a comma begins the decimals, {_put(path, layout, decimal=',')}"

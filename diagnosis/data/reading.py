@@ -5,7 +5,6 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +25,6 @@ from .matlab_files import read_matlab
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
-DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 # N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
 # below where sums of squares overflow.
 MOST_FORCE, MOST_POWER = 1e9, 1e3
@@ -149,8 +147,6 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     given = read_layout(path)
     try:
         names = _names(path, given or Layout())
-        if path.suffix != ".parquet":
-            refuse_preamble(path, given or Layout(), names)
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
         layout = given or (LOG if LOG.column("x").name in names else Layout())
@@ -168,11 +164,10 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         column = layout.column(signal)
         if table.columns.tolist().count(column.name) > 1:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
-        cells, where = table[column.name], f"'{path}'"
-        stamps = _seconds(cells, where) if signal == "time" else None
+        cells = table[column.name]
+        stamps = _seconds(cells, f"'{path}'") if signal == "time" else None
         if stamps is None:
-            numbers = _numbers(cells, where, decimal_comma(path, layout))
-            columns[signal] = to_si(numbers, signal, column)
+            columns[signal] = to_si(_numbers(cells, path, layout), signal, column)
         else:
             columns[signal] = stamps
     return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
@@ -202,7 +197,9 @@ def _names(path: Path, layout: Layout) -> list[str]:
         from pyarrow import parquet
 
         return list(parquet.read_schema(path).names)
-    return csv_names(path, layout)
+    names = csv_names(path, layout)
+    refuse_preamble(path, layout, names)
+    return names
 
 
 def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
@@ -213,15 +210,15 @@ def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
     return table
 
 
-def _numbers(cells: pd.Series, where: str, with_comma: str) -> np.ndarray:
-    """A column as floats; empty cells are NaN. ``with_comma``: told of numbers such as 0,5."""
+def _numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
+    """A column as floats; empty cells are NaN."""
     try:
         numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
     except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
-        raise InputError(f"{where}: {cells.name} is not a column of numbers") from None
+        raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
     wrong = np.flatnonzero(np.isnan(numbers) & np.asarray(cells.notna()))
     if wrong.size:
         text = str(cells.iloc[wrong[0]])[:SHOWN]
-        hint = with_comma if DECIMAL_COMMA.fullmatch(text.strip()) else ""
-        raise InputError(f"{where}: {cells.name} = {text!r} is not a number{hint}")
+        hint = decimal_comma(path, layout, text)
+        raise InputError(f"'{path}': {cells.name} = {text!r} is not a number{hint}")
     return numbers
