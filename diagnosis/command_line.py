@@ -17,11 +17,35 @@ from fmus.declare import DeclarationError
 from fmus.effects import STANDARD
 from fmus.ship import Ship, ship
 
+from .identification import Prior
 from .progress import Advance, progress
 from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
 INPUTS = ("train", "test", "runs", "run", "model", "effects")
+
+
+def prior(text: str) -> Prior:
+    """What ``--prior`` says: one number, or names with numbers.
+
+    Raises:
+        argparse.ArgumentTypeError: neither.
+    """
+    try:
+        if "=" not in text:
+            return _share(text)
+        pairs = [part.split("=") for part in text.split(",")]
+        return {name.strip(): _share(share) for name, share in pairs}
+    except ValueError:
+        form = "a number of zero or more, or names with such numbers as in mass=0.01,thrust=0.5"
+        raise argparse.ArgumentTypeError(f"needs {form}, not '{text}'") from None
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise ValueError
+    return value
 
 
 class Done(NamedTuple):

@@ -12,7 +12,7 @@ from cosim import InputError
 
 from . import session
 from .gathering import gather
-from .identification import DEFAULT, Method
+from .identification import DEFAULT, Method, Prior
 from .model import Integrals, Model, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
@@ -115,7 +115,7 @@ class ShownDiagnosis(session.Diagnosis):
 def diagnose(
     runs: Sequence[Integrals],
     held_out: Sequence[Integrals] = (),
-    prior: float = 0.1,
+    prior: Prior = None,
     model: Model | None = None,
     advance: Advance = silent,
     seed: int = 0,
@@ -126,14 +126,15 @@ def diagnose(
     Args:
         runs: to learn from, see :func:`load`.
         held_out: runs to test on only.
-        prior: relative standard deviation of every nominal coefficient.
+        prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
+            or groups); 0: exact; None: by where each value comes from.
         model: the initial one; the nominal one by default.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
 
     Raises:
-        InputError: too little data, or a prior that is negative or not finite.
+        InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
     found = session.diagnose(runs, held_out, prior, model, advance, seed, by)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -12,7 +12,7 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command_line import Done, command_of, inputs_of, out_options, parser, run, ship_with
+from .command_line import Done, command_of, inputs_of, out_options, parser, prior, run, ship_with
 from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
@@ -30,6 +30,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from . import session  # only now: it takes a second to import
     from .assessment.plausibility import refuse_implausible
     from .gathering import gather
+    from .identification import shares
     from .model import Model, read_model, write_model
     from .report import diagnosis_content, show_diagnosis, write_report
 
@@ -37,6 +38,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     with together(options.out, FILES) as new:
         craft = ship_with(options.effects)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
+        shares(craft, options.prior)
         by = method(options.method)
         paths = [*options.train, *options.test]
         runs = gather(paths, advance, options.anyway)
@@ -67,22 +69,13 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
 UNSOUND = "the learned model is not sound, see Stability; --allow-unstable writes it all the same"
 
 
-def _prior(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value < float("inf"):
-        raise argparse.ArgumentTypeError(f"needs a number of zero or more, not '{text}'")
-    return value
-
-
 def _parser() -> argparse.ArgumentParser:
     made = parser(
         "learn",
         "Learn from measured runs which physical effect a model lacks, and how sure that is.",
         "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
+        "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
         "exit codes: 0 done, 2 bad input, 3 the learned model is not sound: model.ssv is not written,\n"
         "            130 interrupted (nothing is written)",
@@ -105,10 +98,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "--prior",
-        type=_prior,
+        type=prior,
         metavar="SHARE",
-        default=0.1,
-        help="relative standard deviation of every nominal coefficient; 0: exact (0.1)",
+        help="relative standard deviation of every nominal coefficient, or, as in mass=0.01,thrust=0.5, "
+        "of groups and single ones; 0: exact (by where each value comes from)",
     )
     made.add_argument(
         "--method",

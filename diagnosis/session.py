@@ -16,8 +16,9 @@ from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
 from .decision import concluded, remainder_of
-from .identification import DEFAULT, Method, method
+from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Findings
+from .identification.prior import shares as prior_shares
 from .identification.withdrawal import Withdrawn, withdraw
 from .model import Integrals, Model, omega
 from .model.uncertainty import omega_std
@@ -70,7 +71,7 @@ class Diagnosis:
         start: the initial model.
         stability: of the learned model.
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
-        prior: relative standard deviation of the nominal coefficients.
+        prior: of the nominal coefficients, as it was given.
         seed: of everything random.
     """
 
@@ -83,7 +84,7 @@ class Diagnosis:
     start: Model
     stability: Stability
     speeds: tuple[float, float, float]
-    prior: float
+    prior: Prior
     seed: int
 
     @property
@@ -145,7 +146,7 @@ def evaluate(
 def diagnose(
     train: Sequence[Integrals],
     held_out: Sequence[Integrals] = (),
-    prior: float = 0.1,
+    prior: Prior = None,
     model: Model | None = None,
     advance: Advance = silent,
     seed: int = 0,
@@ -156,24 +157,24 @@ def diagnose(
     Args:
         train: runs to learn from, see :func:`diagnosis.gather`.
         held_out: runs to test on only.
-        prior: relative standard deviation of every nominal coefficient.
+        prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
+            or groups); 0: exact; None: by where each value comes from.
         model: the initial one; the nominal one by default.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
 
     Raises:
-        InputError: too little data, or a prior that is negative or not finite.
+        InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    if not 0.0 <= prior < np.inf:
-        raise InputError(f"the prior must be zero or more, not {prior:g}")
+    start = model or Model()
+    prior_shares(start.ship, prior)  # before any work
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
         raise InputError(
             f"too little to learn from: {blocks * BLOCK:g} s with thrusters at work, "
             f"at least {MIN_BLOCKS * BLOCK:g} s are needed"
         )
-    start = model or Model()
     chosen = method(by) if isinstance(by, str) else by
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
     region = OperatingRegion.of(nu)

@@ -1,9 +1,9 @@
 """How a component declares itself, and how its nested tuples map to a flat list of variables.
 
 A field of a Params, Inputs or Outputs NamedTuple reads ``name: Annotated[float, unit, description]
-= start``; behind the description may stand a :class:`Range` and, for a parameter that only counts
-at initialisation, :data:`FIXED`. A field may itself be such a NamedTuple, whose fields then join
-the flat list under their own names.
+= start``; behind the description may stand a :class:`Range`, for a parameter that only counts
+at initialisation :data:`FIXED`, and for a coefficient of the nominal model a :class:`Known`. A field
+may itself be such a NamedTuple, whose fields then join the flat list under their own names.
 """
 
 import difflib
@@ -35,6 +35,23 @@ class Range:
 
 
 POSITIVE = Range(min=0.0)
+
+
+@dataclass(frozen=True)
+class Known:
+    """Where the value of a nominal coefficient comes from, and how well it is known by that.
+
+    Attributes:
+        group: a name for all coefficients of its kind, such as ``mass`` or ``damping``.
+        origin: how the value was found.
+        share: standard deviation, as a share of the value.
+    """
+
+    group: str
+    origin: str
+    share: float
+
+
 FIXED = "fixed"
 # Of a long communication step; beyond, somebody has mistaken a unit.
 MOST_PARTS = 100_000
@@ -50,6 +67,7 @@ class Variable:
     start: float
     range: Range
     fixed: bool
+    known: Known | None = None
 
 
 def vector(
@@ -106,6 +124,7 @@ def variables(cls: type[Any]) -> tuple[Variable, ...]:
         if name not in defaults:
             raise DeclarationError(f"{cls.__name__}.{name} needs a start value")
         ranges = [extra for extra in meta[2:] if isinstance(extra, Range)]
+        known = [extra for extra in meta[2:] if isinstance(extra, Known)]
         found.append(
             Variable(
                 name,
@@ -114,6 +133,7 @@ def variables(cls: type[Any]) -> tuple[Variable, ...]:
                 float(defaults[name]),
                 ranges[0] if ranges else Range(),
                 FIXED in meta[2:],
+                known[0] if known else None,
             )
         )
     return tuple(found)

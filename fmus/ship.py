@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import get_args
 
-from .declare import Component, Variable, variables
+from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
-from .hull import Damping, Inertia
-from .thrusters.chain import Plant
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -44,10 +42,10 @@ class Ship:
         }
 
     @cached_property
-    def coefficients(self) -> Mapping[str, bool]:
-        """Coefficients of hull and thrusters -> whether it is one of damping."""
-        groups = (Inertia, Damping, Plant)
-        return {v.name: group is Damping for group in groups for v in variables(group)}
+    def coefficients(self) -> Mapping[str, Known]:
+        """Coefficients of the nominal hull and thrusters -> where their value comes from."""
+        parts = (self.vessel.params, self.thrusters.params)
+        return {v.name: v.known for part in parts for v in variables(part) if v.known is not None}
 
     @property
     def candidates(self) -> list[str]:

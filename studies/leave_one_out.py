@@ -11,6 +11,7 @@ import numpy as np
 import diagnosis
 from cosim import InputError
 from diagnosis import Diagnosis, DiagnosisContent, Evaluation, Integrals, Model, diagnosis_content, omega
+from diagnosis.identification import Prior
 from diagnosis.model import Response
 from diagnosis.progress import Advance
 
@@ -64,13 +65,13 @@ def fall(e: Evaluation) -> np.ndarray:
     return e.before.omega_rms / e.after.omega_rms
 
 
-def leave_out(runs: Sequence[Integrals], k: int, prior: float, advance: Advance) -> Fold:
+def leave_out(runs: Sequence[Integrals], k: int, prior: Prior, advance: Advance) -> Fold:
     """Learn from all runs but one.
 
     Args:
         runs: at least two.
         k: which one is left out.
-        prior: relative standard deviation believed of every nominal coefficient.
+        prior: of the nominal coefficients, as of :func:`diagnosis.diagnose`.
         advance: receives the name of each step when it begins.
     """
     others = [w for i, w in enumerate(runs) if i != k]

@@ -13,8 +13,8 @@ from rich.console import Console
 
 import cosim
 import diagnosis
-from diagnosis import Diagnosis, Integrals, diagnosis_content
-from diagnosis.identification import MEASURED
+from diagnosis import Diagnosis, Integrals, Model, diagnosis_content
+from diagnosis.identification import shares
 from diagnosis.progress import Advance, progress
 
 from . import basin, bollard, ship_tables
@@ -22,12 +22,11 @@ from .leave_one_out import Fold, gather, leave_out
 from .study_command import run_study, study_parser
 from .study_report import Report
 
-PRIOR = 1.0
 # Profiles of the model error over all covariates: a megabyte that the reports of single runs have.
 LEFT_OUT = {"where", "where_after"}
 
 
-def learned(runs: Sequence[Integrals], prior: float, quick: bool, advance: Advance) -> list[Fold]:
+def learned(runs: Sequence[Integrals], prior: float | None, quick: bool, advance: Advance) -> list[Fold]:
     """Each run left out in turn; the first alone for a first look."""
 
     def without(name: str) -> Advance:
@@ -43,7 +42,7 @@ def with_all(folds: Sequence[Fold], found: Diagnosis) -> list[Fold]:
     return [Fold(f.found, seen[f.name]) for f in folds]
 
 
-def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
+def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
     """Learn from the measured runs and write the report; returns its path."""
     pulls, files = bollard.read(data), basin.files(data)
     with progress(Console(stderr=True)) as advance:
@@ -55,13 +54,15 @@ def study(data: Path, out: Path, prior: float, quick: bool) -> Path:
         report = Report(out, "The real ship")
     except OSError as error:
         raise cosim.InputError(f"cannot write to '{out}': {error.strerror}") from None
-    damping, thrusters = 100.0 * prior, 100.0 * min(prior, MEASURED)
+    share = shares(Model().ship, prior)
+    option = "" if prior is None else f" --prior {prior:g}"
     names = ", ".join(w.run.name for w in runs)
     report.text(
         f"NTNU's measured runs of CyberShip Enterprise 1: {names}. Each is left out in turn; what the "
         "model lacks is learned from the others, as by "
-        f"`python -m diagnosis.learn --prior {prior:g}`: coefficients of the damping, borrowed from "
-        f"another ship, are believed to {damping:.0f} %, masses and thrusters to {thrusters:.0f} %."
+        f"`python -m diagnosis.learn{option}`: the mass is believed to {share['m']:.0%}, thrusts to "
+        f"{share['plant_F_vsp']:.0%}, damping from tow tests to {share['X_u']:.0%} and from another "
+        f"ship to {share['N_r']:.0%}; none to more than a tenth in the search for what is missing."
     )
     ship_tables.write_falls(report, folds)
     ship_tables.write_windows(report, folds)
@@ -101,9 +102,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--prior",
         type=float,
-        default=PRIOR,
         metavar="SHARE",
-        help="relative standard deviation believed of every damping coefficient (%(default)s)",
+        help="relative standard deviation of every damping coefficient (by where each value comes from)",
     )
     options = parser.parse_args(arguments)
     run_study(partial(study, options.data, options.out, options.prior, options.quick))

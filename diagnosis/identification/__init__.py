@@ -11,27 +11,29 @@ from .methods import DEFAULT, METHODS, Method, method
 
 if TYPE_CHECKING:
     from .findings import Finding, Findings, Ranked, Suspect
-    from .prior import MEASURED
+    from .prior import Prior, shares
 
 __all__ = [
     "DEFAULT",
-    "MEASURED",
     "METHODS",
     "Finding",
     "Findings",
     "Method",
+    "Prior",
     "Ranked",
     "Suspect",
     "method",
+    "shares",
 ]
 
 __getattr__ = lazy_names(
     __name__,
     {
-        "MEASURED": "prior",
         "Finding": "findings",
         "Findings": "findings",
         "Ranked": "findings",
         "Suspect": "findings",
+        "Prior": "prior",
+        "shares": "prior",
     },
 )

@@ -23,7 +23,7 @@ from .conclusion import Place, Search
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
 from .map_regression import first_share
-from .prior import NominalPrior
+from .prior import MEASURED, NominalPrior, Prior
 from .refinement import Estimate, TrainingSet, nuisance, refit
 from .shortlist import Ranking, Shortlist, alike, rank, reweighted, scored_alone
 from .waves import Waves, find_waves
@@ -42,7 +42,7 @@ class ForwardSelection:
         self,
         runs: Sequence[Integrals],
         model: Model,
-        prior: float,
+        prior: Prior,
         advance: Callable[[str], None],
         seed: int,
     ) -> Findings:
@@ -74,7 +74,7 @@ class ForwardSelection:
 
 def search(
     data: Sequence[Integrals],
-    prior: float,
+    prior: Prior,
     start: Model,
     advance: Callable[[str], None],
     rng: np.random.Generator,
@@ -83,13 +83,13 @@ def search(
 
     Args:
         data: windows of every training run.
-        prior: relative standard deviation believed of every nominal coefficient.
+        prior: of the nominal coefficients, see :mod:`.prior`.
         start: model to start from.
         advance: receives the name of each step.
         rng: for the bootstrap.
     """
     blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(data)])
-    belief = NominalPrior.of(start, prior)
+    belief = NominalPrior.of(start, prior, MEASURED)
     t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())

@@ -12,6 +12,7 @@ from cosim.errors import nearest
 if TYPE_CHECKING:
     from ..model import Integrals, Model
     from .findings import Findings
+    from .prior import Prior
 
 
 @runtime_checkable
@@ -38,7 +39,7 @@ class Method(Protocol):
         self,
         runs: "Sequence[Integrals]",
         model: "Model",
-        prior: float,
+        prior: "Prior",
         advance: Callable[[str], None],
         seed: int,
     ) -> "Findings":
@@ -47,7 +48,8 @@ class Method(Protocol):
         Args:
             runs: windows of every training run, at least one.
             model: to start from.
-            prior: relative standard deviation believed of every nominal coefficient; 0: exact.
+            prior: relative standard deviation of every nominal coefficient, or of those named; 0: exact;
+                None: as the ship declares it.
             advance: receives the name of each step, a few words each.
             seed: of everything random.
 

@@ -22,6 +22,7 @@ from ..model import Integrals, Model
 from .candidates import Candidate, Shape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
+from .prior import Prior
 
 FOLDS = 4  # of cross-validation over blocks; chosen
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
@@ -115,7 +116,7 @@ class Peer(ABC):
         self,
         runs: Sequence[Integrals],
         model: Model,
-        prior: float,
+        prior: Prior,
         advance: Callable[[str], None],
         seed: int,
     ) -> Findings:

@@ -1,7 +1,7 @@
 """Content of the JSON files, made from the results of the diagnosis."""
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypedDict
@@ -52,6 +52,7 @@ def diagnosis_content(
         files: names of the files that are written together.
     """
     learned, comparison, s = diagnosis.learned, diagnosis.comparison, diagnosis.stability
+    prior = diagnosis.prior
     unique = unique_shares(learned, diagnosis.start, comparison.evaluations)
     effects = [
         _effect(diagnosis, f, share, alone)
@@ -78,7 +79,7 @@ def diagnosis_content(
             mass_definite=s.mass_definite,
             notes=list(s.notes),
         ),
-        prior=diagnosis.prior,
+        prior=dict(prior) if isinstance(prior, Mapping) else prior,
         seed=diagnosis.seed,
         **_provenance(comparison, model, files),
     )

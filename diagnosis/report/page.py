@@ -109,7 +109,8 @@ def _provenance(content: ComparisonContent | DiagnosisContent) -> Iterator[tuple
     yield "runs", content.runs
     yield "model", content.model
     if isinstance(content, DiagnosisContent):
-        yield "prior of the coefficients", content.prior
+        by_origin = "by where each value comes from"
+        yield "prior of the coefficients", by_origin if content.prior is None else content.prior
         yield "seed", content.seed
     yield "versions", content.versions
 

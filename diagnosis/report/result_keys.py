@@ -209,7 +209,7 @@ class DiagnosisContent(Part):
     where: WhereResult
     where_after: WhereResult
     stability: StabilityResult
-    prior: Number
+    prior: float | dict[str, float] | None
     seed: int
     runs: list[str]
     model: str | None

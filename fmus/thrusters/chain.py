@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Component, bundle
+from ..declare import POSITIVE, Component, Known, bundle
 from ..effects import STANDARD, EffectSet, Memory, Running, Thrust
 from ..effects.group import Group, Member, group
 from ..hull import Triple
@@ -21,16 +21,24 @@ from ..ops import Number, clip, finite, when
 from ..signals import Force, Velocity
 from .allocation import Allocation, allocate, moments, thrust
 
+# Thrust goes with the square of a propeller's speed, which is not recorded: a third less speed is half
+# the thrust.
+PULLED = Known("thrust", "bollard pulls at another propeller speed", 0.5)
+# The place of an axis is known to millimetres, that of the force which acts on its disc to a centimetre.
+RULED = Known("place", "by ruler", 0.02)
+
 
 class Plant(NamedTuple):
     """What the thrusters really are."""
 
-    plant_F_vsp: Annotated[float, "N", "real force of the VSP at full command", POSITIVE] = 1.165
-    plant_F_bow: Annotated[float, "N", "real force of the bow at full command", POSITIVE] = 2.629
-    plant_l_vsp: Annotated[float, "m", "real VSP position forward of the body origin"] = -0.4575
-    plant_l_bow: Annotated[float, "m", "real bow thruster position forward of the origin"] = 0.3875
-    plant_p_x: Annotated[float, "m", "real point of attack, forward"] = 0.0
-    plant_p_y: Annotated[float, "m", "real point of attack, to starboard"] = 0.0
+    plant_F_vsp: Annotated[float, "N", "real force of the VSP at full command", POSITIVE, PULLED] = 1.165
+    plant_F_bow: Annotated[float, "N", "real force of the bow at full command", POSITIVE, PULLED] = 2.629
+    plant_l_vsp: Annotated[float, "m", "real VSP position forward of the body origin", RULED] = -0.4575
+    plant_l_bow: Annotated[float, "m", "real bow thruster position forward of the origin", RULED] = (
+        0.3875
+    )
+    plant_p_x: Annotated[float, "m", "real point of attack, forward", RULED] = 0.0
+    plant_p_y: Annotated[float, "m", "real point of attack, to starboard", RULED] = 0.0
 
 
 class Power(NamedTuple):

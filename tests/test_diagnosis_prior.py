@@ -1,0 +1,95 @@
+"""How well the nominal coefficients are known: by where their values come from, or as the user says."""
+
+import pytest
+from support.command import command
+from support.project import ROOT
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Model, learn
+from diagnosis.identification.prior import MEASURED, NominalPrior, shares
+from fmus.declare import variables
+from fmus.hull import Damping, Inertia
+from fmus.ship import ship
+from fmus.thrusters.chain import Plant
+
+KNOWN = ship().coefficients
+
+
+def std(**given):
+    """Relative standard deviation of each coefficient that is not zero."""
+    prior = NominalPrior.of(Model(), **given)
+    return {n: prior.std[n] / abs(mean) for n, mean in prior.mean.items()}
+
+
+def test_each_nominal_coefficient_says_where_it_comes_from():
+    names = [v.name for group in (Inertia, Damping, Plant) for v in variables(group)]
+    assert sorted(KNOWN) == sorted(names)
+    assert all(k.origin and k.group and 0.0 < k.share <= 1.0 for k in KNOWN.values())
+
+
+def test_what_was_weighed_is_known_better_than_what_was_borrowed():
+    found = std()
+    assert found["m"] < found["X_u"] < found["N_r"]
+    assert found["m"] == 0.01
+    assert found["plant_F_vsp"] == 0.5
+
+
+def test_the_search_believes_in_each_to_a_tenth():
+    found = std(most=MEASURED)
+    assert found["m"] == 0.01, "what is known better stays so"
+    assert found["N_r"] == found["plant_F_vsp"] == MEASURED
+
+
+def test_a_prior_of_some_beats_the_ships_and_a_single_one_its_group():
+    found = std(prior={"damping": 0.2, "X_u": 0.4, "thrust": 0.0}, most=MEASURED)
+    assert found["N_r"] == 0.2
+    assert found["X_u"] == 0.4
+    assert found["plant_F_vsp"] == found["plant_F_bow"] == 0.0
+    assert found["m"] == 0.01
+
+
+def test_a_common_prior_leaves_what_was_measured_at_a_tenth():
+    found = std(prior=1.0)
+    assert found["N_r"] == 1.0
+    assert found["m"] == MEASURED
+    assert set(std(prior=0.0).values()) == {0.0}
+
+
+@pytest.mark.parametrize(
+    ("prior", "said"),
+    [
+        ({"trust": 0.5}, "did you mean 'thrust'"),
+        ({"X_uu_": 0.5}, "did you mean 'X_uu'"),
+        ({"mass": -0.5}, "zero or more"),
+        ({"mass": float("nan")}, "zero or more"),
+        (-0.1, "zero or more"),
+    ],
+)
+def test_a_prior_of_what_is_none_is_refused(prior, said):
+    with pytest.raises(InputError, match=said):
+        shares(ship(), prior)
+    with pytest.raises(InputError, match=said):
+        diagnosis.diagnose([], prior=prior)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("trust=0.5", "did you mean 'thrust'"),
+        ("mass=heavy", "needs a number"),
+        ("mass=0.1,", "needs a number"),
+        ("mass=-1", "needs a number"),
+    ],
+)
+def test_the_command_refuses_it_before_it_reads_a_run(text, said, tmp_path):
+    done = command(learn.main, tmp_path / "none.csv", "--prior", text, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_docs_tell_the_origin_of_each_group():
+    text = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    for known in set(KNOWN.values()):
+        assert f"| `{known.group}` | {known.origin} | {100.0 * known.share:g} %" in text
