@@ -149,9 +149,10 @@ def test_failures_end_the_run_at_the_same_row(failure, algorithm, tmp_path, monk
 
 def test_number_too_large_for_a_whole_number_is_refused_in_the_same_words(tmp_path, monkeypatch):
     fmu = build_lag(tmp_path)
-    event = {"time": 1.0, "model": "lag", "variable": "on", "action": "bias", "value": 3e9}
-    result = same(lagging(fmu, events=[event]), tmp_path, monkeypatch, "failed")
-    assert "lag.on = 3000000001.0 is not a 32-bit number" in result.message
+    for value, shown in ((3e9, "3000000001.0"), (2147483646.6, "2147483647.6")):
+        event = {"time": 1.0, "model": "lag", "variable": "on", "action": "bias", "value": value}
+        result = same(lagging(fmu, events=[event]), tmp_path / shown, monkeypatch, "failed")
+        assert f"lag.on = {shown} is not a 32-bit number" in result.message
 
 
 @pytest.mark.slow

@@ -21,6 +21,8 @@ from support.project import COMPONENTS, ROOT
 from fmus.build import BuildError, build, building, packing
 from fmus.build.__main__ import main
 from fmus.declare import flatten, packer, width
+from fmus.fmi.slave import Slave, StateError
+from fmus.vessel.vessel import COMPONENT as VESSEL
 
 every_fmu = pytest.mark.parametrize("name", COMPONENTS)
 
@@ -507,3 +509,17 @@ def test_step_that_is_no_step_is_an_error(opened):
         with pytest.raises(Exception, match="discard"):
             vessel.step(0.0, h)
     assert len(vessel.messages) == 4
+
+
+def test_serialised_state_of_a_python_fmu_is_refused_where_it_was_changed():
+    kinds = {name: {"component": VESSEL, "code_hash": name, "code_version": "0"} for name in "ab"}
+    one, other = (type("Ship", (Slave,), attributes)(instance_name="a") for attributes in kinds.values())
+    one.exit_initialization_mode()
+    saved = one._fmu_state_to_bytes(one._get_fmu_state())
+    assert one._fmu_state_from_bytes(saved) == one._get_fmu_state()
+    with pytest.raises(StateError, match="no state of this FMU"):
+        other._fmu_state_from_bytes(saved)
+    with pytest.raises(StateError, match="another version"):
+        one._fmu_state_from_bytes(b"[2" + saved[2:])
+    with pytest.raises(StateError, match="checksum"):
+        one._fmu_state_from_bytes(saved.replace(b"0.0", b"0.5", 1))

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from support import ccode
 from support.ccode import same_bits
@@ -137,6 +138,60 @@ def test_state_of_another_fmu_is_refused(native, opened_here):
     with pytest.raises(Exception, match="error"):
         vessel.fmu.deSerializeFMUstate(saved)
     assert "no state of this FMU" in vessel.messages[-1][1]
+
+
+LAST_SUCCESSFUL_TIME = 2  # of fmi2StatusKind
+
+
+def test_state_that_is_set_restores_the_last_successful_time(native, opened_here):
+    vessel = opened_here(native["vessel"]).initialise()
+    vessel.play(0)
+    state = vessel.fmu.getFMUstate()
+    reached = vessel.fmu.getRealStatus(LAST_SUCCESSFUL_TIME)
+    vessel.fmu.doStep(reached, 0.5)
+    assert vessel.fmu.getRealStatus(LAST_SUCCESSFUL_TIME) == reached + 0.5
+    vessel.fmu.setFMUstate(state)
+    assert vessel.fmu.getRealStatus(LAST_SUCCESSFUL_TIME) == reached
+    vessel.fmu.freeFMUstate(state)
+
+
+def test_serialised_state_that_was_changed_anywhere_is_refused(native, opened_here):
+    vessel = opened_here(native["vessel"]).initialise()
+    vessel.play(0)
+    state = vessel.fmu.getFMUstate()
+    saved = bytes(vessel.fmu.serializeFMUstate(state))
+    vessel.fmu.freeFMUstate(state)
+    for place in (*range(0, 80, 3), *range(80, len(saved), len(saved) // 40), len(saved) - 1):
+        changed = saved[:place] + bytes([saved[place] ^ 1]) + saved[place + 1 :]
+        if not any(saved[place:64]) and place < 64:  # behind the end of the guid
+            continue
+        with pytest.raises(FMICallException):
+            vessel.fmu.deSerializeFMUstate(changed)
+    assert {text for _, text in vessel.messages} == {
+        "these bytes are no state of this FMU",
+        "this state is of another version",
+        "this state was changed: its checksum is another one",
+    }
+
+
+@pytest.mark.parametrize("kind", ["native", "Python"])
+@pytest.mark.parametrize(
+    "before", [(), ("get",), ("setup", "enter"), ("setup", "enter", "get"), ("state",)]
+)
+def test_step_before_initialisation_is_refused_whatever_was_called_before(
+    before, kind, native, fmus, opened_here
+):
+    vessel = opened_here(native["vessel"] if kind == "native" else fmus["vessel"])
+    for call in before:
+        {
+            "get": vessel.get,
+            "setup": lambda: vessel.fmu.setupExperiment(startTime=0.0),
+            "enter": vessel.fmu.enterInitializationMode,
+            "state": lambda: vessel.fmu.setFMUstate(vessel.fmu.getFMUstate()),
+        }[call]()
+    with pytest.raises(FMICallException):
+        vessel.fmu.doStep(0.0, 0.01)
+    assert "before initialisation has ended" in " ".join(text for _, text in vessel.messages)
 
 
 def test_what_is_out_of_place_is_told_and_changes_nothing(native, opened_here):

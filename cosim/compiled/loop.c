@@ -150,7 +150,7 @@ static int set_all(const Fmu *fmu, const double *table) {
             int32_t *buffer = set->values;
             for (k = 0; k < set->count; k++) {
                 const double value = table[set->slots[k]];
-                if (!(fabs(value) < LIMIT)) return NOT_32_BIT;
+                if (!(value >= -LIMIT - 0.5 && value < LIMIT - 0.5)) return NOT_32_BIT; /* rounding is to even */
                 buffer[k] = (int32_t)nearbyint(value);
             }
         }

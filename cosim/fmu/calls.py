@@ -72,7 +72,7 @@ class Transfer:
         assert self._buffer is not None
         for k, port in enumerate(self._ports):
             value = self._values[port.slot]
-            if not abs(value) < INT_LIMIT:
+            if not -INT_LIMIT - 0.5 <= value < INT_LIMIT - 0.5:  # rounding is to even
                 name = f"{self._component.name}.{port.variable.name}"
                 raise SimulationError(f"{name} = {value} is not a 32-bit number")
             self._buffer[k] = round(value)

@@ -5,6 +5,7 @@ costs no look-up, and holds nothing else but the component's state: resetting, r
 serialising follow from that.
 """
 
+import hashlib
 import json
 import uuid
 from itertools import pairwise
@@ -17,9 +18,15 @@ from pythonfmu.enums import Fmi2Status
 
 from ..declare import Component, flatten, packer, rebuild, width
 
+STATE_VERSION = 1  # of a serialised state
+
 
 class InitialisationError(Exception):
     """No state follows from the start values."""
+
+
+class StateError(Exception):
+    """Bytes are no state of this FMU."""
 
 
 class Slave(Fmi2Slave):
@@ -129,6 +136,9 @@ class Slave(Fmi2Slave):
         self._initialising = False
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        if self._initialising:
+            self.log("there is no state to step from before initialisation has ended", Fmi2Status.error)
+            return False
         if not 0.0 <= step_size < inf:
             self.log(f"step at t = {current_time} s: {step_size} s is no step size", Fmi2Status.error)
             return False
@@ -151,26 +161,38 @@ class Slave(Fmi2Slave):
         return True
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        if self._stale:
-            self._initialise()
         return {
             "values": list(self._values),
-            "state": flatten(self._state),
+            "state": [] if self._initialising else flatten(self._state),
             "initialising": self._initialising,
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self._values = list(state["values"])
         self._params = None
-        inputs, params = self._arguments()
-        self._state = rebuild(self.component.init(inputs, params), state["state"])
-        self._initialising = state["initialising"]
-        self._stale = False
+        # Before initialisation has ended, all follows from the start values.
+        self._initialising = self._stale = state["initialising"]
+        self._failure = ""
+        if not self._initialising:
+            inputs, params = self._arguments()
+            self._state = rebuild(self.component.init(inputs, params), state["state"])
 
-    @staticmethod
-    def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state).encode()
+    @classmethod
+    def _fmu_state_to_bytes(cls, state: dict[str, Any]) -> bytes:  # pyright: ignore[reportIncompatibleMethodOverride]
+        body = json.dumps(state)
+        return json.dumps([STATE_VERSION, cls.code_hash, _checksum(body), body]).encode()
 
-    @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        return json.loads(bytes(state).decode())
+    @classmethod
+    def _fmu_state_from_bytes(cls, state: bytes) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        version, code_hash, checksum, body = json.loads(bytes(state))
+        if code_hash != cls.code_hash:
+            raise StateError("these bytes are no state of this FMU")
+        if version != STATE_VERSION:
+            raise StateError("this state is of another version")
+        if checksum != _checksum(body):
+            raise StateError("this state was changed: its checksum is another one")
+        return json.loads(body)
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

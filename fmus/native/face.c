@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,6 +54,7 @@ typedef struct {
     double values[AT_LEAST_ONE(FIRST_OUTPUT)];
     double outputs[AT_LEAST_ONE(OUTPUTS)];
     double state[AT_LEAST_ONE(STATES)];
+    double reached;
     int initialising;
 } Saved;
 
@@ -75,10 +77,22 @@ typedef struct {
 } Instance;
 
 /* The saved state as bytes: this, then Saved. */
+#define STATE_VERSION 1
 typedef struct {
     char guid[64];
-    size_t size;
+    uint32_t version;
+    uint32_t size;
+    uint64_t checksum;
 } Header;
+
+/* FNV-1a of 64 bits (Fowler, Noll, Vo): one byte that is another one always changes it. */
+static uint64_t checksum(const void *data, size_t size) {
+    const unsigned char *bytes = data;
+    uint64_t sum = 0xcbf29ce484222325u;
+    size_t k;
+    for (k = 0; k < size; k++) sum = (sum ^ bytes[k]) * 0x100000001b3u;
+    return sum;
+}
 
 static void tell(Instance *m, fmi2Status status, const char *format, ...) {
     int category = status == fmi2Warning ? WARNING : status == fmi2OK ? ALL : ERROR;
@@ -302,7 +316,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
         tell(m, fmi2Error, "step at t = %.15g s: %.15g s is no step size", t, h);
         return fmi2Error;
     }
-    if (m->stale || m->failed) return refuse(m, "there is no state to step from");
+    if (m->initialising) return refuse(m, "there is no state to step from before initialisation has ended");
     if (MAX_STEP > 0.0 && h > MOST_PARTS * MAX_STEP) {
         tell(m, fmi2Error, "step at t = %.15g s failed: a step of %.15g s is too long: %.15g s are integrated at once",
              t, h, MAX_STEP);
@@ -331,12 +345,12 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolea
 EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     Instance *m = c;
     Saved *saved;
-    if (m->stale) initialise(m);
     if (!*state) *state = calloc(1, sizeof(Saved));
     if (!(saved = *state)) return refuse(m, "out of memory");
     memcpy(saved->values, m->values, FIRST_OUTPUT * sizeof(double));
     memcpy(saved->outputs, m->outputs[m->shown], OUTPUTS * sizeof(double));
     memcpy(saved->state, m->states[m->current], STATES * sizeof(double));
+    saved->reached = m->reached;
     saved->initialising = m->initialising;
     return fmi2OK;
 }
@@ -348,8 +362,10 @@ EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     memcpy(m->values, saved->values, FIRST_OUTPUT * sizeof(double));
     memcpy(m->outputs[m->shown], saved->outputs, OUTPUTS * sizeof(double));
     memcpy(m->states[m->current], saved->state, STATES * sizeof(double));
-    m->initialising = saved->initialising;
-    m->is_prepared = m->stale = m->failed = 0;
+    m->reached = saved->reached;
+    /* Before initialisation has ended, all follows from the start values. */
+    m->initialising = m->stale = saved->initialising;
+    m->is_prepared = m->failed = 0;
     return fmi2OK;
 }
 
@@ -367,8 +383,9 @@ EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state
 }
 
 EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-    Header header = {GUID, sizeof(Saved)};
+    Header header = {GUID, STATE_VERSION, sizeof(Saved), 0};
     if (!state || size < sizeof(Header) + sizeof(Saved)) return refuse(c, "the memory for a state is too small");
+    header.checksum = checksum(state, sizeof(Saved));
     memcpy(bytes, &header, sizeof header);
     memcpy(bytes + sizeof header, state, sizeof(Saved));
     return fmi2OK;
@@ -376,11 +393,13 @@ EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi
 
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                           fmi2FMUstate *state) {
-    Header header;
-    if (size < sizeof(Header) + sizeof(Saved)) return refuse(c, "these bytes are no state of this FMU");
-    memcpy(&header, bytes, sizeof header);
+    Header header = {"", 0, 0, 0};
+    if (size >= sizeof(Header) + sizeof(Saved)) memcpy(&header, bytes, sizeof header);
     if (strncmp(header.guid, GUID, sizeof header.guid) || header.size != sizeof(Saved))
         return refuse(c, "these bytes are no state of this FMU");
+    if (header.version != STATE_VERSION) return refuse(c, "this state is of another version");
+    if (header.checksum != checksum(bytes + sizeof header, sizeof(Saved)))
+        return refuse(c, "this state was changed: its checksum is another one");
     if (!*state) *state = malloc(sizeof(Saved));
     if (!*state) return refuse(c, "out of memory");
     memcpy(*state, bytes + sizeof header, sizeof(Saved));
