@@ -98,8 +98,8 @@ def run_command(main: Callable[[], int]) -> NoReturn:
             sys.stdout.flush()
         finally:
             ignore_interrupts()
-    except KeyboardInterrupt:
-        complain("interrupted", kind="")
+    except KeyboardInterrupt as interrupt:
+        complain(": ".join(["interrupted", *map(str, interrupt.args)]), kind="")
         code = INTERRUPTED
         # CPython ends by the signal itself if KeyboardInterrupt left an exec(), as of a named tuple that
         # was being made, though it was caught; making another one clears that mark.

@@ -4,9 +4,9 @@ An FMU that replaces another one needs the same names.
 """
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch.watching import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Iterable, Sequence

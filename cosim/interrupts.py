@@ -4,9 +4,9 @@ A signal handler of Python runs between any two steps of the program, also betwe
 folder and the statement that remembers it. So a command leaves at once while it has nothing to clean up
 (:func:`leave_on_interrupt`), and interrupts wait while it makes, moves or removes files (:class:`Held`).
 
-Under ``python -m cosim.run`` a second process watches the run (:mod:`cosim.watch`). A terminal sends
-signals to both, and the watching process passes on its own: what it has counted is a request of the
-user, what it knows nothing of was sent to the simulating process alone, and ends it.
+A second process watches a command (:mod:`cosim.watch`). A terminal sends signals to both, and the
+watching process passes on its own: what it has counted is a request of the user, what it knows nothing
+of was sent to the working process alone, and ends it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import os
 import signal
 import time
 
-from .process.run_state import REQUESTS, STATE
+from .process.run_state import HELD, REQUESTS, STATE
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
@@ -161,13 +161,14 @@ class Held:
         self._before: dict[int, Any] = {}
         self._acting: Mapping[int, Any] = {}
         self._outer: Held | None = None
+        self._was_held = 0
 
     def __enter__(self) -> Held:
         import threading
 
         if threading.current_thread() is threading.main_thread():
             self._before = {number: signal.getsignal(number) for number in SIGNALS}
-            self._outer = Held._innermost
+            self._outer, self._was_held = Held._innermost, STATE.numbers[HELD]
             self._acting = self._outer._acting if self._outer else self._before
             Held._innermost = self
             self.hold()
@@ -182,16 +183,19 @@ class Held:
             self._outer.hold()
             return
         _install(self._before)
+        STATE.numbers[HELD] = self._was_held
         if not self._finished and error is None:
             self.act()
 
     def hold(self) -> None:
         """Interrupts wait."""
         _install(dict.fromkeys(self._before, self._wait))
+        STATE.numbers[HELD] = bool(self._before)
 
     def allow(self) -> None:
         """Interrupts act, those that waited at once."""
         _install(self._acting)
+        STATE.numbers[HELD] = 0
         self.act()
 
     def act(self) -> None:

@@ -1,9 +1,9 @@
 """Performance metrics of a finished run: ``python -m cosim.metrics DIR [--from T] [--to T]``."""
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch.watching import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 import json

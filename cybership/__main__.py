@@ -1,5 +1,10 @@
 """One entry point for all commands: ``cybership NAME ...`` is ``python -m MODULE ...``."""
 
+if __name__ == "__main__":
+    from cosim.interrupts import leave_on_interrupt
+
+    leave_on_interrupt()  # before all other imports, which take a while
+
 import runpy
 import sys
 

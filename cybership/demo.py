@@ -6,9 +6,9 @@ ship sails again.
 """
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 import time

@@ -1,9 +1,9 @@
 """``python -m diagnosis`` tells which commands there are."""
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 from cosim.command import run_command
 

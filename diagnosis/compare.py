@@ -1,9 +1,9 @@
 """Compare a model with measured runs: ``python -m diagnosis.compare RUN...``."""
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,5 +1,6 @@
 """From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
 
+import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -12,7 +13,7 @@ import numpy as np
 
 from cosim import InputError
 from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
-from cosim.process import without_program
+from cosim.process import end_with_parent, without_program
 
 from .data import Run, clean, read
 from .model import Integrals, integrals
@@ -71,6 +72,11 @@ def _smoothed(run: Run, anyway: bool) -> Smoothed:
     return smooth(clean(run, anyway))
 
 
+def _begin(parent: int) -> None:
+    ignore_interrupts()
+    end_with_parent(parent)
+
+
 def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable[Smoothed]:
     if len(runs) < 2 or sum(run.time.size for run in runs) < WORTH:
         for run in runs:
@@ -78,7 +84,7 @@ def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable
             yield _smoothed(run, anyway)
         return
     # Ctrl-C is for this process alone, which then lets the others end.
-    pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), ignore_interrupts)
+    pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), _begin, (os.getpid(),))
     try:
         with UninterruptedProcesses(), without_program():
             futures = [pool.submit(_smoothed, run, anyway) for run in runs]

@@ -1,9 +1,9 @@
 """Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``."""
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

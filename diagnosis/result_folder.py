@@ -12,6 +12,7 @@ from tempfile import mkdtemp
 
 from cosim import InputError
 from cosim.interrupts import Held
+from cosim.process import STATE
 
 # In a folder that nobody chose: the hashes of what the result there was made of.
 MADE_OF = ".inputs.json"
@@ -40,6 +41,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
             try:
                 out.mkdir(parents=True, exist_ok=True)
                 scratch = Path(mkdtemp(prefix=".new-", dir=out))
+                STATE.unfinished(*(folder.absolute() for folder in (scratch, *made)))
             except OSError as error:
                 raise InputError(f"cannot write to '{out}': {error.strerror or error}") from None
             interrupts.allow()
@@ -60,6 +62,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
             with suppress(OSError):  # not empty: it has the files
                 for folder in made:
                     folder.rmdir()
+            STATE.unfinished()
 
 
 def sha256(path: Path) -> str:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch.watching import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 import os
@@ -68,6 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.stop_when,
                 lambda text: None if options.quiet else console.print(printable(text), markup=False),
                 _on(bar) if visible else _lines(console, options.quiet),
+                options.overwrite,
             )
         failed = made.query("status == 'failed'")
         for message, count in Counter(failed["message"]).most_common(MESSAGES):
@@ -84,8 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error)
         return FAILED
     except KeyboardInterrupt:
-        complain(f"interrupted: what has finished is in '{out}'; the same command goes on", kind="")
-        raise
+        raise KeyboardInterrupt(f"what has finished is in '{out}'; the same command goes on") from None
     return 0
 
 
@@ -231,6 +231,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--scheduler", metavar="tcp://HOST:PORT", help="run on the workers of this Dask scheduler"
+    )
+    parser.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="also where runs of another campaign would vanish from DIR/runs.parquet",
     )
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(

@@ -244,7 +244,9 @@ def differences(
                 row |= {n: 100.0 * float(np.expm1(x)) for n, x in zip(names, ends, strict=True)}
             rows.append(row)
     if not any(row["pairs"] for row in rows):
-        raise InputError(UNPAIRED.format(axis))
+        failed = int((made["status"] != "done").sum())
+        why = f"{failed} of {len(made)} runs failed, and of no pair both went well"
+        raise InputError(f"--compare {axis}: {why}" if failed else UNPAIRED.format(axis))
     return pandas.DataFrame(rows)
 
 

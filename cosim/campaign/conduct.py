@@ -8,7 +8,7 @@ import platform
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.util import find_spec
@@ -20,16 +20,18 @@ from filelock import FileLock, Timeout
 
 from ..dispatch.job import Job, Row
 from ..dispatch.measured_run import Measured
-from ..dispatch.places import Place, place_for
+from ..dispatch.places import Place, check_address, check_workers, place_for
 from ..dispatch.travelling_files import Files
-from ..errors import InputError
-from ..files import write_json
+from ..errors import InputError, SimulationError
+from ..files import update_json, write_roomy_json
+from ..interrupts import Held
+from ..process.run_state import CAMPAIGN, STATE
 from ..process.scratch import sweep
 from .campaign_file import LoadedCampaign
 from .case_scenarios import CaseScenarios
 from .comparison import StopRule
 from .design import Case, cases
-from .run_table import Journal, keep_log, table, write_table
+from .run_table import JOURNAL, TABLE, Journal, hashes, keep_log, table, write_table
 
 if TYPE_CHECKING:
     import pandas
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
 NEEDED = ("pandas", "pyarrow", "scipy", "distributed")
 SUMMARY = "campaign.json"
 LOCK = ".campaign.lock"
+# Share of the runs that the table may lack while a campaign runs; up to a hundred it lacks none. Chosen:
+# with a million runs all its writing takes a hundredth of the time.
+AGREE = 0.01
 # Receives the number of runs that have ended, failed ones among them, and of all runs.
 Progress = Callable[[int, int, int], None]
 
@@ -50,6 +55,7 @@ def run_campaign(
     stop_when: str | None = None,
     show: Callable[[str], None] = lambda _: None,
     progress: Progress = lambda ended, failed, of: None,
+    overwrite: bool = False,
 ) -> pandas.DataFrame:
     """Run a scenario many times, and give one row for each run.
 
@@ -65,6 +71,7 @@ def run_campaign(
             :class:`cosim.campaign.comparison.StopRule`.
         show: receives notes, a line each.
         progress: receives how many runs have ended, how many of them failed, and how many there are.
+        overwrite: whether runs may vanish from the table of the folder, those of another campaign.
 
     Returns:
         The table: axes, metrics, ``status``, ``message``, ``wall_s`` [s], ``hash``. It is in
@@ -72,10 +79,12 @@ def run_campaign(
 
     Raises:
         InputError: the campaign cannot be run; nothing has run.
-        SimulationError: the workers were lost; what has finished is kept.
+        SimulationError: the workers were lost, or the disk is full; what has finished is kept.
         KeyboardInterrupt: what has finished is kept.
     """
     demand_packages()
+    check_workers(workers)
+    check_address(scheduler)
     loaded = LoadedCampaign(campaign)
     folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
@@ -89,7 +98,10 @@ def run_campaign(
         for note in scenarios.check(every):
             show(f"note: {note}")
         with _only_one(folder), closing(Journal(folder)) as journal:
+            if journal.unread:
+                show(f"note: {journal.unread} lines of '{JOURNAL}' tell of no run: those are made again")
             work = _Work(scenarios, journal, rule.ordered if rule else every, rule, folder)
+            work.recall(overwrite)
             told = {
                 "campaign": loaded.campaign.model_dump(mode="json", exclude_unset=True),
                 "scenario": loaded.base.model_dump(mode="json", by_alias=True, exclude_unset=True),
@@ -128,6 +140,7 @@ class _Work:
         known: those that were asked for so far, with their hashes.
         waiting: how many of them wait for the run of a hash.
         ended, failed: how many of them have ended, and failed.
+        earlier: hashes of the runs that the table had before.
     """
 
     scenarios: CaseScenarios
@@ -139,45 +152,112 @@ class _Work:
     waiting: Counter[str] = field(default_factory=Counter)
     ended: int = 0
     failed: int = 0
+    earlier: set[str] = field(default_factory=set)
+
+    def recall(self, overwrite: bool) -> None:
+        """Find the runs that the folder has.
+
+        Args:
+            overwrite: whether others may vanish from the table.
+
+        Raises:
+            InputError: they would.
+        """
+        self.earlier = hashes(self.folder)
+        if not self.journal.rows and not self.earlier:
+            return
+        pairs = [(case, self.scenarios.job(case).hash) for case in self.cases]
+        gone = self.earlier.difference(hash_ for _, hash_ in pairs)
+        if gone and not overwrite:
+            raise InputError(
+                f"'{self.folder / TABLE}' has {len(self.earlier)} runs, of which this campaign lacks "
+                f"{len(gone)}: they would vanish; give another --out, or --overwrite"
+            )
+        self.known |= {case.number: (case, h) for case, h in pairs if h in self.journal.rows}
 
     def run(
         self, place: Callable[[], Place], told: dict[str, Any], progress: Progress
     ) -> pandas.DataFrame:
-        """Make the runs that are missing, and write the table however that ends."""
-        started, status = time.time(), "failed"
-        jobs = self._missing()
-        first = next(jobs, None)
-        progress(self.ended, self.failed, len(self.cases))
+        """Make the runs that are missing; journal, table and summary agree however that ends."""
+        self.started, self.told = time.time(), told
         try:
-            if first is not None:
-                with closing(place()) as there, closing(there.rows(chain([first], jobs))) as rows:
-                    for job, row in rows:
-                        if row.log:
-                            keep_log(self.folder, job.hash, row.log)
-                        self.journal.add(job.hash, row)
-                        self._count(row, self.waiting.pop(job.hash, 0))
-                        progress(self.ended, self.failed, len(self.cases))
-                        if self._settled():
-                            break
-            status = "done"
-        except KeyboardInterrupt:
-            status = "interrupted"
-            raise
+            write_roomy_json(self.folder / SUMMARY, self.told | self._state("running"))
+            self._keep("running")
         except OSError as error:
-            raise InputError(f"cannot write to '{self.folder}': {error.strerror or error}") from None
-        finally:
-            made = table(self._counted(), self.journal.rows)
-            write_table(self.folder, made)
-            told |= {
-                "status": status,
-                "runs": len(self.cases),
-                "done": int((made["status"] == "done").sum()),
-                "failed": int((made["status"] == "failed").sum()),
-                "stopped": self.rule.verdict(self._row) if self.rule else None,
-                "wall_s": time.time() - started,
-            }
-            write_json(self.folder / SUMMARY, told)
+            raise InputError(self._not_written(error)) from None
+        STATE.write(CAMPAIGN, str(self.folder / SUMMARY))
+        status, message = "failed", ""
+        with ExitStack() as stack:
+            try:
+                jobs = self._missing()
+                first = next(jobs, None)
+                progress(self.ended, self.failed, len(self.cases))
+                if first is not None:
+                    there = stack.enter_context(closing(place()))
+                    rows = stack.enter_context(closing(there.rows(chain([first], jobs))))
+                    self._take(rows, progress)
+                status = "done"
+            except KeyboardInterrupt:
+                status = "interrupted"
+                raise
+            except (InputError, SimulationError) as error:
+                message = str(error)
+                raise
+            except OSError as error:
+                message = self._not_written(error)
+                raise SimulationError(f"{message}; {self.ended} finished runs are kept") from None
+            finally:
+                # Before the place closes, which may take seconds.
+                with Held():
+                    made = self._keep(status, message)
+                    STATE.write(CAMPAIGN, "")
         return made
+
+    def _take(self, rows: Iterator[tuple[Job, Row]], progress: Progress) -> None:
+        for job, row in rows:
+            if row.log:
+                keep_log(self.folder, job.hash, row.log)
+            self.journal.add(job.hash, row)
+            self._count(row, self.waiting.pop(job.hash, 0))
+            if len(self.journal.new) >= max(1.0, AGREE * len(self.journal.rows)):
+                self._keep("running")
+            progress(self.ended, self.failed, len(self.cases))
+            if self._settled():
+                break
+
+    def _keep(self, status: str, message: str = "") -> pandas.DataFrame:
+        """Bring the table to what the journal has, and the summary to both.
+
+        Raises:
+            OSError: the table cannot be written; then the journal is brought to what that has.
+        """
+        made = table(self._counted(), self.journal.rows)
+        try:
+            write_table(self.folder, made)
+            self.journal.agree()
+        except OSError:
+            self.journal.take_back()
+            if status == "running":
+                raise
+        update_json(self.folder / SUMMARY, self.told, self._state(status, message))
+        return made
+
+    def _state(self, status: str, message: str = "") -> dict[str, Any]:
+        """What changes in campaign.json."""
+        rows = [self.journal.rows[h].status for _, h in self._counted() if h in self.journal.rows]
+        done = rows.count("done")
+        return {
+            "status": status,
+            "message": message,
+            "runs": len(self.cases),
+            "done": done,
+            "failed": len(rows) - done,
+            "stopped": self.rule.verdict(self._row) if self.rule else None,
+            "wall_s": time.time() - self.started,
+        }
+
+    def _not_written(self, error: OSError) -> str:
+        return f"cannot write to '{self.folder}': {error.strerror or error}"
 
     def _missing(self) -> Iterator[Job]:
         """The runs that have not finished yet, each once."""
@@ -186,7 +266,7 @@ class _Work:
                 return
             job = self.scenarios.job(case)
             self.known[case.number] = case, job.hash
-            if (row := self.journal.rows.get(job.hash)) is not None:
+            if (row := self.journal.finished(job.hash)) is not None:
                 self._count(row, 1)
                 continue
             self.waiting[job.hash] += 1
@@ -199,15 +279,19 @@ class _Work:
 
     def _row(self, number: int) -> Row | None:
         known = self.known.get(number)
-        return None if known is None else self.journal.rows.get(known[1])
+        return None if known is None else self.journal.finished(known[1])
 
     def _settled(self) -> bool:
         return self.rule is not None and self.rule.satisfied(self._row)
 
     def _counted(self) -> list[tuple[Case, str]]:
-        """The runs of the table: all, or those up to where the difference was known."""
+        """The runs of the table: all, or those until the difference was known, and earlier ones."""
         numbers = self.rule.counted(self._row) if self.rule else None
-        return [pair for n, pair in self.known.items() if numbers is None or n in numbers]
+        return [
+            pair
+            for n, pair in self.known.items()
+            if numbers is None or n in numbers or pair[1] in self.earlier
+        ]
 
 
 class _only_one:  # noqa: N801 - used as a function

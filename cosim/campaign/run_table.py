@@ -6,7 +6,9 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import BaseModel
 
 from ..dispatch.job import Row
 from ..errors import InputError
@@ -24,8 +26,18 @@ LOGS = "logs"
 DIGITS = 16
 
 
+class Told(BaseModel, extra="allow"):
+    """A line of the journal."""
+
+    hash: str
+    status: Literal["done", "failed", "lost"]
+    message: str
+    wall_s: float
+    metrics: dict[str, float]
+
+
 class Journal:
-    """All runs that were ever finished in a folder, one line each, written as each ends.
+    """All runs that ever ended in a folder, one line each, written as each ends.
 
     A process that is killed leaves at worst the beginning of a line, which counts for nothing.
 
@@ -34,6 +46,8 @@ class Journal:
 
     Attributes:
         rows: hash -> what is kept of the run.
+        unread: lines that cannot be read, but for the end of the last one; their runs are made again.
+        new: runs that were written since :meth:`agree`.
 
     Raises:
         InputError: it cannot be read or written.
@@ -41,36 +55,61 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self.rows: dict[str, Row] = {}
+        self.unread = 0
+        self.new: list[str] = []
         path = folder / JOURNAL
         try:
             old = path.read_bytes() if path.exists() else b""
-            for line in old.splitlines():
+            for line in old.splitlines(keepends=True):
                 self._remember(line)
             self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - closed by close()
             if old and not old.endswith(b"\n"):
                 write_all(self._file, b"\n")
+            self._agreed = self._file.tell()
         except OSError as error:
             raise InputError(f"cannot write to '{folder}': {error.strerror}") from None
 
     def _remember(self, line: bytes) -> None:
         try:
-            told = json.loads(line)
-            row = Row(told["status"], told["message"], told["wall_s"], told["metrics"], {})
-            self.rows[told["hash"]] = row
-        except (ValueError, KeyError, TypeError):
+            told = Told.model_validate_json(line, strict=True)
+        except ValueError:
+            self.unread += line.endswith(b"\n")
             return
+        self.rows[told.hash] = Row(told.status, told.message, told.wall_s, told.metrics, {})
+
+    def finished(self, hash_: str) -> Row | None:
+        """What is kept of a run that need not be made again; one that was lost may go well next time."""
+        row = self.rows.get(hash_)
+        return None if row is None or row.status == "lost" else row
 
     def add(self, hash_: str, row: Row) -> None:
-        """A run has ended; one that was lost, which may go well another time, is not written down.
+        """A run has ended.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: it cannot be written; then nothing of it is.
         """
-        self.rows[hash_] = row._replace(log={}, value=None)
-        if row.status != "lost":
-            told = {"hash": hash_, **row._asdict()}
-            del told["log"], told["value"]
+        told = {"hash": hash_, **row._asdict()}
+        del told["log"], told["value"]
+        begun = self._file.tell()
+        try:
             write_all(self._file, (json.dumps(told) + "\n").encode())
+        except OSError:
+            self._file.truncate(begun)
+            raise
+        self.rows[hash_] = row._replace(log={}, value=None)
+        self.new.append(hash_)
+
+    def agree(self) -> None:
+        """The table now has all that was written here."""
+        self._agreed = self._file.tell()
+        self.new.clear()
+
+    def take_back(self) -> None:
+        """Forget what was written since :meth:`agree`: the table cannot have it."""
+        self._file.truncate(self._agreed)
+        for hash_ in self.new:
+            del self.rows[hash_]
+        self.new.clear()
 
     def close(self) -> None:
         self._file.close()
@@ -126,6 +165,16 @@ def _plain(values: list[Any]) -> list[Any]:
     ):
         return values
     return [v if isinstance(v, str) else json.dumps(v) for v in values]
+
+
+def hashes(folder: Path) -> set[str]:
+    """The runs that the table of a folder has; none where no table can be read."""
+    from pyarrow import parquet
+
+    try:
+        return set(parquet.read_table(folder / TABLE, columns=["hash"])["hash"].to_pylist())
+    except (OSError, ValueError, KeyError):
+        return set()
 
 
 def write_table(folder: Path, made: pandas.DataFrame) -> None:

@@ -20,7 +20,7 @@ from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
 from .job import Job, Row, job_of
 from .measured_run import run_in_memory
-from .places import place_for
+from .places import check_workers, place_for
 from .travelling_files import Files
 
 
@@ -131,6 +131,7 @@ def analyse_runs(
         SimulationError: the workers were lost, or one run ended each process that made it.
         Exception: whatever the analysis raises.
     """
+    check_workers(workers)
     places = folders or [None] * len(scenarios)
     several = 0
     if workers != 0 and len(scenarios) > 1:  # one run needs no other process

@@ -11,7 +11,6 @@ from collections.abc import Generator, Iterable
 from contextlib import ExitStack, suppress
 from itertools import islice
 from queue import Empty, Queue
-from tempfile import TemporaryDirectory
 from threading import Thread
 from typing import Any
 
@@ -24,6 +23,7 @@ from distributed import (
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
+from ..process.scratch import Scratch
 from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
 from .job import Job, Row, own_version
@@ -78,7 +78,7 @@ class DaskWorkers:
     def __init__(self, files: Files, address: str | None, workers: int | None) -> None:
         self._files = files
         self._cluster: LocalCluster | None = None
-        self._scratch = TemporaryDirectory(prefix="campaign_", ignore_cleanup_errors=True)
+        self._scratch = Scratch()
         self._program = ExitStack()
         for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
             logging.getLogger(logger).setLevel(logging.CRITICAL)
@@ -94,7 +94,7 @@ class DaskWorkers:
                         host="127.0.0.1",
                         dashboard_address="127.0.0.1:0",  # where Dask tells of its health
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
-                        local_directory=self._scratch.name,
+                        local_directory=str(self._scratch.path),
                         silence_logs=logging.CRITICAL,
                         scheduler_kwargs={"allowed_failures": DEATHS, "dashboard": False},
                     )
@@ -102,10 +102,12 @@ class DaskWorkers:
             else:
                 self._client = Client(address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
-            self._program.close()
-            self._scratch.cleanup()
+            self._close_cluster()
             where = "with processes on this computer" if address is None else f"at '{address}'"
             raise InputError(f"no Dask scheduler answers {where}: {error}") from None
+        except RuntimeError as error:  # of Dask's nannies
+            self._close_cluster()
+            raise SimulationError(f"{LOST} while they started: {error}; {KEPT}") from None
         except BaseException:
             self._close_cluster()
             raise
@@ -221,4 +223,4 @@ class DaskWorkers:
             with suppress(OSError):
                 self._cluster.close()
         self._program.close()
-        self._scratch.cleanup()
+        self._scratch.remove()

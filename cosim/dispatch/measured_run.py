@@ -5,8 +5,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from ..errors import SimulationError
 from ..master.algorithm import Master
@@ -15,6 +13,7 @@ from ..master.loops.chosen_loop import choose_loop
 from ..master.recorder import Recorder
 from ..master.simulation import UPDATE_INTERVAL, simulate
 from ..process.run_state import STATE
+from ..process.scratch import scratch_folder
 from ..results import performance
 from ..results.log import LogInMemory
 from ..scenario.schema import Scenario
@@ -107,11 +106,11 @@ def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -
 
 def _logged(pool: InstancePool, scenario: Scenario) -> Row:
     notes: list[str] = []
-    with TemporaryDirectory(prefix="campaign_") as scratch:
+    with scratch_folder() as scratch:
         result = simulate(scenario, scratch, show=notes.append, pool=pool)
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        log = {file.name: file.read_bytes() for file in Path(scratch).iterdir()}
+        log = {file.name: file.read_bytes() for file in scratch.iterdir()}
     message = result.message
     if result.status == "done" and not result.metrics:
         message = next((n.removeprefix("note: ") for n in notes if "no metrics" in n), "")

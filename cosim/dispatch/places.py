@@ -1,13 +1,16 @@
 """Where runs are made: in this process, or on the workers of a Dask scheduler."""
 
+import re
 from collections.abc import Generator, Iterable
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Protocol
 
+from ..errors import InputError
+from ..process.scratch import Scratch
 from .job import Job, Row
 from .travelling_files import Files, copy_all
 from .workplace import Workplace
+
+ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9a-fA-F:.]+\]|[\w.-]+):\d{1,5}")
 
 
 class Place(Protocol):
@@ -27,8 +30,8 @@ class ThisProcess:
 
     def __init__(self, files: Files) -> None:
         self._files = files
-        self._scratch = TemporaryDirectory(prefix="campaign_")
-        self._work = Workplace(Path(self._scratch.name))
+        self._scratch = Scratch()
+        self._work = Workplace(self._scratch.path)
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
         for job in jobs:
@@ -40,7 +43,29 @@ class ThisProcess:
 
     def close(self) -> None:
         self._work.close()
-        self._scratch.cleanup()
+        self._scratch.remove()
+
+
+def check_address(scheduler: str | None) -> None:
+    """Refuse what is no address of a scheduler.
+
+    Raises:
+        InputError: it is none.
+    """
+    if scheduler is not None and not ADDRESS.fullmatch(scheduler):
+        raise InputError(
+            f"'{scheduler}' is no address of a scheduler: it takes the form tcp://HOST:PORT"
+        )
+
+
+def check_workers(workers: int | None) -> None:
+    """Refuse what is no number of processes.
+
+    Raises:
+        InputError: it is none.
+    """
+    if workers is not None and workers < 0:
+        raise InputError(f"workers = {workers}: needs a whole number from zero on")
 
 
 def place_for(files: Files, scheduler: str | None, workers: int | None) -> Place:

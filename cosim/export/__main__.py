@@ -1,9 +1,9 @@
 """Export a scenario to other tools: ``python -m cosim.export SCENARIO --ssp FILE.ssp``."""
 
 if __name__ == "__main__":
-    from cosim.interrupts import leave_on_interrupt
+    from cosim.watch.watching import watched
 
-    leave_on_interrupt()  # before all other imports, which take a while
+    watched()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

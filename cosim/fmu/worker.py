@@ -13,12 +13,11 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError, SimulationError
+from ..process.spawned import end_with_parent
 from .channel import DONE, FAILED, GET, LOG, MOVE, MOVE_HEAD, PUT, REFUSED, STEP, Channel
 from .fmu_model import Model, Value
 from .local import LocalInstance
 from .memory import Memory, Port
-
-PR_SET_PDEATHSIG = 1  # of Linux' prctl(2)
 
 
 class Worker:
@@ -95,10 +94,9 @@ class Worker:
 def main() -> None:
     """Serve the master, over pipes of its own: whatever the FMU prints goes to standard error."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the master handles Ctrl-C
+    end_with_parent(os.getppid())  # an FMU that hangs would outlive a master that was killed
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)
-        # Without it, an FMU that hangs would outlive a master that was killed.
-        libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
         libc.setlinebuf(ctypes.c_void_p.in_dll(libc, "stdout"))  # as below, for FMUs in C
     channel = Channel(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -48,6 +48,7 @@ class Master:
         self.system = system
         self._pool = pool or InstancePool()
         self._owner = Owner()
+        STATE.steps(system.order)
         self._interrupted = interrupted
         self.messages = Messages(show)
         self._instances: dict[str, Instance] = {}

@@ -136,7 +136,7 @@ def _run(
         show(f"warning: {warning}")
     if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
         raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
-    STATE.begin(str(folder), json.dumps(description), system.order)
+    STATE.begin(str(folder), json.dumps(description))
     with interruptible() as interrupted:
         try:
             master = Master(system, lambda text: show(f"warning: {text}"), interrupted, pool)

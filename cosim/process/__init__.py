@@ -4,8 +4,18 @@ from ..lazy import lazy_names
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
-    from .spawned import without_program
+    from .run_state import STATE
+    from .scratch import scratch_folder
+    from .spawned import end_with_parent, without_program
 
-__all__ = ["without_program"]
+__all__ = ["STATE", "end_with_parent", "scratch_folder", "without_program"]
 
-__getattr__ = lazy_names(__name__, {"without_program": "spawned"})
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "STATE": "run_state",
+        "end_with_parent": "spawned",
+        "scratch_folder": "scratch",
+        "without_program": "spawned",
+    },
+)

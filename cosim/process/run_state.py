@@ -1,8 +1,8 @@
-"""What another process must know of a run whose process has died: its folder, and the last call.
+"""What another process must know of a command whose process has died: its files, and the last call.
 
-The state lies in one block of memory. ``python -m cosim.run`` shares it with the process that watches
-the run (:mod:`cosim.watch`); from Python it is written all the same, which costs less
-than a test whether anybody reads it.
+The state lies in one block of memory. A command shares it with the process that watches it
+(:mod:`cosim.watch`); from Python it is written all the same, which costs less than a test whether
+anybody reads it.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ if TYPE_CHECKING:
 SIZE = 2**26
 # Texts: first byte and most bytes of each. A call is a name and a short text, a folder a path.
 CALL, FOLDER, LAYOUT = (256, 4096), (8192, 8192), (2**15, 2**20)
+CAMPAIGN, UNFINISHED = (2**14, 2**13), (3 * 2**13, 2**13)
 NAMES, DESCRIPTION = (2**21, 2**21), (2**22, 2**22)
 ROWS = (2**23, SIZE - 2**23)  # the rows that are not in the log yet
 LENGTH = struct.Struct("<I")
 # Values of ``numbers[INSTANCE]`` that are no instance.
 NOTHING, NAMED = -1, -2
 # Places in ``numbers``.
-INSTANCE, REQUESTS, ENDED, CODE, LOGGING, TAKEN, STEPS = range(7)
+INSTANCE, REQUESTS, ENDED, CODE, LOGGING, TAKEN, STEPS, HELD = range(8)
 
 
 class RunState:
@@ -37,7 +38,8 @@ class RunState:
             loop is calling, NAMED if the call is the text CALL, or NOTHING; REQUESTS counts the
             interrupts that the watching process has received; ENDED is 1 once the command has ended in
             order, with exit code CODE; LOGGING is 1 once the log is the run's own; TAKEN is the number
-            of rows that wait in ROWS, and STEPS that of the rows before them, both at every base step.
+            of rows that wait in ROWS, and STEPS that of the rows before them, both at every base step;
+            HELD is 1 while interrupts wait.
         watched: whether another process reads it.
     """
 
@@ -81,15 +83,21 @@ class RunState:
             return self._octets[first : first + room], self.numbers
         return memoryview(bytearray(octets)), memoryview(bytearray(64)).cast("i")
 
-    def begin(self, folder: str, description: str, names: Sequence[str]) -> None:
+    def steps(self, names: Sequence[str]) -> None:
+        """From now on the step loop calls these instances, in this order."""
+        self.write(NAMES, "\n".join(names))
+
+    def unfinished(self, *paths: str | os.PathLike[str]) -> None:
+        """Folders to remove if this process dies: the first with all that is in it, others if empty."""
+        self.write(UNFINISHED, "\n".join(os.fspath(path) for path in paths))
+
+    def begin(self, folder: str, description: str) -> None:
         """A run begins.
 
         Args:
             folder: of its results.
             description: what its log.json will say, but for how it ended; JSON.
-            names: of the instances, in the order of stepping.
         """
-        self.write(NAMES, "\n".join(names))
         fits = len(description) * 4 < DESCRIPTION[1]  # bytes of a character, at most
         self.write(DESCRIPTION, description if fits else "{}")
         self.numbers[LOGGING] = 0

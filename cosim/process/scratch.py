@@ -4,7 +4,8 @@ import os
 import re
 import shutil
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -32,6 +33,22 @@ class Scratch:
         with suppress(OSError):  # an FMU has closed it
             self._lock.release()
         shutil.rmtree(self._outer, ignore_errors=True)
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A scratch folder for a block."""
+    scratch = Scratch()
+    try:
+        yield scratch.path
+    finally:
+        scratch.remove()
+
+
+def is_scratch(folder: Path) -> bool:
+    """Whether a folder lies in a scratch folder of some process."""
+    outer = Path(tempfile.gettempdir())
+    return any(p.parent == outer and p.name.startswith(PREFIX) for p in (folder, *folder.parents))
 
 
 def sweep() -> None:

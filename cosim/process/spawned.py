@@ -1,7 +1,9 @@
-"""Processes that are started from a user's program, and do not run it again."""
+"""Processes that are started from a user's program: they do not run it again, and end with it."""
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec
@@ -9,6 +11,22 @@ from importlib.machinery import ModuleSpec
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+PR_SET_PDEATHSIG = 1  # of Linux' prctl(2)
+
+
+def end_with_parent(parent: int) -> None:
+    """Have this process end when the one that has started it is killed (on Linux).
+
+    Args:
+        parent: that process, which may have ended before.
+    """
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:
+            os._exit(1)
 
 
 @contextmanager

@@ -1,7 +1,8 @@
-"""What remains to be done when the simulating process has died: its files, and a line for the user."""
+"""What remains to be done when the working process has died: its files, and a line for the user."""
 
 import json
 import os
+import shutil
 import signal
 from contextlib import suppress
 from pathlib import Path
@@ -10,8 +11,8 @@ from typing import Any
 from ..command import FAILED, INTERRUPTED, complain
 from ..files import update_json, write_json
 from ..interrupts import ignore_interrupts
-from ..process.run_state import DESCRIPTION, FOLDER, LOGGING, STATE
-from ..process.scratch import sweep
+from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LOGGING, STATE, UNFINISHED
+from ..process.scratch import is_scratch, sweep
 from ..results.log import CSV, SIDECAR, cut_to_rows
 from ..results.pending_rows import rescue
 from ..results.result_files import clear_results
@@ -31,7 +32,7 @@ def ending(code: int) -> str:
 
 
 def report(code: int, interrupted: bool) -> int:
-    """Complete the results of a run whose process died, and tell the user.
+    """Complete the results of a command whose process died, and tell the user.
 
     Args:
         code: how it ended; negative for a signal.
@@ -44,20 +45,41 @@ def report(code: int, interrupted: bool) -> int:
     (instance, what), folder = STATE.call(), STATE.read(FOLDER)
     message = f"{instance}: the simulating process died in {what} ({ending(code)})"
     if not instance:
-        message = f"the simulating process died ({ending(code)})"
-    status, rows = "interrupted" if interrupted else "failed", 0
-    if folder:
-        try:
+        message = f"the process of this command died ({ending(code)})"
+    status, kept = "interrupted" if interrupted else "failed", ""
+    try:
+        if folder and not is_scratch(Path(folder)):
             rows, message = _complete(Path(folder), status, message)
-        except OSError as error:
-            message += f"; cannot write to '{folder}': {error.strerror}"
+            kept = f"{rows} rows are kept in '{_shown(folder)}'" if rows else ""
+        if summary := STATE.read(CAMPAIGN):
+            folder, runs = str(Path(summary).parent), _end_campaign(Path(summary), status, message)
+            kept = f"{runs} runs are kept in '{_shown(folder)}'; the same command goes on"
+    except OSError as error:
+        message += f"; cannot write to '{folder}': {error.strerror}"
+    _remove_unfinished()
     sweep()
-    kept = f"{rows} rows are kept in '{_shown(folder)}'" if rows else ""
     if interrupted:
         complain(": ".join(filter(None, ["interrupted", kept])), kind="")
         return INTERRUPTED
     complain("; ".join(filter(None, [message, kept])))
     return FAILED
+
+
+def _end_campaign(summary: Path, status: str, message: str) -> str:
+    """Say in campaign.json how it ended; returns how many runs have ended, of how many."""
+    content = json.loads(summary.read_text(encoding="utf-8"))
+    update_json(summary, content, {"status": status, "message": message})
+    return f"{content['done'] + content['failed']} of {content['runs']}"
+
+
+def _remove_unfinished() -> None:
+    """Remove the folders that the process has made, and would have removed itself."""
+    for k, path in enumerate(filter(None, STATE.read(UNFINISHED).split("\n"))):
+        if k == 0:
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            with suppress(OSError):  # not empty: it has other files
+                os.rmdir(path)
 
 
 def _complete(folder: Path, status: str, message: str) -> tuple[int, str]:

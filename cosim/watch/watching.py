@@ -1,21 +1,21 @@
-"""A process that watches the simulating one: however that ends, the command says so.
+"""A process that watches the working one: however that ends, the command says so.
 
-An FMU in the simulating process can end it without a word: by a crash, or by exit(0), which looks like
+An FMU in the working process can end it without a word: by a crash, or by exit(0), which looks like
 success. The watching process is the one that was started; it forks before the imports, does nothing but
-wait, passes interrupts on, and returns the exit code of the run. It reads what was being called from
-:mod:`cosim.process.run_state`. On systems without fork() there is none.
+wait, passes interrupts on, ends a process that does not follow them, and returns the exit code. It reads
+what was being called from :mod:`cosim.process.run_state`. On systems without fork() there is none.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-import sys
 import time
 from contextlib import suppress
 
 from ..interrupts import SIGNALS, leave_on_interrupt
-from ..process.run_state import CODE, ENDED, INSTANCE, NOTHING, REQUESTS, STATE
+from ..process.run_state import CODE, ENDED, HELD, REQUESTS, STATE
+from ..process.spawned import end_with_parent
 
 TYPE_CHECKING = False  # typing itself takes a while to import
 if TYPE_CHECKING:
@@ -25,12 +25,13 @@ if TYPE_CHECKING:
 # Two interrupts within this wall time [s] are one: ``timeout`` sends its signal to a process and to its
 # group. Chosen: longer than that takes, shorter than between two presses of a key.
 ONE_REQUEST = 0.1
-# Wall time [s] that an FMU may go on after the second interrupt before its process is ended; chosen: the
-# end of a Python FMU, which the interrupt reaches, takes less.
+# Wall time after an interrupt until a process that has not ended in order is killed [s]; chosen: enough
+# for a step and the end of a run, and with what remains to be done a command ends within 2 s.
 GRACE = 1.0
+# Wall time between two looks at a process that is to be ended, while interrupts wait in it [s].
+LOOK = 0.1
 # Signals that would end the watching process and mean nothing to it: an FMU may send them to its parent.
 INDIFFERENT = ("SIGUSR1", "SIGUSR2", "SIGPIPE", "SIGQUIT", "SIGVTALRM", "SIGPROF", "SIGXCPU")
-PR_SET_PDEATHSIG = 1  # of Linux' prctl(2)
 
 
 def watched() -> None:
@@ -54,28 +55,18 @@ def watched() -> None:
     leave_on_interrupt()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
     STATE.keep()
-    _end_with(watching)
+    end_with_parent(watching)
 
 
 def _no_action(number: int, frame: FrameType | None) -> None:
     """Handler that does nothing."""
 
 
-def _end_with(watching: int) -> None:
-    """Have this process end when the watching one is killed."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-        if os.getppid() != watching:
-            os._exit(1)
-
-
 class _Watch:
     """The watching process.
 
     Args:
-        child: the simulating process.
+        child: the working process.
     """
 
     def __init__(self, child: int) -> None:
@@ -86,7 +77,7 @@ class _Watch:
                 signal.signal(getattr(signal, name), signal.SIG_IGN)
 
     def run(self, waited: Sequence[int]) -> None:
-        """Wait for the end of the run, and exit with its code.
+        """Wait for the end of the command, and exit with its code.
 
         Args:
             waited: interrupts, SIGCHLD and SIGALRM; all are blocked.
@@ -98,7 +89,7 @@ class _Watch:
             if number in SIGNALS:
                 self._pass_on(number)
             elif number == signal.SIGALRM:
-                self._end_hanging()
+                self._end_late()
             else:
                 ended, status = os.waitpid(self._child, os.WNOHANG)
         code = STATE.numbers[CODE]
@@ -115,14 +106,14 @@ class _Watch:
             return
         self._last = now
         STATE.numbers[REQUESTS] += 1
-        if STATE.numbers[REQUESTS] > 1:
+        if STATE.numbers[REQUESTS] == 1:
             signal.setitimer(signal.ITIMER_REAL, GRACE)
         self._send(number)
 
-    def _end_hanging(self) -> None:
-        """After the second interrupt: end a process that is still in a call of an FMU."""
-        if STATE.numbers[INSTANCE] == NOTHING:
-            signal.setitimer(signal.ITIMER_REAL, GRACE)
+    def _end_late(self) -> None:
+        """End a process that still runs; while it makes, moves or removes files it may finish that."""
+        if STATE.numbers[HELD]:
+            signal.setitimer(signal.ITIMER_REAL, LOOK)
         else:
             self._send(signal.SIGKILL)
 

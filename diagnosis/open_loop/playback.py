@@ -9,13 +9,13 @@ import importlib
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 import cosim
+from cosim.process import scratch_folder
 from fmus.declare import Component, variables
 from fmus.thrusters.allocation import Allocation
 
@@ -154,13 +154,13 @@ def play(source: Source, loop: Loop, advance: Advance = silent) -> Played:
     """
     notes = [f"samples are not regular: steps of {source.step} s"] if not _regular(source) else []
     loop = replace(loop, observer=_paced(loop, source))
-    with TemporaryDirectory(prefix="replay-") as folder:
-        recording = Path(folder) / "recording.csv"
+    with scratch_folder() as folder:
+        recording = folder / "recording.csv"
         columns = _columns(source, loop)
         _write(recording, source.time, columns)
         content = _scenario(source, loop, str(recording), columns, notes)
         advance(f"replay of {source.name}")
-        result = cosim.simulate(cosim.load_scenario(content), Path(folder) / "out")
+        result = cosim.simulate(cosim.load_scenario(content), folder / "out")
         if result.status == "interrupted":
             raise KeyboardInterrupt
         if result.status != "done":
