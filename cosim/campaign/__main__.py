@@ -85,7 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error)
         return FAILED
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"what has finished is in '{out}'; the same command goes on") from None
+        kept = [f"what has finished is in '{out}'; the same command goes on"] if out.exists() else []
+        raise KeyboardInterrupt(*kept) from None
     return 0
 
 
