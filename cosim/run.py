@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 
 from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, program, run_command
-from .errors import InputError
+from .errors import InputError, SimulationError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
 from .master.simulation import simulate
@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         scenario = _scenario(options)
+        if options.ensemble is not None or options.posterior is not None:
+            return _ensemble(scenario, options, console, show)
         with _progress(console, scenario, options.quiet) as progress:
             result = simulate(
                 scenario,
@@ -62,6 +64,51 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         restore(handlers)
     return EXIT_CODES[result.status]
+
+
+def _ensemble(
+    scenario: Scenario, options: argparse.Namespace, console: Console, show: Callable[[str], None]
+) -> int:
+    """Run the scenario with many ships; returns the exit code."""
+    if options.ensemble is None or options.posterior is None:
+        raise InputError("--ensemble N and --posterior FILE go together")
+    if options.realtime is not None:
+        raise InputError("an ensemble keeps to no wall clock: leave --realtime out")
+    from .campaign.ensemble import run_ensemble, spread  # only now: pandas takes a second to import
+    from .campaign.shown_progress import shown_progress
+
+    folder = Path(options.out or Path("results", f"{scenario.name}_ensemble"))
+    try:
+        with shown_progress(console, options.quiet) as progress:
+            made = run_ensemble(
+                scenario,
+                options.posterior,
+                options.ensemble,
+                folder,
+                options.parameters,
+                options.believe,
+                options.only_own,
+                pictures=not options.no_plots,
+                show=show,
+                progress=progress,
+                overwrite=options.overwrite,
+            )
+    except SimulationError as error:
+        complain(error)
+        return FAILED
+    except KeyboardInterrupt:
+        kept = (
+            [f"what has finished is in '{folder}'; the same command goes on"] if folder.exists() else []
+        )
+        raise KeyboardInterrupt(*kept) from None
+    failed = made.query("status == 'failed'")
+    if len(failed):
+        complain(failed["message"].iloc[0], kind=f"{len(failed)} of {len(made)} members failed: ")
+    if not options.quiet:
+        output = Output(highlight=False)
+        output.print(spread(made))
+        output.print(printable(f"{len(made)} members in {folder}"), soft_wrap=True)
+    return 0
 
 
 def _scenario(options: argparse.Namespace) -> Scenario:
@@ -134,6 +181,12 @@ def _seed(text: str) -> int:
     return int(text)
 
 
+def _members(text: str) -> int:
+    if not text.isdecimal() or int(text) < 2:
+        raise argparse.ArgumentTypeError(f"needs a whole number from two on, not '{text}'")
+    return int(text)
+
+
 def _folder(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("needs the name of a folder")
@@ -147,6 +200,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="examples:  %(prog)s scenarios/ellipse.json\n"
         "           %(prog)s scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           %(prog)s scenarios/ellipse.json --parameters model.ssv\n"
+        "           %(prog)s ellipse --parameters model.ssv --ensemble 50 --posterior posterior.json\n"
         "           %(prog)s theirs.json --only-own\n"
         "           %(prog)s scenarios/ellipse.json --set vessel.m=15 --seed 3\n"
         "           %(prog)s scenarios/ellipse.json --set controller=./mine.fmu\n"
@@ -201,6 +255,18 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="SSP parameter set of the plant that controllers and observers believe; may be given "
         "several times",
+    )
+    parser.add_argument(
+        "--ensemble",
+        type=_members,
+        metavar="N",
+        help="run N ships whose parameters are drawn from --posterior; bands of track and heading",
+    )
+    parser.add_argument(
+        "--posterior",
+        type=Path,
+        metavar="FILE.json",
+        help="mean and covariance of parameters, from python -m diagnosis.learn",
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")

@@ -11,8 +11,18 @@ if TYPE_CHECKING:
     from .campaign_file import campaign_schema
     from .comparison import differences, pareto
     from .conduct import run_campaign
+    from .ensemble import run_ensemble
+    from .posterior import Posterior, read_posterior
 
-__all__ = ["campaign_schema", "differences", "pareto", "run_campaign"]
+__all__ = [
+    "Posterior",
+    "campaign_schema",
+    "differences",
+    "pareto",
+    "read_posterior",
+    "run_campaign",
+    "run_ensemble",
+]
 
 __getattr__ = lazy_names(
     __name__,
@@ -21,5 +31,8 @@ __getattr__ = lazy_names(
         "differences": "comparison",
         "pareto": "comparison",
         "run_campaign": "conduct",
+        "Posterior": "posterior",
+        "read_posterior": "posterior",
+        "run_ensemble": "ensemble",
     },
 )

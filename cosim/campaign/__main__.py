@@ -9,23 +9,20 @@ if __name__ == "__main__":
 
 import argparse
 import os
-import time
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from ..results.performance import METRICS
-from .conduct import Progress as Told
 from .conduct import demand_packages, result_folder, run_campaign
+from .shown_progress import shown_progress
 
 if TYPE_CHECKING:
     import pandas
@@ -36,8 +33,6 @@ USUAL = ("e_pos_rms", "cross_track_rms", "heading_rms", "W", "I_tau_dot")
 # Width that no table reaches [characters].
 WIDE = 10_000
 
-LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal; chosen
-
 # Messages of failed runs that are shown; chosen: the table has all.
 MESSAGES = 3
 
@@ -47,18 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     out = result_folder(options.campaign, options.out)
-    visible = not options.quiet and console.is_terminal
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-    )
     try:
         _check(options)
-        with bar if visible else nullcontext():
+        with shown_progress(console, options.quiet) as progress:
             made = run_campaign(
                 options.campaign,
                 out,
@@ -67,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options.keep_logs,
                 options.stop_when,
                 lambda text: None if options.quiet else console.print(printable(text), markup=False),
-                _on(bar) if visible else _lines(console, options.quiet),
+                progress,
                 options.overwrite,
             )
         failed = made.query("status == 'failed'")
@@ -88,34 +74,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = [f"what has finished is in '{out}'; the same command goes on"] if out.exists() else []
         raise KeyboardInterrupt(*kept) from None
     return 0
-
-
-def _on(bar: Progress) -> Told:
-    task = bar.add_task("runs", total=None)
-
-    def progress(ended: int, failed: int, of: int) -> None:
-        said = f"runs ({failed} failed)" if failed else "runs"
-        bar.update(task, completed=ended, total=of, description=said)
-
-    return progress
-
-
-def _lines(console: Console, quiet: bool) -> Told:
-    """A line every half a minute, where there is no terminal."""
-    started = told = time.monotonic()
-    before: int | None = None  # ended in an earlier call of the command
-
-    def progress(ended: int, failed: int, of: int) -> None:
-        nonlocal told, before
-        now, before = time.monotonic(), ended if before is None else before
-        if quiet or now - told < LINE_EVERY or ended == before:
-            return
-        told = now
-        left = (now - started) * (of - ended) / (ended - before)
-        said = f" ({failed} failed)" if failed else ""
-        console.print(f"{ended} of {of} runs{said}, about {left:.0f} s left", markup=False)
-
-    return progress
 
 
 def _check(options: argparse.Namespace) -> None:

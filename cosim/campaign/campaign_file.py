@@ -134,6 +134,7 @@ class LoadedCampaign:
 
     Args:
         source: path of the file, or the same content as a dict, as if it lay in the working directory.
+        base: the scenario, in place of the one that the file names.
 
     Attributes:
         campaign: what the file says.
@@ -145,7 +146,7 @@ class LoadedCampaign:
             does not have.
     """
 
-    def __init__(self, source: str | Path | dict[str, Any]) -> None:
+    def __init__(self, source: str | Path | dict[str, Any], base: Scenario | None = None) -> None:
         self.folder = Path.cwd() if isinstance(source, dict) else Path(source).resolve().parent
         shown = "campaign" if isinstance(source, dict) else f"'{source}'"
         content = source if isinstance(source, dict) else _read(Path(source))
@@ -155,7 +156,7 @@ class LoadedCampaign:
             raise InputError(_message(error, shown)) from None
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"{shown} cannot be written as JSON: {error}") from None
-        self.base: Scenario = load_scenario(find_scenario(self.campaign.scenario, self.folder))
+        self.base = base or load_scenario(find_scenario(self.campaign.scenario, self.folder))
         dumped = self.base.model_dump(mode="json", by_alias=True, exclude_unset=True)
         taken: dict[tuple[str, ...], str] = {}
         for name, axis in self.campaign.axes.items():

@@ -1,4 +1,4 @@
-"""Pictures of a campaign: metrics against axes, heat maps, box plots over seeds, paired differences."""
+"""Pictures of a campaign: metrics against axes, heat maps, box plots, paired differences, bands."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ UNITS = {metric.name: metric.unit for metric in METRICS}
 MOST_MAPS = 3
 # Resolution [dots per inch] and size of one panel [inch]; taste.
 DPI, PANEL = 110, (4.2, 3.2)
+BANDS_SIZE = (10.0, 5.0)  # of the picture of an ensemble
+CHANNELS = {"x": "north [m]", "y": "east [m]", "psi": "heading [°]"}  # of a member less the mean
 
 
 def draw_campaign(
@@ -136,5 +138,38 @@ def _differences(found: pandas.DataFrame, axis: str, metrics: Sequence[str]) -> 
         panel.set_yticks(places, list(part["value"]), fontsize=7)
         panel.set(title=f"{axis}: less {part['against'].iloc[0]}", ylim=(-0.5, len(part) - 0.5))
         panel.set_xlabel(f"difference of {metric} [{UNITS.get(metric, '')}]")
+        panel.grid(alpha=0.3)
+    return figure
+
+
+def draw_bands(found: pandas.DataFrame, poses: np.ndarray) -> Figure:
+    """Draw an ensemble: its tracks, and how far the members are from their mean against time.
+
+    Args:
+        found: the bands, from :func:`.ensemble.bands`.
+        poses: (members, 3, n), north, east [m] and heading [rad].
+    """
+    figure = Figure(figsize=BANDS_SIZE, dpi=DPI, layout="constrained")
+    panels = figure.subplot_mosaic([["track", name] for name in CHANNELS])
+    track = panels["track"]
+    for member in poses:
+        track.plot(member[1], member[0], color="tab:blue", lw=0.5, alpha=0.3)
+    track.plot(found["y_mean"], found["x_mean"], color="k", lw=1.0, label="mean")
+    track.set(xlabel="east [m]", ylabel="north [m]", title=f"{len(poses)} members")
+    track.set_aspect("equal", "datalim")
+    track.legend(fontsize=7)
+    for name, label in CHANNELS.items():
+        panel, scale = panels[name], np.degrees(1.0) if name == "psi" else 1.0
+        for low, high, shade in ((5, 95, 0.25), (25, 75, 0.45)):
+            ends = (scale * (found[f"{name}_{q}"] - found[f"{name}_mean"]) for q in (low, high))
+            panel.fill_between(
+                found["time"], *ends, color="tab:blue", alpha=shade, lw=0.0, label=f"{high - low} %"
+            )
+        panel.axhline(0.0, color="k", lw=1.0, label="mean")
+        panel.set_ylabel(label)
+    panels["x"].set_title("from the mean")
+    panels["x"].legend(fontsize=7)
+    panels["psi"].set_xlabel("time [s]")
+    for panel in panels.values():
         panel.grid(alpha=0.3)
     return figure

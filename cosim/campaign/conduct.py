@@ -27,6 +27,7 @@ from ..files import update_json, write_roomy_json
 from ..interrupts import Held
 from ..process.run_state import CAMPAIGN, STATE
 from ..process.scratch import sweep
+from ..scenario.schema import Scenario
 from .campaign_file import LoadedCampaign
 from .case_scenarios import CaseScenarios
 from .comparison import StopRule
@@ -56,6 +57,7 @@ def run_campaign(
     show: Callable[[str], None] = lambda _: None,
     progress: Progress = lambda ended, failed, of: None,
     overwrite: bool = False,
+    base: Scenario | None = None,
 ) -> pandas.DataFrame:
     """Run a scenario many times, and give one row for each run.
 
@@ -72,6 +74,7 @@ def run_campaign(
         show: receives notes, a line each.
         progress: receives how many runs have ended, how many of them failed, and how many there are.
         overwrite: whether runs may vanish from the table of the folder, those of another campaign.
+        base: the scenario, in place of the one that the campaign names.
 
     Returns:
         The table: axes, metrics, ``status``, ``message``, ``wall_s`` [s], ``hash``. It is in
@@ -85,7 +88,7 @@ def run_campaign(
     demand_packages()
     check_workers(workers)
     check_address(scheduler)
-    loaded = LoadedCampaign(campaign)
+    loaded = LoadedCampaign(campaign, base)
     folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
         raise InputError(f"'{campaign}' would be overwritten by the results; give another --out")
