@@ -20,7 +20,7 @@ from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Findings
 from .identification.prior import shares as prior_shares
 from .identification.withdrawal import Withdrawn, withdraw
-from .model import Integrals, Model, omega
+from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
 from .progress import Advance, silent
@@ -175,6 +175,8 @@ def diagnose(
             f"too little to learn from: {blocks * BLOCK:g} s with thrusters at work, "
             f"at least {MIN_BLOCKS * BLOCK:g} s are needed"
         )
+    runs = told_apart([*train, *held_out])
+    train, held_out = runs[: len(train)], runs[len(train) :]
     chosen = method(by) if isinstance(by, str) else by
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
     region = OperatingRegion.of(nu)
@@ -185,8 +187,10 @@ def diagnose(
     final = learned.model if learned.effects or refitted else None
     comparison = evaluate(train, start, final, held_out, advance)
     advance("what is left")
-    runs, std = comparison.evaluations, comparison.omega_std
-    remainder = remainder_of(runs, std, comparison.after.regions, learned)
+    # What fails at times of its own in a run held out says nothing of what was learned of others.
+    judged = comparison.evaluations[: len(train) if learned.model.runs else None]
+    std = comparison.omega_std[: len(judged)]
+    remainder = remainder_of(judged, std, comparison.after.regions, learned)
     advance("stability")
     stability = check_stability(learned.model, start, advance, region)
     shares = _shares(learned, start, held_out)
@@ -207,11 +211,18 @@ def diagnose(
 
 
 def _shares(learned: Findings, start: Model, held_out: Sequence[Integrals]) -> list[float]:
-    """Share of the initial sum of squares that each finding explains; axes weighted by noise."""
-    if not held_out:
-        return [min(1.0, max(0.0, f.share)) for f in learned.effects]
-    models = [start, *(f.model for f in learned.effects)]
-    sums = np.array(
-        [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
-    )
-    return [min(1.0, max(0.0, share)) for share in (-np.diff(sums) / sums[0]).tolist()]
+    """Share of the initial sum of squares that each finding explains; axes weighted by noise.
+
+    Of runs held out; of times within a run, which no other run has, by cross-validation.
+    """
+    shares = [f.share for f in learned.effects]
+    if held_out:
+        models = [start, *(f.model for f in learned.effects)]
+        sums = np.array(
+            [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
+        )
+        unseen = (-np.diff(sums) / sums[0]).tolist()
+        shares = [
+            f.share if f.of_runs else share for f, share in zip(learned.effects, unseen, strict=True)
+        ]
+    return [min(1.0, max(0.0, share)) for share in shares]

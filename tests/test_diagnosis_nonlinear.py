@@ -1,10 +1,12 @@
 """What a regression is not linear in: outages by segmentation, shapes of effects from many starts, curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.measured import sail, smoothed
 
-from diagnosis import Model
+from diagnosis import Model, Windows, omega
 from diagnosis.identification.candidates import candidate, covered, model_error
 from diagnosis.identification.multistart import Landscape, best_values
 from diagnosis.identification.segmentation import programmed
@@ -15,9 +17,9 @@ from fmus.effects import STANDARD, effect
 SPANS = [(8.0, 14.0), (25.3, 28.0), (40.0, 52.0)]
 
 
-def times(device, spans):
-    """Intervals as parameters of an outage."""
-    pairs = [(f"{device}_outage_{end}_{k}", t) for k, s in enumerate(spans, 1)
+def times(device, spans, run=""):
+    """Intervals as parameters of an outage, or as their values in one run."""
+    pairs = [(f"{device}_outage_{end}_{k}{run and '@'}{run}", t) for k, s in enumerate(spans, 1)
              for end, t in zip(("start", "end"), s, strict=True)]  # fmt: skip
     return dict(pairs)
 
@@ -30,11 +32,13 @@ def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tm
     base = model_error([w], model)
     (shape,) = candidate([w], model, base, STANDARD[f"{device}_outage"]).shapes
     found = shape.given
-    assert set(found) == set(hidden)
+    assert set(found) == set(times(device, SPANS, "made"))
     assert [*found.values()] == pytest.approx([*hidden.values()], abs=0.3)
     assert np.sqrt(np.mean((base - shape.offset) ** 2)) < 0.1 * np.sqrt(np.mean(base**2))
     write_model(tmp_path / "model.ssv", model.plus(found))
-    assert read_model(tmp_path / "model.ssv").thrusters == pytest.approx(found)
+    again = read_model(tmp_path / "model.ssv")
+    assert again.thrusters == {}
+    assert again.during("made").thrusters == pytest.approx(hidden, abs=0.3)
 
 
 def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure():
@@ -43,6 +47,57 @@ def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure(
         model = Model()
         base = model_error([w], model)
         assert not candidate([w], model, base, STANDARD["bow_outage"]).shapes
+
+
+RUNS = {"a": [(12.0, 18.0), (35.0, 41.0)], "b": [], "c": [(4.0, 9.0), (22.0, 27.0), (44.3, 52.0)]}
+
+
+def in_runs(thrusters):
+    """Windows of a run for each name, with the thrusters that it has there."""
+    made = {
+        name: sail(64.0, thrusters=own, seed=k)[0] for k, (name, own) in enumerate(thrusters.items())
+    }
+    return [integrals(smoothed(replace(run, name=name))) for name, run in made.items()]
+
+
+def test_outages_at_other_times_in_each_run_are_found_where_they_are():
+    data = in_runs({name: times("bow", spans) for name, spans in RUNS.items()})
+    model = Model()
+    base = model_error(data, model)
+    (shape,) = candidate(data, model, base, STANDARD["bow_outage"]).shapes
+    true = times("bow", RUNS["a"], "a") | times("bow", RUNS["c"], "c")
+    assert shape.given == pytest.approx(true, abs=0.3)
+    learned = model.plus(shape.given)
+    assert set(learned.runs) == {"a", "c"}
+    for w in data:
+        left, first = (np.sqrt(np.mean(omega(w, m) ** 2)) for m in (learned, model))
+        assert left < 0.1 * first or w.run.name == "b"
+        assert left < 0.01, "of the run without a failure it is the noise"
+
+
+def test_a_failure_for_good_begins_at_another_time_in_each_run():
+    data = in_runs({"a": {"bow_failure_time": 30.0}, "b": {}, "c": {"bow_failure_time": 15.0}})
+    model = Model()
+    base = model_error(data, model)
+    (shape,) = candidate(data, model, base, STANDARD["bow_failure"]).shapes
+    true = {"bow_failure_time@a": 30.0, "bow_failure_time@c": 15.0}
+    assert shape.given == pytest.approx(true, abs=0.3)
+    assert not candidate(data, model, base, STANDARD["bow_outage"]).shapes
+
+
+def test_times_of_one_run_are_left_out_of_the_predictions_of_others():
+    data = in_runs({name: times("bow", spans) for name, spans in RUNS.items()})
+    model = Model()
+    timed = model.plus(times("bow", RUNS["a"], "a"))
+    runs = [w.smoothed for w in data]
+    together = Windows(runs)
+    with_times, without = (together.residuals(m) for m in (timed, model))
+    of_a = together.run[together.sample_window] == 0
+    assert np.array_equal(with_times[~of_a], without[~of_a])
+    assert np.square(with_times[of_a]).mean() < 0.1 * np.square(without[of_a]).mean()
+    assert with_times[of_a] == pytest.approx(Windows(runs[:1]).residuals(timed.during("a")))
+    for w in data[1:]:
+        assert np.array_equal(omega(w, timed), omega(w, model))
 
 
 def test_what_is_dead_most_of_the_time_is_no_outage():

@@ -9,6 +9,7 @@ from support.planted import bank, dead_bow, gusts, voyages
 
 import diagnosis
 from diagnosis import Model, Run, integrals, omega
+from diagnosis.assessment.evaluation import evaluate_run
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import axis_remainders
@@ -19,6 +20,7 @@ from diagnosis.identification.map_regression import Scored, first_share
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.withdrawal import withdraw
 from diagnosis.model.correlation import correlated_windows
+from diagnosis.model.ship_model import of_one_run
 from diagnosis.model.uncertainty import omega_std
 from diagnosis.report import diagnosis_content
 
@@ -158,11 +160,27 @@ def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     (effect,) = found.learned.effects
     assert effect.id == "bow_outage"
     assert effect.confidence > 0.9
-    ends = sorted(effect.values.values())
-    assert ends == pytest.approx([11.0, 15.0, 40.0, 48.0, 71.0, 75.0, 100.0, 108.0], abs=0.3)
+    assert effect.of_runs == ["run0", "run1"]
+    true = [11.0, 15.0, 40.0, 48.0, 71.0, 75.0, 100.0, 108.0]
+    for run in effect.of_runs:
+        ends = sorted(of_one_run(effect.values, run).values())
+        assert ends == pytest.approx(true, abs=1.0), "where little is commanded, little is known"
+        assert np.median(np.abs(np.subtract(ends, true))) < 0.2
     assert not found.remainder.significant
-    for e in found.comparison.evaluations:
+    *trained, held_out = found.comparison.evaluations
+    for e in trained:
         assert e.after.position < 0.5 * e.before.position
+    timeless = evaluate_run(held_out.integrals, replace(found.learned.model, runs={})).before
+    assert np.array_equal(held_out.after.residuals, timeless.residuals), "it has none of their times"
+    assert found.shares[0] > 0.5, "of its own runs"
+    assert found.withdrawn == []
+    content = diagnosis_content(found, None, [])
+    (told,) = content.effects
+    assert told.sentence.startswith("Run run0: The bow thruster is dead from 1")
+    assert "Run run1: The bow" in told.sentence
+    runs = {name: c.run for name, c in told.coefficients.items()}
+    assert runs["bow_outage_start_1"] == "run0"
+    assert runs["bow_outage_start_1@run1"] == "run1"
 
 
 def finding(start, **values):

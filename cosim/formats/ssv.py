@@ -12,8 +12,9 @@ from ..files import write_text
 from ..fmu.archive_check import check_xml, real
 from .namespaces import SSC, SSV
 
-# Type of the annotation that holds values of this project; the standard leaves annotations to the tools.
-BESIDE = "cybership.beside"
+# Types of annotations that hold values of this project; the standard leaves annotations to the tools.
+BESIDE, RUN = "cybership.beside", "cybership.run"
+Values = Mapping[str, Mapping[str, "Parameter"]]  # model name -> parameter -> value
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,21 @@ class ParameterSet:
         units: name -> exponents of the SI base units, rad, factor, offset, by the names of the standard.
         beside: values of the model that are no parameter of an FMU, so that no tool applies them.
         name: of the set.
+        runs: measured run -> values that hold in it alone. Those of the first run stand in ``values``,
+            too, where nothing else does, so that a tool that knows no measured runs can apply them.
     """
 
-    values: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
+    values: Values = field(default_factory=dict)
     units: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     beside: Mapping[str, Parameter] = field(default_factory=dict)
     name: str = "parameters"
+    runs: Mapping[str, Values] = field(default_factory=dict)
+
+    @property
+    def of_one_run(self) -> dict[str, list[str]]:
+        """Model name -> parameters in ``values`` that were found in the first of the runs."""
+        first = next(iter(self.runs.values()), {})
+        return {m: [n for n in v if first.get(m, {}).get(n) == v[n]] for m, v in self.values.items()}
 
     def unit(self, name: str) -> Unit:
         """A unit that a value of this set states."""
@@ -96,6 +106,24 @@ def read_parameters(path: Path) -> ParameterSet:
         raise InputError(f"'{path}' cannot be read as a parameter set: {error}") from None
     if root.tag != f"{{{SSV}}}ParameterSet":
         raise InputError(f"'{path}' is not an SSP 1.0 parameter set")
+    values = _values(root, path)
+    units = {
+        entry.get("name", ""): _exponents(base, f"'{path}': unit '{entry.get('name', '')}'")
+        for entry in root.iterfind(f"{{{SSV}}}Units/{{{SSC}}}Unit")
+        for base in entry.iterfind(f"{{{SSC}}}BaseUnit")
+    }
+    own = f"{{{SSV}}}Annotations/{{{SSC}}}Annotation"
+    entries = root.iterfind(f"{own}[@type='{BESIDE}']/{{{SSV}}}Parameters/*")
+    beside = {e.get("name", ""): _parameter(e, f"'{path}': {e.get('name')}") for e in entries}
+    sets = root.iterfind(f"{own}[@type='{RUN}']/{{{SSV}}}ParameterSet")
+    runs = {s.get("name", ""): _values(s, path) for s in sets}
+    if "" in runs:
+        raise InputError(f"'{path}' has values of a run without a name")
+    return ParameterSet(values, units, beside, root.get("name", ""), runs)
+
+
+def _values(root: Element, path: Path) -> dict[str, dict[str, Parameter]]:
+    """The values of an element ``ParameterSet``."""
     values: dict[str, dict[str, Parameter]] = {}
     for entry in root.iterfind(f"{{{SSV}}}Parameters/{{{SSV}}}Parameter"):
         name = entry.get("name", "")
@@ -105,14 +133,7 @@ def read_parameters(path: Path) -> ParameterSet:
         if parameter in values.setdefault(model, {}):
             raise InputError(f"'{path}': {name} stands there twice")
         values[model][parameter] = _parameter(entry, f"'{path}': {name}")
-    units = {
-        entry.get("name", ""): _exponents(base, f"'{path}': unit '{entry.get('name', '')}'")
-        for entry in root.iterfind(f"{{{SSV}}}Units/{{{SSC}}}Unit")
-        for base in entry.iterfind(f"{{{SSC}}}BaseUnit")
-    }
-    own = f"{{{SSV}}}Annotations/{{{SSC}}}Annotation[@type='{BESIDE}']/{{{SSV}}}Parameters/*"
-    beside = {e.get("name", ""): _parameter(e, f"'{path}': {e.get('name')}") for e in root.iterfind(own)}
-    return ParameterSet(values, units, beside, root.get("name", ""))
+    return values
 
 
 def _parameter(entry: Element, where: str) -> Parameter:
@@ -151,20 +172,27 @@ def write_parameters(path: Path, content: ParameterSet) -> None:
     ElementTree.register_namespace("ssv", SSV)
     ElementTree.register_namespace("ssc", SSC)
     root = Element(f"{{{SSV}}}ParameterSet", version="1.0", name=content.name)
-    _write_entries(
-        root, {f"{m}.{p}": value for m, found in content.values.items() for p, value in found.items()}
-    )
+    _write_entries(root, _named(content.values))
     if content.units:
         units = SubElement(root, f"{{{SSV}}}Units")
         for name, own in content.units.items():
             unit = SubElement(units, f"{{{SSC}}}Unit", name=name)
             SubElement(unit, f"{{{SSC}}}BaseUnit", {key: f"{value:.17g}" for key, value in own.items()})
-    if content.beside:
+    if content.beside or content.runs:
         annotations = SubElement(root, f"{{{SSV}}}Annotations")
-        _write_entries(SubElement(annotations, f"{{{SSC}}}Annotation", type=BESIDE), content.beside)
+        if content.beside:
+            _write_entries(SubElement(annotations, f"{{{SSC}}}Annotation", type=BESIDE), content.beside)
+        for run, values in content.runs.items():
+            own = SubElement(annotations, f"{{{SSC}}}Annotation", type=RUN)
+            within = SubElement(own, f"{{{SSV}}}ParameterSet", version="1.0", name=run)
+            _write_entries(within, _named(values))
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _named(values: Values) -> dict[str, Parameter]:
+    return {f"{m}.{p}": value for m, found in values.items() for p, value in found.items()}
 
 
 def _write_entries(parent: Element, entries: Mapping[str, Parameter]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ..errors import InputError, nearest
@@ -55,6 +55,7 @@ def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
                 f"'{path}': {name} = {beside.value} {beside.unit or ''} is no parameter of an FMU "
                 f"and has no effect here: {beside.description}"
             )
+        system.warnings += [f"'{path}': {text}" for text in _of_one_run(given)]
         for model_name in given.values:
             targets = [n for n, model in system.models.items() if model.name == model_name]
             if not targets:
@@ -71,6 +72,18 @@ def _merge_parameters(system: System, overrides: Overrides) -> Chosen:
                         )
                     chosen[name][parameter] = (value, f"'{path}'")
     return chosen
+
+
+def _of_one_run(given: ParameterSet) -> Iterator[str]:
+    """Which values of a parameter set were found in one measured run and hold for it alone."""
+    for model, names in given.of_one_run.items():
+        if names:
+            first, *others = (f"'{run}'" for run in given.runs)
+            more = f"; what was found in {', '.join(others)} is not used" if others else ""
+            called = " … ".join(dict.fromkeys((names[0], names[-1])))
+            verb = "was" if len(names) == 1 else "were"
+            holds = "holds" if len(names) == 1 else "hold"
+            yield f"{model}.{called} {verb} found in run {first} and {holds} for that run alone{more}"
 
 
 def _from_table(system: System, name: str) -> dict[str, tuple[Value, str]]:

@@ -7,7 +7,6 @@ coefficients has one shape; any other has several, one for each value tried of w
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 
 import numpy as np
 
@@ -16,14 +15,11 @@ from fmus.effects.effect import EACH_VSP
 
 from ..model import Integrals, Model, omega
 from .multistart import Landscape, best_values
-from .segmentation import FLOOR, Interval, intervals, problem
+from .segmentation import FLOOR, intervals, problem
 
 SMALL = (
     1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
 )
-# Values at which a failure's time is tried [1]: long runs must not take more memory.
-CHANGE_POINTS = 150
-CLOSEST = 5.0  # s, between two of them: the model error is an average over 3 s
 # A nonlinear effect without values of its own is tried at these multiples of the value at which its
 # force is as large as the model error, found between the smallest and the largest in steps of ten.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
@@ -84,11 +80,6 @@ def shape(
     return Shape(dict(given), list(fitted), base - start if given else None, stacked)
 
 
-def spacing(data: Sequence[Integrals]) -> float:
-    """Time between two change points [s] that are tried."""
-    return max(CLOSEST, float(max(w.run.time[-1] for w in data)) / CHANGE_POINTS)
-
-
 def covered(columns: np.ndarray) -> np.ndarray:
     """(p,), which nodes of a curve the data reach, and those between them.
 
@@ -137,18 +128,9 @@ def values_to_try(
     data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
 ) -> list[Mapping[str, float]]:
     """The values at which a nonlinear effect is tried."""
-    times = e.search.change_points
     declared = e.search.values(model.values)
     if e.search.intervals:
         return with_intervals(data, model, base, e)
-    if times:
-        # Of several times as many as there would be of one.
-        share = CHANGE_POINTS ** (1.0 - 1.0 / len(times))
-        every = spacing(data) * share
-        last = max(w.run.time[-1] for w in data)
-        instants = np.arange(every, last, every).tolist()
-        chosen = [dict(zip(times, at, strict=True)) for at in combinations(instants, len(times))]
-        return [{**at, **more} for at in chosen for more in declared or [{}]]
     if declared or e.differentiable:
         return declared
     return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
@@ -191,21 +173,15 @@ def with_intervals(
 ) -> list[Mapping[str, float]]:
     """The intervals in which an effect seems to act, as additions to a model; none: no values.
 
-    A single one without an end is the effect that lasts, if there is such.
+    A single one without an end in each run that has any is the effect that lasts, if there is such.
     """
     p = problem(data, model, base, e)
     spans = [] if p is None else intervals(p)
     if p is None or not spans or not p.passing(spans):
         return []
-    if e.search.lasting and len(spans) == 1 and spans[0][1] == p.count:
+    if e.search.lasting and p.without_end(spans):
         return []
-    return [additions(model, e, named(e, p.seconds(spans)))]
-
-
-def named(e: Effect, found: Sequence[Interval]) -> dict[str, float]:
-    """Intervals [s] by the names of an effect's parameters."""
-    pairs = zip(e.search.intervals, found, strict=False)
-    return {name: time for names, times in pairs for name, time in zip(names, times, strict=True)}
+    return [p.values(spans)]
 
 
 def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str, float]:

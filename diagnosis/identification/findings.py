@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..model import Model
+from ..model.ship_model import parameter_and_run
 from .confidence import Evidence
 
 
@@ -39,7 +40,7 @@ class Finding:
 
     Attributes:
         id: of the effect.
-        values: its parameters as additions to the nominal ones.
+        values: its parameters as additions to the nominal ones; named ``parameter@run`` if of one run.
         ci95: interval of each that is fitted, at the final step.
         confidence: probability that it is a true cause; NaN where a method has none.
         alike: ids that these data cannot tell from it, itself not among them.
@@ -58,6 +59,12 @@ class Finding:
     share: float
     model: Model = field(default_factory=Model)
     evidence: Evidence | None = None
+
+    @property
+    def of_runs(self) -> list[str]:
+        """The runs in which alone it holds, such as times of failures; none: it holds in all."""
+        runs = (parameter_and_run(name)[1] for name in self.values)
+        return [*dict.fromkeys(run for run in runs if run)]
 
 
 @dataclass(frozen=True, eq=False)

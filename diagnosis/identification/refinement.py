@@ -7,10 +7,10 @@ With the model error r(theta) in units of the noise, the cost is
 P the prior precision of all parameters about their prior means. A step solves
 (J^T J + P) delta = J^T r - P theta, halved while the cost does not fall. The slopes J by the nuisance
 parameters hardly change on the way and are taken once; those of a new effect anew at each step.
-Change points have no slope: they are searched around their first guess.
+Times within a run have no slope: they are found by segmentation, anew at each fit of all else.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -20,20 +20,18 @@ from fmus.effects import Effect
 from fmus.ship import Ship
 
 from ..model import Integrals, Model
+from ..model.ship_model import parameter_and_run
 from ..model.weak_form import OVERLAP
-from .candidates import SMALL, Shape, model_error, named, spacing
+from .candidates import SMALL, Shape, model_error
 from .gram import Nuisance
 from .map_regression import RIDGE
 from .prior import NominalPrior
-from .segmentation import LIKELY, likely, problem, segmented
+from .segmentation import likely, problem, segmented
 
 STEPS = 5  # of Gauss-Newton, at the most
 ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
 SMALLEST_SCALE = 1e-2  # of a parameter, by which the step of its finite difference is scaled
 HALVINGS = (1.0, 0.5, 0.25)
-# Steps [s] by which a change point is searched, the last a few samples of a slow measurement.
-CHANGE_POINT_STEPS = (1.0, 0.2)
-REACH = 5  # of these steps to both sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +88,7 @@ class Estimate:
     @property
     def fitted(self) -> list[str]:
         """Those values that are fitted by slopes."""
-        searched = change_points(self.start.ship)
-        return [n for n in self.values if n not in searched]
+        return [n for n in self.values if timed(self.start.ship, n) is None]
 
     def without(self, names: Collection[str]) -> "Estimate":
         """The estimate without the values of some effects."""
@@ -107,9 +104,10 @@ class Estimate:
         return replace(self, values=within, offset=self.offset + offset)
 
 
-def change_points(ship: Ship) -> frozenset[str]:
-    """Parameters of a ship's effects that are times within a run."""
-    return frozenset(n for e in ship.effects.values() for n in e.search.times)
+def timed(ship: Ship, name: str) -> Effect | None:
+    """The effect of a ship that a value is a time within a run of; None: it is none."""
+    parameter, _ = parameter_and_run(name)
+    return next((e for e in ship.effects.values() if parameter in e.search.times), None)
 
 
 def bounded(start: Model, name: str, addition: float) -> float:
@@ -192,10 +190,8 @@ def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refin
         along: nuisance parameters, from :func:`nuisance`.
         start: of the new effect.
     """
-    if change_points(at.start.ship) & set(start.values):
-        several = owner(at.start.ship, start.values).search.intervals
-        return (_with_intervals if several else _with_change_points)(t, at, along, start)
-    return _gauss_newton(t, at, along, start)
+    e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
+    return _gauss_newton(t, at, along, start) if e is None else _with_intervals(t, at, along, start, e)
 
 
 def refit(t: TrainingSet, at: Estimate, along: Nuisance) -> Refined:
@@ -242,35 +238,8 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
     return best
 
 
-def _with_change_points(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
-    """The same with the change points searched one after the other around their first guess [s]."""
-    names = [n for n in start.values if n in change_points(at.start.ship)]
-    least = CHANGE_POINT_STEPS[-1]
-
-    def tried(times: Mapping[str, float]) -> Refined:
-        later = {n: max(time, least) for n, time in times.items()}
-        return _gauss_newton(t, at, along, replace(start, values={**start.values, **later}))
-
-    found = tried({n: start.values[n] for n in names})
-    coarse = spacing(t.data) / REACH
-    sizes = (coarse, *CHANGE_POINT_STEPS) if coarse > CHANGE_POINT_STEPS[0] else CHANGE_POINT_STEPS
-    every: dict[str, list[Refined]] = {n: [found] for n in names}
-    for size in sizes:
-        for name in names:
-            times = {n: found.estimate.values[n] for n in names}
-            around = [tried({**times, name: times[name] + k * size}) for k in range(-REACH, REACH + 1)]
-            every[name] += around
-            found = min([found, *around], key=lambda r: r.cost)
-    intervals = {}
-    for name, trials in every.items():
-        likely = [r.estimate.values[name] for r in trials if r.cost < found.cost + LIKELY]
-        intervals[name] = (min(likely) - least, max(likely) + least)
-    return replace(found, intervals=intervals)
-
-
-def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
-    """The same with the intervals found anew at each fit of all else, until they stay."""
-    e = owner(at.start.ship, start.values)
+def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start, e: Effect) -> Refined:
+    """The same with the intervals of an effect found anew at each fit of all else, until they stay."""
     found = _gauss_newton(t, at, along, start)
     present, p = dict(start.values), None
     for _ in range(STEPS):
@@ -283,27 +252,13 @@ def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start)
         if whole is None:
             break
         p = whole.weighted(np.asarray(t.sigma))
-        spans = p.cells(intervals_of(e, present))
+        spans = p.spans(present)
         better = segmented(p, spans)
         if not better or not p.passing(better) or p.cost(better) > p.cost(spans) - ENOUGH:
             break
-        present = named(e, p.seconds(better))
+        present = p.values(better)
         found = _gauss_newton(t, at, along, replace(start, values=present))
-    if p is None:
-        return found
-    ends = likely(p, p.cells(intervals_of(e, present)))
-    return replace(found, intervals=dict(zip(present, ends, strict=True)))
-
-
-def intervals_of(e: Effect, values: Mapping[str, float]) -> list[tuple[float, float]]:
-    """The intervals [s] among the values of an effect."""
-    return [(values[a], values[b]) for a, b in e.search.intervals if a in values]
-
-
-def owner(ship: Ship, values: Iterable[str]) -> Effect:
-    """The effect of a ship that some times within a run are of."""
-    names = set(values)
-    return next(e for e in ship.effects.values() if names & {*e.search.times})
+    return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
 
 
 def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:

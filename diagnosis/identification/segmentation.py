@@ -12,19 +12,24 @@ some n places chance finds one at which the sum falls by 2 log n, no more for an
 With b held and windows taken as independent, dynamic programming gives the least sum (Auger and Lawrence
 1989; with a charge for each change Killick, Fearnhead and Eckley 2012). Then b is fitted, and so on; at
 the end the change points are moved one by one while the exact sum falls.
+
+Each run has intervals of its own: its cells follow those of the run before, and no interval lies in two.
 """
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csc_matrix, csr_matrix, diags, vstack
+from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, vstack
 
 from fmus.effects import Effect
 
 from ..model import Integrals, Model
+from ..model.ship_model import of_run
 from ..model.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
 
 # s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
@@ -46,37 +51,62 @@ Along = tuple[np.ndarray, np.ndarray, np.ndarray]
 Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
 
 
+class Section(NamedTuple):
+    """The cells of one run.
+
+    Attributes:
+        run: its name.
+        first: time at which the cells begin [s].
+        start, end: the first cell, and that after the last.
+        names: start and end of each interval that it may have; of one that lasts the end is empty.
+    """
+
+    run: str
+    first: float
+    start: int
+    end: int
+    names: Sequence[tuple[str, str]]
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A model error that intervals without thrust may explain.
 
     Attributes:
-        first, cell: time at which the cells begin, and how long each is [s].
+        sections: of the runs.
+        lasting: whether an interval has no end but that of its run.
+        cell: how long each cell is [s].
         y: (3 K,), model error.
         columns: (3 K, m), what each cell of a dead thruster adds to it.
-        count: m, number of cells.
-        bins: (K,), number of the EVERY seconds in which the middle of each window lies.
+        middles: (K,), cell, and part of it, in which the middle of each window lies.
         along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
         precision, offset: (q, q) and (q,), of the nuisance parameters.
-        most: intervals, at the most.
         work: (m,), share of the time in which the thruster is commanded, in each cell.
     """
 
-    first: float
+    sections: Sequence[Section]
+    lasting: bool
     cell: float
     y: np.ndarray
     columns: csc_matrix
-    count: int
-    bins: np.ndarray
+    middles: np.ndarray
     along: np.ndarray
     precision: np.ndarray
     offset: np.ndarray
-    most: int
     work: np.ndarray
 
     def passing(self, spans: Spans) -> bool:
         """Whether the thruster works for at least half of the time for which it is commanded."""
-        return sum(float(self.work[a:b].sum()) for a, b in spans) <= EXCEPTION
+        return self.lasting or sum(float(self.work[a:b].sum()) for a, b in spans) <= EXCEPTION
+
+    def without_end(self, spans: Spans) -> bool:
+        """Whether there is one interval in each run at the most, and it lasts to the end of the run."""
+        runs = [self.section(a).run for a, _ in spans]
+        return len(set(runs)) == len(runs) and all(b == self.section(a).end for a, b in spans)
+
+    def section(self, cell: int) -> Section:
+        """The section that a cell lies in."""
+        return next(s for s in self.sections if cell < s.end)
 
     @property
     def charge(self) -> float:
@@ -89,19 +119,45 @@ class Problem:
         columns = csc_matrix(diags(weight) @ self.columns)
         return replace(self, y=weight * self.y, columns=columns, along=weight[:, None] * self.along)
 
-    def seconds(self, spans: Spans) -> list[Interval]:
-        """Intervals in seconds."""
-        at = np.round(self.first + self.cell * np.array(spans).reshape(-1, 2), DECIMALS)
-        return [(a, b) for a, b in at.tolist()]
+    def keys(self, spans: Spans) -> list[tuple[str, str]]:
+        """Names of the values that are start and end of each interval; of an end that is none: empty."""
+        used: Counter[str] = Counter()
+        found = []
+        for a, _ in spans:
+            s = self.section(a)
+            start, end = s.names[used[s.run]]
+            found.append((of_run(start, s.run), end and of_run(end, s.run)))
+            used[s.run] += 1
+        return found
 
-    def cells(self, intervals: Sequence[Interval]) -> Spans:
-        """Intervals in cells."""
-        edges = np.clip(np.round((np.array(intervals) - self.first) / self.cell), 0, self.count)
-        return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    def seconds(self, s: Section, cell: int) -> float:
+        """Time [s] in a run; where 0 would mean that an effect never begins, a cell later."""
+        time = round(s.first + self.cell * (cell - s.start), DECIMALS)
+        return max(time, self.cell) if self.lasting else time
+
+    def values(self, spans: Spans) -> dict[str, float]:
+        """Intervals as values [s] of the effect's parameters, each in its run."""
+        return {
+            key: self.seconds(self.section(span[0]), cell)
+            for span, pair in zip(spans, self.keys(spans), strict=True)
+            for cell, key in zip(span, pair, strict=True)
+            if key
+        }
+
+    def spans(self, values: Mapping[str, float]) -> Spans:
+        """The intervals among the values [s] of the effect's parameters."""
+        found = []
+        for s in self.sections:
+            for start, end in ((of_run(a, s.run), of_run(b, s.run)) for a, b in s.names):
+                if start in values:
+                    times = values[start], values.get(end, np.inf)
+                    a, b = (min((t - s.first) / self.cell, s.end - s.start) for t in times)
+                    found.append((s.start + max(round(a), 0), s.start + round(b)))
+        return found
 
     def left(self, spans: Spans) -> np.ndarray:
         """(3 K,), model error without what the intervals add to it."""
-        dead = np.zeros(self.count)
+        dead = np.zeros(self.work.size)
         for a, b in spans:
             dead[a:b] = 1.0
         return self.y - self.columns @ dead
@@ -122,8 +178,8 @@ class Problem:
         return cho_factor(H + RIDGE * np.diag(np.diag(H) + 1.0))
 
     def cost(self, spans: Spans) -> float:
-        """What is minimised; an end beyond the data is no change point."""
-        points = sum(1 + (b < self.count) for _, b in spans)
+        """What is minimised; an end beyond the data of a run is no change point."""
+        points = sum(1 + (b < self.section(a).end) for a, b in spans)
         return self.fitted(self.left(spans))[1] + self.charge * points
 
 
@@ -137,14 +193,22 @@ def segmented(p: Problem, start: Spans | None = None) -> Spans:
         # With b held where it is: the error were there no interval, and what it falls by in each window.
         before = p.fitted(left)[0] + p.y - left
         gain = (2.0 * before * whole - whole**2).reshape(-1, 3).sum(axis=1)
-        gained = np.bincount(p.bins, gain, int(p.cell * p.count / EVERY))
-        bins = programmed(gained, p.charge, p.most)
-        found = moved(p, p.cells([(p.first + EVERY * a, p.first + EVERY * b) for a, b in bins]))
+        found = moved(p, [span for s in p.sections for span in programmed_in(p, s, gain)])
         cost = p.cost(found)
         if cost > least - 1e-6:
             break
         best, least = found, cost
     return best
+
+
+def programmed_in(p: Problem, s: Section, gain: np.ndarray) -> Iterator[tuple[int, int]]:
+    """The intervals of one run that gain the most, by what each window (K,) gains inside of one."""
+    size = EVERY / p.cell  # cells in a bin
+    inside = (p.middles >= s.start) & (p.middles < s.end)
+    place = ((p.middles[inside] - s.start) / size + 1e-6).astype(int)
+    gained = np.bincount(place, gain[inside], int((s.end - s.start) / size))
+    for a, b in programmed(gained, p.charge, len(s.names), p.lasting):
+        yield s.start + round(a * size), s.end if b == gained.size else s.start + round(b * size)
 
 
 def intervals(p: Problem) -> Spans:
@@ -165,15 +229,18 @@ def intervals(p: Problem) -> Spans:
     return spans
 
 
-def programmed(gain: np.ndarray, charge: float, most: int) -> Spans:
+def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False) -> Spans:
     """Intervals of bins that gain the most, less a charge for each change, by dynamic programming.
 
     Args:
         gain: (B,), of each bin inside an interval.
         charge: of each change point; the end of the data is none.
         most: intervals, at the most.
+        lasting: whether an interval has no end but that of the data.
     """
-    states = 2 * most + 1  # number of changes so far: the thruster is dead in those that are odd
+    states = 1 + most * (
+        2 - lasting
+    )  # number of changes so far: the thruster is dead in those that are odd
     dead = np.arange(states) % 2
     total = np.full(states, np.inf)
     total[0] = 0.0
@@ -196,15 +263,16 @@ def programmed(gain: np.ndarray, charge: float, most: int) -> Spans:
 def around(p: Problem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
     """The intervals with an end of the k-th moved, without it, or with it and the next made one."""
     (a, b), before, after = spans[k], spans[:k], spans[k + 1 :]
-    low = before[-1][1] if before else 0
-    high = after[0][0] if after else p.count
+    section = p.section(a)
+    low = max(section.start, before[-1][1] if before else 0)
+    high = min(section.end, after[0][0] if after else section.end)
     for step in (-size, size):
         if low <= a + step < b:
             yield [*before, (a + step, b), *after]
-        if a < b + step <= high:
+        if a < b + step <= high and not p.lasting:
             yield [*before, (a, b + step), *after]
     yield before + after
-    if after:
+    if after and after[0][1] <= section.end:
         yield [*before, (a, after[0][1]), *after[1:]]
 
 
@@ -224,11 +292,12 @@ def moved(p: Problem, spans: Spans) -> Spans:
     return spans
 
 
-def likely(p: Problem, spans: Spans) -> list[Interval]:
-    """95 % intervals of all change points [s], start and end in turn, each with the others held."""
-    least, found = p.cost(spans) + LIKELY, []
-    for k, span in enumerate(spans):
-        for end in (0, 1):
+def likely(p: Problem, spans: Spans) -> dict[str, Interval]:
+    """95 % intervals of all change points [s] by their names, each with the others held."""
+    least, found = p.cost(spans) + LIKELY, {}
+    for k, (span, pair) in enumerate(zip(spans, p.keys(spans), strict=True)):
+        section = p.section(span[0])
+        for end, key in enumerate(pair):
             reached = []
             for step in (-1, 1):
                 place = span[end]
@@ -236,12 +305,13 @@ def likely(p: Problem, spans: Spans) -> list[Interval]:
                     there = [*span]
                     there[end] = place + step
                     trial = [*spans[:k], (there[0], there[1]), *spans[k + 1 :]]
-                    fits = 0 <= there[0] < there[1] <= p.count
+                    fits = section.start <= there[0] < there[1] <= section.end
                     if not fits or p.cost(trial) > least:
                         break
                     place += step
-                reached.append(p.first + p.cell * (place + step))
-            found.append((reached[0], reached[1]))
+                reached.append(p.seconds(section, place + step))
+            if key:
+                found[key] = (reached[0], reached[1])
     return found
 
 
@@ -261,39 +331,48 @@ def problem(
         e: the effect.
         along: columns (K, 3, q), prior precision and offset of nuisance parameters; None: none.
     """
-    first = max(0.0, min(float(w.run.time[0]) for w in data))
-    last = max(float(w.run.time[-1]) for w in data) + WIDTH
-    cell = max(CELL, (last - first) / CELLS)
-    count = int(np.ceil((last - first) / cell))
-    start, end = e.search.intervals[0]
-    dead = model.plus({start: first - model.value(start), end: last - model.value(end)})
+    ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + WIDTH) for w in data]
+    cell = max(CELL, sum(last - first for first, last in ends) / CELLS)
+    counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
-    parts, work = [], np.zeros(count)
-    for w in data:
+    sections: list[Section] = []
+    parts, work, middles = [], [], []
+    for w, (first, last), count in zip(data, ends, counts, strict=True):
+        whole = dict(zip(e.search.intervals[0], (max(first, cell), last), strict=True))
+        named = {of_run(n, w.run.name): time for n, time in whole.items() if n}
+        dead = model.plus({n: time - model.value(n) for n, time in named.items()})
         lost = thrust_along(w, model) - thrust_along(w, dead)
         place = np.clip(((w.run.time - first) / cell + 1e-6).astype(int), 0, count - 1)
-        work += np.bincount(place, np.any(lost != 0.0, axis=1), count)
+        work.append(np.bincount(place, np.any(lost != 0.0, axis=1), count))
         where = csr_matrix((np.ones(place.size), (np.arange(place.size), place)), (place.size, count))
         force = [w.held @ diags(-axis) @ where for axis in lost.T]
         by_axis = vstack([sum(f * g for f, g in zip(force, gain, strict=True)) for gain in turned.T])
         rows = np.arange(3 * w.middle.size).reshape(3, -1).T.ravel()  # axes of a window together
         parts.append(by_axis.tocsr()[rows])
-    columns = csc_matrix(vstack(parts))
+        start = sections[-1].end if sections else 0
+        free = [pair for pair in e.search.intervals if not any(_set(model, n, w) for n in pair)]
+        sections.append(Section(w.run.name, first, start, start + count, free))
+        middles.append(start + np.clip((w.middle - first) / cell, 0.0, count - 1e-6))
+    columns = csc_matrix(block_diag(parts))
     if not columns.count_nonzero():
         return None
-    middles = np.concatenate([w.middle for w in data])
     Z, precision, offset = along or (np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0))
+    worked = np.concatenate(work)
     return Problem(
-        first,
+        sections,
+        not e.search.intervals[0][1],
         cell,
         base.ravel(),
         columns,
-        count,
-        np.maximum((middles - first) / EVERY, 0.0).astype(int),
+        np.concatenate(middles),
         Z.reshape(base.size, -1),
         precision,
         offset,
-        len(e.search.intervals),
-        work / work.sum(),
+        worked / worked.sum(),
     )
+
+
+def _set(model: Model, name: str, w: Integrals) -> bool:
+    """Whether a model has a value of a parameter in a run."""
+    return bool(name) and model.value(of_run(name, w.run.name)) != model.declared(name).start

@@ -20,9 +20,9 @@ from .refinement import (
     Start,
     TrainingSet,
     as_shape,
-    change_points,
     nuisance,
     refine,
+    timed,
 )
 from .segmentation import FLOOR
 
@@ -209,7 +209,7 @@ def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
     columns = ranking.table.entries[best.candidate, best.shape].columns
     found = {n: float(beta[k]) for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
     values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
-    fitted = [n for n in values if n not in change_points(at.start.ship)]
+    fitted = [n for n in values if timed(at.start.ship, n) is None]
     size = len(fitted)
     precision = np.zeros((size, size)) if shape.precision is None else shape.precision
     return Start(values, fitted, precision)

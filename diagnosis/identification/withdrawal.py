@@ -43,7 +43,9 @@ def withdraw(
     Returns:
         The findings that are left, all else fitted anew, and what was withdrawn.
     """
-    judged = [f.id for f in found.effects if start.ship.effects[f.id].search.by == "regression"]
+    fitted = [f for f in found.effects if start.ship.effects[f.id].search.by == "regression"]
+    # Held-out runs say nothing of what holds in others alone.
+    judged = [f.id for f in fitted if not (held_out and f.of_runs)]
     where = "held-out runs" if held_out else "data left out of the fit"
     if not judged or (not held_out and found.left_out is None):
         return found, []

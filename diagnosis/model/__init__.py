@@ -3,6 +3,15 @@
 from .parameter_set import read_model, write_model
 from .ship_model import Model
 from .thrust import Response
-from .weak_form import Integrals, integrals, omega
+from .weak_form import Integrals, integrals, omega, told_apart
 
-__all__ = ["Integrals", "Model", "Response", "integrals", "omega", "read_model", "write_model"]
+__all__ = [
+    "Integrals",
+    "Model",
+    "Response",
+    "integrals",
+    "omega",
+    "read_model",
+    "told_apart",
+    "write_model",
+]

@@ -24,7 +24,7 @@ from fmus.ship import Ship, ship
 
 from .ship_model import Model
 
-MEASUREMENT = "measurement"
+MEASUREMENT, THRUSTERS = "measurement", "thrusters"
 # What a tool is told of a parameter that no FMU has.
 NO_FMU = "of the measurement system, which no FMU has; in a scenario it is a fault"
 
@@ -35,6 +35,8 @@ def write_model(path: Path, model: Model) -> None:
     What equals its nominal value is left out: the file of the nominal model is an empty set. No FMU has
     a parameter of the measurement system, such as the offset of its clock: it stands in an
     annotation, which :func:`read_model` knows, and of which ``cosim.run`` says that it has no effect.
+    Values that hold in one run alone stand in another, with the name of their run; those of the first
+    such run are parameters as well, of which ``cosim.run`` says whose they are.
 
     Args:
         path: ``.ssv``; an older file is replaced.
@@ -43,18 +45,31 @@ def write_model(path: Path, model: Model) -> None:
     Raises:
         InputError: a parameter that no FMU has, or a value that its FMU would refuse.
     """
-    values: dict[str, dict[str, Parameter]] = {}
-    for part, declared in model.ship.parameters.items():
-        values[part] = {}
-        for name, value in getattr(model, part).items():
-            v = _find(name, declared, f"{part}.{name}")
-            if _within(float(value), v, f"{part}.{name}") != v.start:
-                text = f"{v.description}; {NO_FMU}" if part == MEASUREMENT else v.description
-                values[part][name] = Parameter(float(value), v.unit, text)
+    values = {
+        part: _told(part, getattr(model, part), names) for part, names in model.ship.parameters.items()
+    }
+    declared = model.ship.parameters[THRUSTERS]
+    runs = {run: {THRUSTERS: _told(THRUSTERS, own, declared)} for run, own in model.runs.items()}
+    for own in [*runs.values()][:1]:
+        values[THRUSTERS] = {**own[THRUSTERS], **values[THRUSTERS]}
     beside = values.pop(MEASUREMENT)
-    used = [str(given.unit) for group in (*values.values(), beside) for given in group.values()]
+    groups = (*values.values(), beside, *(own[THRUSTERS] for own in runs.values()))
+    used = [str(given.unit) for group in groups for given in group.values()]
     units = {unit: base_exponents(unit) for unit in sorted(set(used))}
-    write_parameters(path, ParameterSet(values, units, beside, "model"))
+    write_parameters(path, ParameterSet(values, units, beside, "model", runs))
+
+
+def _told(
+    part: str, values: Mapping[str, float], declared: Mapping[str, Variable]
+) -> dict[str, Parameter]:
+    """What differs from the nominal values of a part of the ship, for a file."""
+    told = {}
+    for name, value in values.items():
+        v = _find(name, declared, f"{part}.{name}")
+        if _within(float(value), v, f"{part}.{name}") != v.start:
+            text = f"{v.description}; {NO_FMU}" if part == MEASUREMENT else v.description
+            told[name] = Parameter(float(value), v.unit, text)
+    return told
 
 
 def read_model(path: Path, of: Ship | None = None) -> Model:
@@ -71,19 +86,28 @@ def read_model(path: Path, of: Ship | None = None) -> Model:
     given = read_parameters(path)
     of = of or ship()
     declared = {part: names for part, names in of.parameters.items() if part != MEASUREMENT}
-    found: dict[str, dict[str, float]] = {part: {} for part in declared}
-    for part, values in given.values.items():
-        if part not in declared:
-            raise InputError(f"'{path}' has values for '{part}'{nearest(part, declared)}")
-        for name, parameter in values.items():
-            where = f"'{path}': {part}.{name}"
-            v = _find(name, declared[part], where)
-            own = base_exponents(v.unit)
-            unit = Unit(v.unit, tuple(own.get(base, 0) for base in BASE_UNITS))
-            found[part][name] = _within(given.number(parameter, unit, where), v, where)
+
+    def numbers(values: Mapping[str, Mapping[str, Parameter]]) -> dict[str, dict[str, float]]:
+        found: dict[str, dict[str, float]] = {part: {} for part in declared}
+        for part, own in values.items():
+            if part not in declared:
+                raise InputError(f"'{path}' has values for '{part}'{nearest(part, declared)}")
+            for name, parameter in own.items():
+                where = f"'{path}': {part}.{name}"
+                v = _find(name, declared[part], where)
+                exponents = base_exponents(v.unit)
+                unit = Unit(v.unit, tuple(exponents.get(base, 0) for base in BASE_UNITS))
+                found[part][name] = _within(given.number(parameter, unit, where), v, where)
+        return found
+
+    found = numbers(given.values)
+    for part, names in given.of_one_run.items():
+        for name in names:
+            del found[part][name]
+    runs = {run: numbers(own)[THRUSTERS] for run, own in given.runs.items()}
     known = of.parameters[MEASUREMENT]
     beside = {name: p.value for name, p in given.beside.items() if name in known}
-    return Model(found["vessel"], found["thrusters"], beside, of)
+    return Model(found["vessel"], found[THRUSTERS], beside, of, runs=runs)
 
 
 def _find(name: str, declared: Mapping[str, Variable], where: str) -> Variable:

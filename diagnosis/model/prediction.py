@@ -110,6 +110,11 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
     Returns:
         (steps + 1, 3, p, w): pose [m, m, rad] at each step.
     """
+    names = [smoothed.track.run.name for smoothed, _ in starts.runs]
+    if model.runs.keys() & set(names):
+        each = zip(starts.runs, names, strict=True)
+        parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
+        return np.concatenate(parts, axis=-1)
     body, drive, h = model.hull, model.drive, starts.h
     p = drive.params
     arriving = [starts.arriving(single) for single in singles(model)]

@@ -1,7 +1,7 @@
 """A model of a ship: what differs from its nominal parameters, by the names of the FMUs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,24 @@ from fmus.ship import Ship, ship
 from fmus.vessel.vessel import Prepared
 
 Values = Mapping[str, Any]
+OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
+
+
+def of_run(parameter: str, run: str) -> str:
+    """The name of a parameter's value that holds in one run alone."""
+    return f"{parameter}{OF_RUN}{run}"
+
+
+def parameter_and_run(name: str) -> tuple[str, str]:
+    """The parameter that a value is of, and the run in which alone it holds; empty: in all."""
+    parameter, _, run = name.partition(OF_RUN)
+    return parameter, run
+
+
+def of_one_run(values: Mapping[str, float], run: str) -> dict[str, float]:
+    """Those of some values that hold in all runs or in this one, by parameter."""
+    named = ((*parameter_and_run(name), value) for name, value in values.items())
+    return {parameter: value for parameter, of, value in named if of in ("", run)}
 
 
 def parameters(component: Component, values: Values) -> Any:
@@ -42,12 +60,17 @@ def parameters(component: Component, values: Values) -> Any:
 class Model:
     """Parameters of a ship, by name; what is not named is nominal.
 
+    A time within a run, such as that of a failure, is of that run alone. Such a value is called
+    ``parameter@run``, wherever values have names, and stands in ``runs``; :meth:`during` is the model of
+    a run with its values. What knows no run, or another one, has none of them.
+
     Attributes:
         vessel, thrusters: parameter -> value.
         measurement: parameter of the measurement system that no FMU has -> value.
         ship: its components and effects.
         origin: the model that this one was made from by additions; None: itself. Its inertia is the one
             by which a model error is a force.
+        runs: run -> parameter of the thrusters -> value that it has in that run alone.
     """
 
     vessel: Mapping[str, float] = field(default_factory=dict)
@@ -55,18 +78,35 @@ class Model:
     measurement: Mapping[str, float] = field(default_factory=dict)
     ship: Ship = field(default_factory=ship)
     origin: "Model | None" = None
+    runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def during(self, run: str) -> "Model":
+        """The model of one run, with the values that hold in it alone; mostly the model itself."""
+        if run not in self.runs:
+            return self
+        if run not in self._during:
+            thrusters = {**self.thrusters, **self.runs[run]}
+            origin = self.origin or self
+            self._during[run] = replace(self, thrusters=thrusters, origin=origin, runs={})
+        return self._during[run]
+
+    @cached_property
+    def _during(self) -> dict[str, "Model"]:
+        return {}
 
     def plus(self, changes: Mapping[str, float]) -> "Model":
-        """The model with additions to some parameters, wherever they belong.
+        """The model with additions to some parameters, wherever they belong, or in one run alone.
 
         Raises:
             InputError: no part of the ship has such a parameter.
         """
         parts = {part: dict(getattr(self, part)) for part in self.ship.parameters}
+        runs = {run: dict(values) for run, values in self.runs.items()}
         for name, value in changes.items():
-            part = self._owner(name)
-            parts[part][name] = self._value(part, name) + value
-        return Model(**parts, ship=self.ship, origin=self.origin or self)
+            parameter, run = parameter_and_run(name)
+            place = runs.setdefault(run, {}) if run else parts[self._owner(parameter)]
+            place[parameter] = self.value(name) + value
+        return Model(**parts, ship=self.ship, origin=self.origin or self, runs=runs)
 
     def declared(self, name: str) -> Variable:
         """The declaration of a parameter of any part of the ship.
@@ -74,15 +114,18 @@ class Model:
         Raises:
             InputError: there is none.
         """
-        return self.ship.parameters[self._owner(name)][name]
+        parameter, _ = parameter_and_run(name)
+        return self.ship.parameters[self._owner(parameter)][parameter]
 
     def value(self, name: str) -> float:
-        """A parameter of any part of the ship.
+        """A parameter of any part of the ship, or its value in one run.
 
         Raises:
             InputError: there is none.
         """
-        return self._value(self._owner(name), name)
+        parameter, run = parameter_and_run(name)
+        at = self.during(run)
+        return at._value(at._owner(parameter), parameter)
 
     def _value(self, part: str, name: str) -> float:
         return getattr(self, part).get(name, self.ship.parameters[part][name].start)

@@ -4,8 +4,9 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -148,11 +149,25 @@ def integrals(smoothed: Smoothed) -> Integrals:
     )
 
 
+def told_apart(data: Sequence[Integrals]) -> list[Integrals]:
+    """Runs of which no two have the same name: those that had it are numbered."""
+    found, seen = [], Counter[str]()
+    for w in data:
+        name, s = w.run.name, w.smoothed
+        seen[name] += 1
+        if seen[name] > 1:
+            run = replace(w.run, name=f"{name} ({seen[name]})")
+            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
+        found.append(w)
+    return found
+
+
 def omega(w: Integrals, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
 
     An acceleration counts as a force by the inertia of the model that this one was made from.
     """
+    model = model.during(w.run.name)
     of_pose = model.ship.effects.of_kind("measurement")
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
     measured = tuple((name, model.vessel.get(name, 0.0)) for name in names)
@@ -179,6 +194,7 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
         model: whose thrusters.
         nu: (n, 3), body-fixed velocity, zero where it is not known; by default the smoothed one.
     """
+    model = model.during(w.run.name)
     if nu is None:
         nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
     key = Response.key(model)

@@ -4,7 +4,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 from fmus.effects.text import Found
 
@@ -12,12 +12,14 @@ from ..assessment.evaluation import Evaluation
 from ..assessment.regions import ErrorRegions, Profile, Region
 from ..assessment.remainder import Remainder
 from ..identification.findings import Finding
+from ..model.ship_model import of_one_run, parameter_and_run
 from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit
 from .headline import headline
 from .unique_share import unique_shares
 
+T = TypeVar("T")
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
 AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
@@ -189,7 +191,12 @@ def _effect(
     values = {n: x + present[n] for n, x in f.values.items()}
     ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
     coefficients = {
-        name: result_keys.Coefficient(value=value, unit=unit(effect, name), ci95=ci95.get(name))
+        _plain(name, f): result_keys.Coefficient(
+            value=value,
+            unit=unit(effect, name),
+            ci95=ci95.get(name),
+            run=parameter_and_run(name)[1] or None,
+        )
         for name, value in values.items()
     }
     return result_keys.EffectResult(
@@ -200,8 +207,32 @@ def _effect(
         share_of_error=share,
         indistinguishable=list(f.alike),
         advice=advice(f.id, f.alike, effects),
-        sentence=sentence(Found(effect, values, diagnosis.speeds)),
-        equation=equation(effect, values, ci95),
+        sentence=_sentence(diagnosis, f, values),
+        equation=equation(effect, _shown(diagnosis, values), _shown(diagnosis, ci95)),
         separation=separation_note(f.id, f.alike),
         share_unique=unique,
     )
+
+
+def _plain(name: str, f: Finding) -> str:
+    """The name of a value in the files: plain, but of the second run on in which alone it holds."""
+    parameter, run = parameter_and_run(name)
+    return parameter if run in f.of_runs[:1] else name
+
+
+def _sentence(diagnosis: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
+    """A finding in words; what holds in single runs, one after the other."""
+
+    def told(own: Mapping[str, float]) -> str:
+        return sentence(Found(diagnosis.start.ship.effects[f.id], own, diagnosis.speeds))
+
+    shown = _shown(diagnosis, values)
+    runs = [run for run in f.of_runs if shown is values]
+    return " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
+
+
+def _shown(diagnosis: Diagnosis, values: Mapping[str, T]) -> Mapping[str, T]:
+    """Values by their names; where there is one run only, without it."""
+    if len(diagnosis.comparison.evaluations) > 1:
+        return values
+    return {parameter_and_run(name)[0]: value for name, value in values.items()}

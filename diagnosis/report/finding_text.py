@@ -7,6 +7,8 @@ import numpy as np
 from fmus.effects import Effect, EffectSet
 from fmus.effects.text import Found
 
+from ..model.ship_model import parameter_and_run
+
 CURVE = 8  # more coefficients than that are shown as a curve
 MOST_SHOWN = 4  # of the effects that data cannot tell apart, the most likely first; chosen
 
@@ -20,8 +22,8 @@ def sentence(found: Found) -> str:
 
 
 def unit(effect: Effect, name: str) -> str:
-    """The unit of a parameter of an effect."""
-    return next(p.unit for p in effect.parameters if p.name == name)
+    """The unit of a parameter of an effect, or of its value in one run."""
+    return next(p.unit for p in effect.parameters if p.name == parameter_and_run(name)[0])
 
 
 def equation(
@@ -36,7 +38,11 @@ def equation(
     symbols = [s.strip() for s in effect.symbol.split(",")]
     names = symbols if len(symbols) == len(effect.coefficients) else effect.coefficients
     called = dict(zip(effect.coefficients, names, strict=True))
-    parts = [_coefficient(called.get(n, n), values[n], unit(effect, n), ci95.get(n)) for n in shown]
+    parts = []
+    for n in shown:
+        parameter, run = parameter_and_run(n)
+        symbol = called.get(parameter, parameter) + (run and f" in {run}")
+        parts.append(_coefficient(symbol, values[n], unit(effect, n), ci95.get(n)))
     return "; ".join([formula, *parts])
 
 

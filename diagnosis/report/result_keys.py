@@ -121,11 +121,15 @@ class ComparisonContent(Part):
 
 
 class Coefficient(Part):
-    """An addition to the nominal value, and its 95 % interval; null where there is none."""
+    """An addition to the nominal value, and its 95 % interval; null where there is none.
+
+    ``run`` is the one in which alone it holds, such as the time of a failure; null: it holds in all.
+    """
 
     value: Number
     unit: str
     ci95: tuple[Number, Number] | None
+    run: str | None = None
 
 
 class EffectResult(Part):

@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError
 from ..assessment.evaluation import Evaluation
 from ..decision import MOST_MOVED
 from ..identification.findings import Findings
-from ..model import Model, omega
+from ..model import Integrals, Model, omega
 
 
 def unique_shares(
@@ -23,23 +23,24 @@ def unique_shares(
     Args:
         learned: the findings and the model with them.
         start: the initial model.
-        evaluations: of the runs; those held out count if there are any.
+        evaluations: of the runs; those held out count if there are any, but for what holds in others
+            alone, such as times of failures.
 
     Returns:
         For each finding, in their order, a share [1], axes weighted by noise; None where the method
         cannot fit without it.
     """
-    held_out = [e for e in evaluations if e.held_out]
-    runs = [e.integrals for e in held_out or evaluations]
-
-    def squares(model: Model) -> float:
-        return sum(float(np.sum((omega(w, model) / learned.sigma) ** 2)) for w in runs)
-
+    held_out = [e.integrals for e in evaluations if e.held_out]
+    trained = [e.integrals for e in evaluations if not e.held_out]
     if learned.keep is None or not learned.effects:
         return [None] * len(learned.effects)
-    first, last = squares(start), squares(learned.model)
     found: list[float | None] = []
     for finding in learned.effects:
+        runs = trained if finding.of_runs else held_out or trained
+
+        def squares(model: Model, runs: Sequence[Integrals] = runs) -> float:
+            return sum(float(np.sum((omega(w, model) / learned.sigma) ** 2)) for w in runs)
+
         try:
             others = learned.keep([f.id for f in learned.effects if f.id != finding.id])
         except LinAlgError:  # these data do not determine the others alone
@@ -49,5 +50,5 @@ def unique_shares(
         fitted = learned.model.ship.effects[finding.id].search.by == "regression"
         if fitted and any(abs(z) > MOST_MOVED for z in others.moved.values()):
             without = learned.model.plus({name: -value for name, value in finding.values.items()})
-        found.append(min(1.0, max(0.0, (squares(without) - last) / first)))
+        found.append(min(1.0, max(0.0, (squares(without) - squares(learned.model)) / squares(start))))
     return found

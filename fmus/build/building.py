@@ -100,6 +100,8 @@ def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], Non
             note(f"'{starts.path}' has values for {name}, which is not built")
     for text in starts.beside:
         note(f"'{starts.path}' has what no FMU can hold, {text}")
+    for run in starts.runs[:1]:
+        note(f"'{starts.path}' has times that were found in run '{run}' and hold for that run alone")
     if not starts.values:
         note(f"'{starts.path}' holds no values: no FMU is changed by it")
 

@@ -15,6 +15,8 @@ from ..declare import Component, DeclarationError, Variable, nearest, variables
 
 # Entries that belong to the model but that no FMU takes, in the annotation that is ours.
 BESIDE = ".//*[@type='cybership.beside']//*[@name]"
+# Measured runs with values that hold in them alone; those of the first are parameters as well.
+RUNS = ".//*[@type='cybership.run']/*[@name]"
 
 
 @dataclass(frozen=True)
@@ -25,11 +27,13 @@ class Starts:
         values: component -> variable -> value and the unit that it claims to have; empty: as declared.
         path: file that they are from.
         beside: what the file holds that is no parameter of an FMU.
+        runs: measured runs with values that hold in them alone, such as times of failures.
     """
 
     values: Mapping[str, Mapping[str, tuple[float, str | None]]] = field(default_factory=dict)
     path: Path = Path()
     beside: Sequence[str] = ()
+    runs: Sequence[str] = ()
 
     def baked(self, component: Component) -> Component:
         """The component with its values as start values.
@@ -82,8 +86,9 @@ def read_starts(path: Path) -> Starts:
         if not math.isfinite(value):
             raise DeclarationError(f"'{path}': {entry.name} has no number as its value")
         found[model][name] = value, entry.unit
-    notes = ElementTree.fromstring(content).iterfind(BESIDE)
-    return Starts(found, path, [f"{e.get('name')}: {e.get('description')}" for e in notes])
+    root = ElementTree.fromstring(content)
+    notes = [f"{e.get('name')}: {e.get('description')}" for e in root.iterfind(BESIDE)]
+    return Starts(found, path, notes, [e.get("name", "") for e in root.iterfind(RUNS)])
 
 
 def _check(value: float, unit: str | None, v: Variable, where: str) -> None:

@@ -29,7 +29,7 @@ def _cell(text: str) -> str:
 
 def _parameters(e: Effect) -> str:
     """Names of the parameters with their units, a curve's nodes or many times as one."""
-    if e.search.intervals:
+    if len(e.search.intervals) > 1:
         first, *_, last = e.parameters
         return f"`{first.name}`, `{e.parameters[1].name}` … `{last.name}` [{first.unit}]"
     if e.search.by == "given" and len(e.parameters) > 8:

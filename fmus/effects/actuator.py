@@ -142,7 +142,7 @@ def bow_curve(f: Thrust, now: Running, *values: Number) -> Thrust:
     source="7.2.5",
     linear=False,
     needs=("bow",),
-    search=Search(change_points=("bow_failure_time",)),
+    search=Search(intervals=(("bow_failure_time", ""),)),
     wording=Wording(
         lambda f: f"The bow thruster is dead from t = {number(f['bow_failure_time'])} s on.",
         BOW_THRUSTER,

@@ -153,10 +153,9 @@ class Search:
             and refined in all parameters that are no settings.
         fitted: parameters that are fitted by regression at each value tried; by default all
             coefficients of a differentiable effect, else none.
-        change_points: parameters that are times within a run [s]: tried throughout each run, and refined
-            by search, as the fit has no slope by them.
-        intervals: start and end [s] of each interval in which the effect acts, of which there may be any
-            number up to these: found by segmentation of the runs.
+        intervals: start and end [s] of each interval of a run in which the effect acts, of which there
+            may be any number up to these, at other times in each run: found by segmentation, as the fit
+            has no slope by them. An end without a name is that of the run.
         lasting: id of the effect that is the same as one interval without an end.
         smooth: whether the coefficients are values of a curve at equally spaced nodes, of which
             neighbours are alike.
@@ -166,7 +165,6 @@ class Search:
     differentiable: bool | None = None
     tries: Iterable[Values] | Callable[[Values], Iterable[Values]] = ()
     fitted: tuple[str, ...] | None = None
-    change_points: tuple[str, ...] = ()
     intervals: tuple[tuple[str, str], ...] = ()
     lasting: str = ""
     smooth: bool = False
@@ -174,7 +172,7 @@ class Search:
     @property
     def times(self) -> tuple[str, ...]:
         """Parameters that are times within a run [s]."""
-        return (*self.change_points, *(name for pair in self.intervals for name in pair))
+        return tuple(name for pair in self.intervals for name in pair if name)
 
     def values(self, nominal: Values) -> list[Values]:
         """The values to try, for a model with these parameters."""
