@@ -62,6 +62,46 @@ def test_the_file_is_valid_by_the_schema_of_the_standard(model, tmp_path):
     assert (files("fmpy.ssp") / "schema" / "SystemStructureParameterValues.xsd").is_file()
 
 
+FAILS = {
+    "a": {"bow_outage_start_1": 8.0, "bow_outage_end_1": 14.5},
+    "of b": {"bow_outage_start_1": 3.0, "bow_outage_end_1": 5.0, "bow_outage_start_2": 7.0},
+}
+
+
+@pytest.mark.parametrize("always", [{}, {"lag": 0.3}, {"lag": 0.3, "bow_outage_end_1": 60.0}])
+def test_values_of_one_run_come_back_as_its_own(always, tmp_path):
+    write_model(tmp_path / "model.ssv", Model(thrusters=always, runs=FAILS))
+    found = read_model(tmp_path / "model.ssv")
+    assert (found.thrusters, found.runs) == (always, FAILS)
+    assert found.during("of b").thrusters == {**always, **FAILS["of b"]}
+    assert found.during("c") is found
+    names = {p.name: float(p.value) for p in read_ssv(str(tmp_path / "model.ssv")).parameters}
+    first = {f"thrusters.{name}": value for name, value in {**FAILS["a"], **always}.items()}
+    assert names == first, "what a tool that knows no runs can apply"
+
+
+def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
+    path = tmp_path / "model.ssv"
+    for runs, told in (
+        (
+            {"a": {"bow_failure_time": 40.0}},
+            "bow_failure_time was found in run 'a' and holds for that run alone",
+        ),
+        (
+            FAILS,
+            "bow_outage_start_1 … bow_outage_end_1 were found in run 'a' and hold for that run alone; "
+            "what was found in 'of b' is not used",
+        ),
+        ({}, ""),
+    ):
+        write_model(path, Model(thrusters={"lag": 0.3}, runs=runs))
+        short = cosim.load_scenario({**ellipse, "stop": 0.1})
+        warnings = cosim.simulate(short, tmp_path / "out", [path], overwrite=True).warnings
+        alone = [text for text in warnings if "alone" in text]
+        assert alone == [f"'{path}': thrusters.{told}"] * bool(told)
+        assert read_starts(path).runs == [*runs], "which fmus.build tells"
+
+
 def test_what_is_nominal_is_left_out(tmp_path):
     write_model(tmp_path / "a.ssv", Model({"delta_X_u": 0.0, "m": 14.79}, {"lag": 0.0}))
     write_model(tmp_path / "b.ssv", Model())
