@@ -14,6 +14,8 @@ from benchmarks.hidden_effects.confidence_fit import Judged, confidence, fitted
 from benchmarks.hidden_effects.draw import (
     LARGEST,
     LOOKED_FOR,
+    OTHER_TIMES,
+    OUTAGES,
     SINGLE,
     SMALLEST,
     UNKNOWN,
@@ -32,7 +34,7 @@ from benchmarks.hidden_effects.scoring import row, same_coefficients
 from benchmarks.hidden_effects.separation import NOTHING, Rivals, flat
 from benchmarks.hidden_effects.simulated_runs import STEP, Hidden, Voyage, build, sail
 from benchmarks.hidden_effects.summary import write
-from benchmarks.hidden_effects.truth import force, motion, over, windows
+from benchmarks.hidden_effects.truth import Motion, force, motion, over, windows
 from cosim import InputError
 from diagnosis import Run
 from fmus.effects import STANDARD
@@ -483,3 +485,26 @@ def test_too_little_to_calibrate_is_refused(tmp_path, capsys):
         == 2
     )
     assert "50 are needed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("effect", OUTAGES)
+def test_outages_at_other_times_in_each_run_are_scored_run_by_run(effect):
+    rng, still = np.random.default_rng(3), np.zeros((3000, 3))
+    t = np.arange(3000) * 0.08
+    command = np.column_stack([np.sin(0.3 * t), np.sin(0.4 * t), np.sin(0.5 * t)])
+    drawn = draw(effect, rng, [Motion(t, still, still, still, command)] * 3)
+    own = [tuple(drawn.during(f"run{k}").values.values()) for k in (1, 2, 3, 4)]
+    assert len(set(own)) == 4
+    assert drawn.size > 0.1
+    told = {
+        name.removesuffix("@run1"): {"value": t + 0.3, "ci95": [t + 0.2, t + 0.4], "run": name[-4:]}
+        for name, t in drawn.values.items()
+        if not name.endswith("run4")
+    }
+    problem = Problem(effect, "n1", "exact", 1, [drawn])
+    answer = answer_of("found", (effect.removesuffix(OTHER_TIMES), 0.98, told))
+    assert row(problem, answer).right
+    (name, one), *_ = told.items()
+    late = {"value": one["value"] + 1.0, "ci95": [one["value"] + 0.9, one["value"] + 1.1]}
+    for wrong in (told | {name: one | late}, {n: c for n, c in told.items() if c["run"] != "run2"}):
+        assert not row(problem, answer_of("found", (effect.split()[0], 0.98, wrong))).right

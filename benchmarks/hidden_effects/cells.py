@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from .draw import SINGLE, UNKNOWN
+from .draw import OUTAGES, SINGLE, UNKNOWN
 
 NONE = "none"
 NONES = 5  # cells without an effect, for each noise, kind of coefficients and seed
@@ -34,7 +34,7 @@ PAIRS = (
     ("N_|v|v", "bow_speed_loss"),
     ("X_vr", "curve_vsp_x(c)"),
 )
-KINDS = ("single", "none", "pair", "foreign")
+KINDS = ("single", "none", "pair", "foreign", "outages")
 Key = tuple[str, str, str, int]
 
 
@@ -89,6 +89,7 @@ def cells(
         "none": [()],
         "pair": list(PAIRS),
         "foreign": [(e,) for e in UNKNOWN],
+        "outages": [(e,) for e in OUTAGES],
     }
     for seed, (noise, off), kind in product(seeds, product(noises, wrong), kinds):
         # The manoeuvres are those of the seed; where nothing is hidden, all else is drawn anew.
@@ -101,6 +102,8 @@ def kind_of(name: str) -> str:
     """The kind of a cell with this name."""
     if name == NONE:
         return "none"
+    if name in OUTAGES:
+        return "outages"
     return "pair" if " + " in name else "foreign" if name in UNKNOWN else "single"
 
 
@@ -120,5 +123,6 @@ def for_showing(name: str, seed: int) -> bool:
 
 def _even(name: str) -> bool:
     names = {"single": SINGLE, "pair": [" + ".join(pair) for pair in PAIRS], "foreign": UNKNOWN}
+    names["outages"] = OUTAGES
     kind = kind_of(name)
     return kind == "none" or names[kind].index(name) % 2 == 0

@@ -6,10 +6,11 @@ any effect: with the effect the controller follows the same path.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.model import of_one_run, of_run
 from fmus.effects import EACH_VSP, STANDARD
 
 from .effect_forms import form
@@ -30,6 +31,9 @@ SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
 OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 # Physics of which the diagnosis has nothing: no id is a right answer.
 UNKNOWN = [e.id for e in FOREIGN_PHYSICS]
+# An effect whose times are drawn anew for each run, the held-out one among them.
+OTHER_TIMES = " at other times"
+OUTAGES = [e.id + OTHER_TIMES for e in LOOKED_FOR if len(e.search.intervals) > 1]
 MOST_PLAY = 0.12  # of the full command: about the largest size, 40 % of the force on an axis
 
 
@@ -50,7 +54,13 @@ class Draw:
     @property
     def right(self) -> tuple[str, ...]:
         """The ids that are a right answer."""
+        if self.effect in OUTAGES:
+            return (self.effect.removesuffix(OTHER_TIMES),)
         return () if self.effect in UNKNOWN else FOREIGN.get(self.effect, (self.effect,))
+
+    def during(self, run: str) -> "Draw":
+        """What of it a run has: parameters are named ``parameter@run`` where each run has its own."""
+        return replace(self, values=of_one_run(self.values, run))
 
     @property
     def measured(self) -> dict[str, float]:
@@ -70,7 +80,9 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
     """
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
-    elif effect in STANDARD and STANDARD[effect].search.intervals:  # and so are these
+    elif effect in OUTAGES:  # and so are these
+        return outages(effect, rng, pilot)
+    elif effect in STANDARD and STANDARD[effect].search.intervals:
         values = outage(effect, rng)
     elif effect == "backlash":  # so is its play, of which a series takes seconds
         values = {"backlash": less * MOST_PLAY * float(rng.uniform(0.25, 1.0))}
@@ -90,6 +102,21 @@ def outage(effect: str, rng: np.random.Generator) -> dict[str, float]:
     starts = room * np.arange(count) + rng.uniform(0.1, 0.5, count) * room
     spans = zip(names, starts.tolist(), lasts.tolist(), strict=False)
     return {name: t for (a, b), start, last in spans for name, t in ((a, start), (b, start + last))}
+
+
+def outages(effect: str, rng: np.random.Generator, pilot: Sequence[Motion]) -> Draw:
+    """The same with other intervals in each run, the held-out one among them."""
+    plain = effect.removesuffix(OTHER_TIMES)
+    each = [outage(plain, rng) for _ in run_names(len(pilot) + 1)]
+    sizes = [share([m], plain, values) for m, values in zip(pilot, each, strict=False)]
+    names = zip(run_names(len(each)), each, strict=True)
+    values = {of_run(n, run): t for run, own in names for n, t in own.items()}
+    return Draw(effect, values, float(np.sqrt(np.mean(np.square(sizes)))))
+
+
+def run_names(count: int) -> list[str]:
+    """The names of the runs of a cell, in their order."""
+    return [f"run{k}" for k in range(1, count + 1)]
 
 
 def share(pilot: Sequence[Motion], effect: str, values: Values) -> float:

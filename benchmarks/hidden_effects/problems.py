@@ -6,7 +6,7 @@ A problem depends on the physics alone, not on the diagnosis: it is made once an
 import json
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,10 @@ import numpy as np
 
 from cosim import atomic_write
 from diagnosis import Run
+from fmus.effects import STANDARD
 
 from .cells import Cell, Key
-from .draw import FOREIGN, UNKNOWN, Draw, added_force, draw
+from .draw import FOREIGN, OUTAGES, UNKNOWN, Draw, added_force, draw, run_names
 from .fleet import TOGETHER, Order, sail_all
 from .manoeuvres import manoeuvres
 from .separation import COEFFICIENTS, SEPARABLE, Rivals
@@ -144,21 +145,25 @@ def _drawn(cell: Cell, pilot: Sequence[Motion], less: float) -> list[Draw]:
 
 
 def _orders(cell: Cell, hidden: Sequence[Draw]) -> list[Order]:
-    ship = plant(cell, hidden)
+    ships = [plant(cell, [d.during(run) for d in hidden]) for run in run_names(RUNS)]
     seeds = cell.rng(3).integers(0, 2**31, RUNS) + list(NOISE).index(cell.noise)
-    along = zip(manoeuvres(cell.seed % 100), seeds, strict=True)
-    return [Order(m, ship, NOISE[cell.noise], int(s)) for m, s in along]
+    along = zip(manoeuvres(cell.seed % 100), ships, seeds, strict=True)
+    return [Order(m, ship, NOISE[cell.noise], int(s)) for m, ship, s in along]
 
 
 def _problem(cell: Cell, hidden: Sequence[Draw], redrawn: int, voyages: Sequence[Any]) -> Problem:
     if not voyages:
         return Problem(*cell.key, hidden, redrawn, note="runs away at any size")
     ship = plant(cell, hidden)
-    # The diagnosis has no model of waves that are known, nor of a ship of another form.
-    known = not (ship.other or "wave_force" in ship.vessel or {d.effect for d in hidden} & set(UNKNOWN))
+    # The diagnosis has no model of waves that are known, nor of a ship of another form; and nobody knows
+    # when a thruster fails in a run held out.
+    never = {*UNKNOWN, *OUTAGES, *(e.id for e in STANDARD.values() if e.search.times)}
+    known = not (ship.other or "wave_force" in ship.vessel or {d.effect for d in hidden} & never)
     alike = confusable(hidden, voyages[:-1], cell.wrong)
     true = (ship.vessel, ship.thrusters, ship.clock) if known else (None, None, 0.0)
-    return Problem(*cell.key, hidden, redrawn, alike, *true, "", [v.measured for v in voyages])
+    named = zip(voyages, run_names(len(voyages)), strict=True)
+    runs = [replace(v.measured, name=name) for v, name in named]
+    return Problem(*cell.key, hidden, redrawn, alike, *true, "", runs)
 
 
 def confusable(hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> list[list[str]]:
@@ -175,7 +180,9 @@ def confusable(hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> l
     motions = [motion(v, measurement) for v in runs]
     rivals, found = Rivals(motions, wrong), []
     for d in hidden:
-        left = rivals.separations(added_force(motions, d.effect, d.values), d.right)
+        each = zip(motions, run_names(len(motions)), strict=True)
+        forces = [added_force([m], d.effect, d.during(run).values) for m, run in each]
+        left = rivals.separations(np.concatenate(forces), d.right)
         found.append(sorted(effect for effect, share in left.items() if share < SEPARABLE))
     return found
 

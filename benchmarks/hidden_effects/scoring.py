@@ -6,8 +6,8 @@ from typing import Any
 from fmus.effects import STANDARD
 
 from .answers import Answer
-from .draw import Draw
-from .problems import Problem
+from .draw import Draw, run_names
+from .problems import RUNS, Problem
 from .results import Row
 from .separation import COEFFICIENTS, NOTHING
 
@@ -20,6 +20,7 @@ SAME_AS = {
     "loss_vsp": {"plant_F_vsp"},
     "loss_bow": {"plant_F_bow"},
 }
+IN_TIME = 0.5  # s, from the end of an outage as it was; half a second moves the ship by millimetres
 SMALL = 1e-6  # of a parameter that is told in the table
 
 
@@ -48,6 +49,8 @@ def row(problem: Problem, answer: Answer) -> Row:
     made.separable = bool(hidden) and not made.alike
     made.absorbed = any(NOTHING in each for each in problem.alike)
     made.right = bool(hidden) and _right(made, hidden, answer["verdict"])
+    if made.kind == "outages":
+        made.right = made.right and in_time(answer["effects"][0]["coefficients"], hidden[0])
     made.in_set = any(set(d.right) & set(made.reported) for d in hidden)
     made.intervals, made.covered = _coverage(answer["effects"], hidden)
     return made
@@ -83,6 +86,24 @@ def _right(made: Row, hidden: Sequence[Draw], verdict: str) -> bool:
         return True
     told = verdict == "coefficients" and len(hidden) == 1
     return told and bool(same_coefficients(hidden[0].effect) & set(made.suspects))
+
+
+def in_time(coefficients: dict[str, Any], hidden: Draw) -> bool:
+    """Whether every outage of the training runs was found, and nothing else.
+
+    An end counts as found within IN_TIME or its 95 % interval: where a thruster is hardly commanded,
+    nothing tells when it fails.
+    """
+    for run in run_names(RUNS - 1):
+        true = sorted(hidden.during(run).values.values())
+        mine = [c for c in coefficients.values() if c["run"] == run]
+        found = sorted((c["value"], c["ci95"]) for c in mine)
+        if len(found) != len(true):
+            return False
+        for t, (value, (low, high)) in zip(true, found, strict=True):
+            if abs(value - t) > IN_TIME and not low <= t <= high:
+                return False
+    return True
 
 
 def _coverage(effects: Sequence[dict[str, Any]], hidden: Sequence[Draw]) -> tuple[int, int]:

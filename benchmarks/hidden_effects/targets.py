@@ -10,7 +10,8 @@ from .results import Row
 from .simulated_runs import NOISE
 
 Rows = Sequence[Row]
-KINDS_SHOWN = ("single", "pair", "none", "foreign")
+KINDS_SHOWN = ("single", "pair", "none", "foreign", "outages")
+WORSE = 1.02  # ratio of held-out errors from which on a prediction is worse: less is noise of the fit
 LEAVES_REMAINDER = ("waves",)  # the ship moves with them, but no model predicts them
 SURE, CERTAIN = (
     0.9,
@@ -42,7 +43,7 @@ def fall(rows: Iterable[Row]) -> str:
 def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
     """Measure, target, and what was reached."""
     good = [r for r in rows if not r.note]
-    one, two, none, foreign = ([r for r in good if r.kind == k] for k in KINDS_SHOWN)
+    one, two, none, foreign, outages = ([r for r in good if r.kind == k] for k in KINDS_SHOWN)
     exact, wrong = ([r for r in one if r.coefficients == kind] for kind in ("exact", "wrong"))
     alone = [r for r in one if r.right and r.effect not in LEAVES_REMAINDER and r.remainder]
     found = [
@@ -61,6 +62,8 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
         ("two effects, all", "", share(two, lambda r: r.right)),
         ("foreign physics: told as unexplained, nothing wrong at >= 0.9", ">= 95 %", unknown(foreign)),
         ("of these: something wrong at >= 0.9", "", share(foreign, lambda r: r.surest >= SURE)),
+        ("outages at other times in each run: right, and when", "", share(outages, _right)),
+        ("of these: held-out position error larger by 2 %", "none", share(outages, spoiled)),
         (
             "no significant remainder where nothing is hidden",
             ">= 95 %",
@@ -95,6 +98,11 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
         found.append(("time of 4 runs x 240 s x 50 Hz", "<= 10 s", f"{cost.seconds:.1f} s"))
         found.append(("memory, one hour at 100 Hz", "< 1 GB", f"{cost.megabytes:.0f} MB"))
     return found
+
+
+def spoiled(r: Row) -> bool:
+    """Whether a run held out is predicted worse by what was learned."""
+    return r.after_mm > WORSE * r.before_mm
 
 
 def first(rows: Rows) -> str:

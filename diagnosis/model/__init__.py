@@ -1,7 +1,7 @@
 """A model of ship and thrusters on measured runs: parameters, forces, predictions, model error."""
 
 from .parameter_set import read_model, write_model
-from .ship_model import Model
+from .ship_model import Model, of_one_run, of_run
 from .thrust import Response
 from .weak_form import Integrals, integrals, omega, told_apart
 
@@ -10,6 +10,8 @@ __all__ = [
     "Model",
     "Response",
     "integrals",
+    "of_one_run",
+    "of_run",
     "omega",
     "read_model",
     "told_apart",
