@@ -17,25 +17,26 @@ from cosim.dispatch import FinishedRun
 from cosim.results import draw
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
-from .outcome import LEARNED_FROM, Outcome, columns, outcome, true_states
+from .outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
 from .store_verdicts import store_claims
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import CONTROLLERS, FOUR, OLD, claims, goals
+from .verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
 
 PATHS = ("ellipse", "eight")
 SENSES = ("mdf", "kalman")
 NEEDED = [
     "vessel.x",
     "vessel.y",
+    "vessel.v",
+    "vessel.r",
     "guidance.x_t",
     "guidance.y_t",
     "controller.z1_x",
     "controller.tau_N",
     *LEARNED_FROM,
-    "controller.sigma_min",
-    "controller.rank_met",
 ]
+LEARNING = [*PHI, "controller.sigma_min", "controller.rank_met"]
 # As printed, a sample may be stored whatever force is commanded, learning takes the force that is asked
 # for to be the one that acts, and footnote 1 of 4.1.4 weighs the stored sums.
 UNGATED = {"controller.tau_max": 1e6}
@@ -48,7 +49,8 @@ Table = Mapping[str, Mapping[str, list[Outcome]]]
 
 def needed(name: str) -> list[str]:
     """What is logged of a run with this controller."""
-    return NEEDED if "_cl_" in name else NEEDED[:-2]
+    more = LEARNING if "_cl_" in name else PHI if "_abs" in name else []
+    return [*NEEDED, *more]
 
 
 def variants(path: str, seconds: float | None) -> dict[str, dict[str, Content]]:
@@ -138,32 +140,37 @@ def differences(report: Report, by_path: Mapping[str, Table]) -> None:
             base = columns(table[sense]["controller_abs"], "position")
             shares = [str(ratio(columns(table[sense][c], "position"), base)) for c in others]
             rows.append([f"{path}, {sense}", *shares])
-    report.table(["run", *[c.removeprefix("controller_") for c in others]], rows)
+    report.table(["run", *map(short, others)], rows)
 
 
 def pictures(report: Report, seconds: float | None, jobs: int | None) -> None:
-    """The five pictures of 5.1 for both groups of controllers on both paths, and Fig. 5.7."""
-    singular: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    """The five pictures of 5.1 for both groups of controllers on both paths, and Fig. 5.7.
+
+    With noise and the thesis' observer, and as printed: no noise, stale errors with the weight 0.1.
+    """
     logs = report.folder / "logs"
-    contents = {
-        f"{path}/{name}": vary(content, log={"signals": "all"})
-        for path in PATHS
-        for name, content in variants(path, seconds)["mdf"].items()
-    }
-    run_all(contents, [0], done, logs, jobs)
+    contents = {}
     for path in PATHS:
-        read = {name: cosim.read_log(logs / path / name / "0") for name in CONTROLLERS}
-        for group, names in (("variants", FOUR), ("against", OLD)):
-            folder = report.folder / f"{path}_{group}"
-            shown = {name.removeprefix("controller_"): read[name] for name in names}
-            draw({label: dict(log) for label, log in shown.items()}, folder)
-            for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
-                caption = f"{path}, {group}: {file.replace('_', ' ')} (seed 0)"
-                report.picture(f"{folder.name}/{file}.png", caption)
-        for name in FOUR:
-            label = f"{name.removeprefix('controller_cl_')}, {path}"
-            singular[label] = (read[name]["time"], read[name]["controller.sigma_min"])
-    report.figure("singular_values", singular_values(singular), "Smallest singular value (Fig. 5.7)")
+        by = variants(path, seconds)
+        for kind, runs in (("today", by["mdf"]), ("printed", {**by["true"], **by[PRINTED]})):
+            for name, content in runs.items():
+                contents[f"{path}/{kind}/{name}"] = vary(content, log={"signals": "all"})
+    run_all(contents, [0], done, logs, jobs)
+    for kind in ("today", "printed"):
+        singular: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for path in PATHS:
+            read = {name: cosim.read_log(logs / path / kind / name / "0") for name in CONTROLLERS}
+            for group, names in (("variants", FOUR), ("against", OLD)):
+                folder = report.folder / f"{path}_{group}_{kind}"
+                draw({short(name): dict(read[name]) for name in names}, folder)
+                for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
+                    caption = f"{path}, {group}, {kind}: {file.replace('_', ' ')} (seed 0)"
+                    report.picture(f"{folder.name}/{file}.png", caption)
+            for name in FOUR:
+                series = (read[name]["time"], read[name]["controller.sigma_min"])
+                singular[f"{short(name)}, {path}"] = series
+        caption = f"Smallest singular value, {kind} (Fig. 5.7)"
+        report.figure(f"singular_values_{kind}", singular_values(singular), caption)
 
 
 def done(run: FinishedRun) -> bool:
@@ -197,10 +204,8 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
         "form of that with weight 1, `stale, 0.1` with that of the footnote."
     )
     report.text(
-        "With errors formed anew, twenty stored samples drive the estimates and the one of this instant "
-        "adds little: whether that is ε or z2 makes no great difference any more. The printed form "
-        "winds up with weight 1; with the weight of footnote 1 it does not on the ellipse, and gives "
-        "the thesis' order there with true states (`python -m studies.store_weight`, four weights)."
+        "More weights: `python -m studies.store_weight`. Pictures `printed`: true states, no noise, "
+        "`stale, 0.1`; `today`: the shipped scenarios with the modified derivative filter."
     )
     report.heading("What the thesis concludes, and what comes out here")
     rows = [*claims(by_path), *store_claims(by_path), *goals(by_path)]

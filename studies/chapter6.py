@@ -19,7 +19,7 @@ from .chapter6_runs import FEW, Plant, folder, run
 from .found import FAULTY, Runs, label, lost, mean
 from .lessons import lessons
 from .model_loops import parameters_of
-from .observations import observations
+from .observations import observations, other_sections
 from .study_command import run_study, study_parser
 from .study_report import Report
 from .trials import CONTROLLERS, LABELS, TRIALS
@@ -93,6 +93,10 @@ def study(
     seen = observations(found)
     report.table(["thesis", "here", "numbers"], [list(row) for row in seen], words=True)
     report.result("observations", [row._asdict() for row in seen])
+    for section, rows in other_sections(found).items():
+        report.heading(section)
+        report.table(["thesis", "here", "numbers"], [list(row) for row in rows], words=True)
+        report.result(section, [row._asdict() for row in rows])
     report.heading("Lessons learned (6.5)")
     rows = lessons(found)
     report.table(["thesis", "here", "numbers and cause"], [list(row) for row in rows], words=True)

@@ -117,12 +117,13 @@ def fallen(found: Found) -> Verdict:
         runs = found.trials[fast, faulty]
         each = ", ".join(f"{LABELS[c]} {lost(r)} of {len(r)}" for c, r in runs.items())
         rows.append(f"{label(fast, faulty)}: {each}")
-    runs = found.trials[fast, REGULAR]
+    runs = found.trials[fast, FAULTY]
     ahead = min(lost(runs[c]) for c in (CLZ, CLE)) > max(lost(runs[c]) for c in (RBS, ABS))
     return Verdict(
         "Outside of the model's domain, at 0.16 m/s, CLZ and CLE fail, RBS and ABS do not (6.4.4)",
         "reproduced" if ahead else "not reproduced",
-        f"runs that fell back by more than 2 m: {'; '.join(rows)}",
+        f"judged with the guidance fault, as in the basin; runs that fell back by more than 2 m: "
+        f"{'; '.join(rows)}",
     )
 
 

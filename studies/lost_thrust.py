@@ -1,8 +1,9 @@
-"""What decides the estimated loss of thrust in yaw (7.2.4): ``python -m studies.lost_thrust``.
+"""The estimated loss of thrust in yaw, and a bow thruster that fails: ``python -m studies.lost_thrust``.
 
 On the ellipse at constant speed the moment of the thrusters and the damping of the yaw rate go together,
 so that N_r and delta_N trade against each other along a line on which the model error is explained
-alike. Where on it the passes of (7.10)-(7.11) stand depends on gains, number of passes, and estimates.
+alike. Where on it the passes of (7.10)-(7.11) stand depends on gains, number of passes, and estimates
+(7.2.4). The improved controller's own estimates of the losses through a failure: 7.2.5.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,16 +12,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from cosim.dispatch import FinishedRun
 from diagnosis.analysis import GAMMA, SETTLED, Samples, explained, material, model_error, one_pass
 
 from . import sysid4
 from .monte_carlo import Content, run_all, shipped, vary
-from .outcome import AXES, Log
+from .outcome import AXES, Log, missing
 from .study_command import run_study, study_parser
 from .study_report import Report
 from .trials import HARD, gains
+from .verdict import Verdict
 
 NU = ("u", "v", "r")
 N_R, DELTA_N = 8, 13  # places of N_r in (7.2) and of delta_N after (7.5)
@@ -28,6 +31,8 @@ PASSES = (1, 4, 16)
 # s; between the delays of the derivative filter in velocity (0.3 s) and in acceleration (0.5 s).
 LATE = 0.45
 PACES = (1.0, 0.25)  # of the gain of delta; chosen
+RISE, ZERO = 0.3, 0.1  # of a loss of thrust: the thesis' rise, and what is close to zero (chosen)
+FAILS, SECONDS = 140.0, 20.0  # s; when the bow thruster stops, and what counts as before and after
 # FMU and ending of the signals, delay of the force [s].
 ESTIMATES = {
     "true states": ("vessel", "", 0.0),
@@ -56,6 +61,69 @@ def scenario() -> Content:
         metrics={},
         log={"signals": [*signals, *(f"thrusters.tau_cmd_{a}" for a in AXES)]},
     )
+
+
+def failure() -> Content:
+    """The ellipse by the improved controller; the bow thruster stops. Table 2.1, no noise."""
+    dead = {"model": "thrusters", "variable": "loss_bow", "action": "override", "value": 1.0}
+    return vary(
+        shipped("ellipse"),
+        {"controller": "controller_cl_improved.fmu"},
+        faults=[],
+        events=[{"time": FAILS, **dead}],
+        metrics={},
+        log={"signals": "all", "every": 10},
+    )
+
+
+def estimates(log: Log) -> np.ndarray:
+    """Estimated losses of thrust (n, 3)."""
+    return np.column_stack([log[f"controller.phi_hat_{k}"] for k in (12, 13, 14)])
+
+
+def seen(log: Log) -> Verdict:
+    """Whether the losses in sway and yaw rise by the thesis' 30 % within seconds, and from zero."""
+    time, delta = log["time"], estimates(log)
+    before = delta[(time > FAILS - SECONDS) & (time < FAILS)].mean(axis=0)
+    after = delta[(time > FAILS) & (time < FAILS + SECONDS)].max(axis=0)
+    rises, from_zero = after[1:] - before[1:] >= RISE, np.abs(before[1:]) < ZERO
+    here = "reproduced" if from_zero.all() else "the rise is, but not from zero"
+    return Verdict(
+        "The bow thruster's failure takes δ̂ in sway and yaw from near 0 to 30-40 % in seconds (7.2.5)",
+        here if rises.all() else "not reproduced",
+        f"δ̂ in surge, sway, yaw, mean of the {SECONDS:g} s before: {listing(before)}; largest of the "
+        f"{SECONDS:g} s after: {listing(after)}",
+    )
+
+
+def listing(values: np.ndarray) -> str:
+    return ", ".join(f"{x:.2f}" for x in values)
+
+
+def failure_picture(log: Log) -> Figure:
+    """Pose, z1, model error, and the estimated losses (Fig. 7.3)."""
+    figure = Figure(figsize=(8.0, 9.0), layout="constrained")
+    parts = {
+        "pose [m, m, rad]": {n: log[f"vessel.{n}"] for n in ("x", "y", "psi")},
+        "z1 [m, m, rad]": {n: log[f"controller.z1_{n}"] for n in ("x", "y", "psi")},
+        "ω [N, N, N m]": {a: missing(log, a) for a in AXES},
+        "δ̂": dict(zip(AXES, estimates(log).T, strict=True)),
+    }
+    panels = figure.subplots(len(parts), 1, sharex=True)
+    for panel, (label, lines) in zip(panels, parts.items(), strict=True):
+        for name, values in lines.items():
+            panel.plot(log["time"], values, label=name, linewidth=1.0)
+        panel.axvline(FAILS, color="black", linewidth=0.7)
+        panel.set_ylabel(label)
+        panel.legend(fontsize=7)
+    panels[-1].set_xlabel("time [s]")
+    return figure
+
+
+def whole(run: FinishedRun) -> Log:
+    """The log of a run that must have gone through."""
+    run.demand()
+    return dict(run.log)
 
 
 def samples(log: Log, source: str, suffix: str, late: float) -> Samples:
@@ -114,6 +182,12 @@ def study(out: Path) -> Path:
         f"The line through them: N_r = {offset:.2f} + {slope:.2f} delta_N; on it delta_N = 0.07 goes "
         f"with N_r = {offset + 0.07 * slope:.2f}. Farthest from it is N_r by {off:.2f}."
     )
+    report.heading("A bow thruster that fails (7.2.5)")
+    (log,) = run_all({"": failure()}, [0], whole)[""]
+    report.table(["thesis", "here", "numbers"], [list(seen(log))], words=True)
+    caption = f"Pose, z1, ω and δ̂; the bow thruster stops at {FAILS:g} s (Fig. 7.3)."
+    report.figure("failure", failure_picture(log), caption)
+    report.result("failure", seen(log))
     report.result("places", found)
     report.result("line", [slope, offset])
     return report.write()

@@ -11,12 +11,16 @@ from diagnosis import analysis
 from diagnosis.analysis import Regressed
 from diagnosis.model import Model
 
+from .lap_pictures import errors_picture, force_picture
 from .monte_carlo import Content, run_all, vary
+from .outcome import LEARNED_FROM, Log, rms
 from .study_report import Report
 from .trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
+from .verdict import Verdict
 
 SLOW, EIGHT = TRIALS[0], TRIALS[1]
-TRACK = ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t", "controller.z1_x", "controller.z1_y"]
+TRACK = ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"]
+SIGNALS = [*TRACK, *(f"controller.z1_{n}" for n in ("x", "y", "psi")), *LEARNED_FROM]
 # Run -> trial, controller, with the guidance fault: 7.4 (a) to (d).
 RUNS = {
     "RBS, ellipse, fault": (SLOW, RBS, True),
@@ -28,24 +32,27 @@ RUNS = {
 
 
 class Loop(NamedTuple):
-    """Distance to the target, RMS [m], mean z1_x over the second half [m], and the track."""
+    """Distance to the target, RMS [m], mean z1_x over the second half [m], and every tenth row."""
 
     position: float
     lag: float
-    x: np.ndarray
-    y: np.ndarray
-    x_t: np.ndarray
-    y_t: np.ndarray
+    log: Log
+
+    @property
+    def lost(self) -> bool:
+        """Whether the run broke off or the ship was far from its target."""
+        return not self.position < LOST
 
 
 def loop(run: FinishedRun) -> Loop:
     """The numbers of a run; of one that broke off, what there is."""
     log = run.log
-    track = [log[n] for n in TRACK[:4]]
-    distance = np.hypot(track[0] - track[2], track[1] - track[3])
+    distance = np.hypot(log["vessel.x"] - log["guidance.x_t"], log["vessel.y"] - log["guidance.y_t"])
     half = log["time"] >= 0.5 * log["time"][-1]
-    position = float(np.sqrt(np.mean(distance**2))) if run.status != "failed" else float("nan")
-    return Loop(position, float(log["controller.z1_x"][half].mean()), *(x[::10] for x in track))
+    position = rms(distance) if run.status != "failed" else float("nan")
+    return Loop(
+        position, float(log["controller.z1_x"][half].mean()), {n: x[::10] for n, x in log.items()}
+    )
 
 
 def eigenvalues(found: Regressed) -> str:
@@ -79,8 +86,37 @@ def contents(models: Mapping[str, Model], seconds: float | None) -> dict[str, Co
         for run, (trial, controller, faulty) in RUNS.items():
             t = trial if seconds is None else trial._replace(seconds=seconds)
             content = scenario(t, controller, faulty, spikes=False, plant=parameters_of(model))
-            made[f"{name}|{run}"] = vary(content, log={"signals": TRACK})
+            made[f"{name}|{run}"] = vary(content, log={"signals": SIGNALS})
     return made
+
+
+def unstable(lost: Mapping[str, int], holds: Mapping[str, bool], numbers: str) -> Verdict:
+    """Which regressions lose the ship, and whether the check before the simulation tells which."""
+    losing = [name for name, count in lost.items() if count]
+    here = "reproduced" if "PLS3" in losing else "not reproduced"
+    others = [name for name in losing if name != "PLS3"]
+    if others:
+        here += f"; {', '.join(others)} {'does' if len(others) == 1 else 'do'}"
+    told = all(holds[name] == (not count) for name, count in lost.items())
+    return Verdict(
+        "With PLS3 (SYSMV3; SYSMV4 in the caption) in the plant the ship is lost (7.4, Fig. 7.16)",
+        f"{here}; the check before the simulation {'tells which' if told else 'does not tell which'}",
+        f"runs lost: {', '.join(f'{n} {k} of {len(RUNS)}' for n, k in lost.items())}. {numbers}",
+    )
+
+
+def why(found: Mapping[str, Regressed]) -> str:
+    """What the regressions make of the surge force, and whether it can be told from the speed."""
+    x = next(iter(found.values())).samples.x
+    parts = [
+        f"{n} ({r.by_axis('factors')['X']} factors) {r.B[0, r.columns.index('tau_X')]:.2f}"
+        for n, r in found.items()
+        if "tau_X" in r.columns
+    ]
+    return (
+        f"Force in X by unit of τ_X: {', '.join(parts)}. u and τ_X of these runs correlate by "
+        f"{np.corrcoef(x[:, 0], x[:, 3])[0, 1]:.2f}; the coefficients of few factors are shrunk"
+    )
 
 
 def write_loops(
@@ -94,11 +130,8 @@ def write_loops(
     for name in models:
         r = found.get(name)
         check = ("yes" if analysis.thrust_of(r).holds else "no") if r is not None else ""
-        cells = []
-        for run in RUNS:
-            o = runs[f"{name}|{run}"]
-            lost = "lost, " if not o.position < LOST else ""
-            cells.append(f"{lost}{o.position:.3g} ({o.lag:.3g})")
+        each = [runs[f"{name}|{run}"] for run in RUNS]
+        cells = [f"{'lost, ' if o.lost else ''}{o.position:.3g} ({o.lag:.3g})" for o in each]
         rows.append([name, "" if r is None else eigenvalues(r), check, *cells])
     report.table(["model in the plant", "eigenvalues of I + B_τ", "check", *RUNS], rows)
     report.text(
@@ -107,25 +140,37 @@ def write_loops(
         "simulation. SYSID4 is hidden in the runs that the regressions were made of: its line is the "
         "measured ship of Figs. 7.11 and 7.12, that of PLS3 the simulated one."
     )
-    for run, figure in (
-        ("RBS, ellipse, fault", "Figs. 7.11, 7.12"),
-        ("CLZ, ellipse", "Figs. 7.13 to 7.15"),
-        ("RBS, ellipse", "Fig. 7.16"),
+    tried = {n: r for n, r in found.items() if n in models}
+    verdict = unstable(
+        {n: sum(runs[f"{n}|{run}"].lost for run in RUNS) for n in tried},
+        {n: analysis.thrust_of(r).holds for n, r in tried.items()},
+        why(found),
+    )
+    report.table(["thesis", "here", "numbers"], [list(verdict)], words=True)
+    report.result("unstable", verdict)
+    hydrodynamic = ("SYSID1", "SYSID4", "PLS4")
+    for run, names, draw, what in (
+        ("RBS, ellipse, fault", ("SYSID4", "PLS3"), tracks, "tracks (Fig. 7.11)"),
+        ("RBS, ellipse, fault", ("SYSID4", "PLS3"), errors_picture, "errors (Fig. 7.12a, b)"),
+        ("RBS, ellipse, fault", ("SYSID4", "PLS3"), force_picture, "model error (Fig. 7.12c, d)"),
+        ("CLE, ellipse", hydrodynamic, tracks, "tracks (Fig. 7.13)"),
+        ("CLE, ellipse", hydrodynamic, errors_picture, "errors (Fig. 7.14a)"),
+        ("CLE, ellipse", hydrodynamic, force_picture, "model error and estimate (Figs. 7.14b, 7.15)"),
+        ("RBS, ellipse", ("SYSID4", "PLS2", "PLS3"), tracks, "tracks (Fig. 7.16)"),
     ):
-        names = [n for n in ("SYSID1", "SYSID4", "PLS2", "PLS3", "PLS4") if n in models]
-        chosen = {n: runs[f"{n}|{run}"] for n in names}
-        label = run.replace(", ", "_")
-        report.figure(f"loop_{label}", tracks(chosen), f"{run}: tracks ({figure}).")
+        shown = draw({n: runs[f"{n}|{run}"].log for n in names if n in models})
+        file = f"loop_{run}_{what.split(' (')[0]}".replace(", ", "_").replace(" ", "_")
+        report.figure(file, shown, f"{run}: {what}.")
 
 
-def tracks(runs: Mapping[str, Loop]) -> Figure:
+def tracks(logs: Mapping[str, Log]) -> Figure:
     """The paths of several ships, and that of the target."""
     figure = Figure(figsize=(8.0, 4.0), layout="constrained")
     axes = figure.subplots()
-    first = next(iter(runs.values()))
-    axes.plot(first.y_t, first.x_t, "k--", linewidth=1.0, label="target")
-    for name, run in runs.items():
-        axes.plot(run.y, run.x, linewidth=1.0, label=name)
+    first = next(iter(logs.values()))
+    axes.plot(first["guidance.y_t"], first["guidance.x_t"], "k--", linewidth=1.0, label="target")
+    for name, log in logs.items():
+        axes.plot(log["vessel.y"], log["vessel.x"], linewidth=1.0, label=name)
     axes.set(xlabel="east [m]", ylabel="north [m]")
     axes.set_aspect("equal")
     axes.legend(fontsize=7, ncols=2)

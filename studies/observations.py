@@ -1,25 +1,105 @@
-"""The observations of 6.4.4, on the ellipse at twice the speed, each with what our runs show."""
+"""The observations of 6.4.2 to 6.4.5 on the basin trials, each with what our runs show."""
+
+from collections.abc import Mapping, Sequence
+from math import isnan
 
 from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
+from .monte_carlo import Interval
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
-from .verdict import Verdict
+from .verdict import Verdict, listed
 
 MUCH = 1.5  # times that count as "substantially"; chosen
 
 
-def answered(answers: dict[str, bool | None]) -> str:
+def answered(answers: Mapping[str, str | bool | None]) -> str:
     """One word for each setting; None: no run kept up."""
     words = {True: "yes", False: "no", None: "no run kept up"}
-    return "; ".join(f"{setting}: {words[a]}" for setting, a in answers.items())
+    said = {setting: a if isinstance(a, str) else words[a] for setting, a in answers.items()}
+    return "; ".join(f"{setting}: {a}" for setting, a in said.items())
+
+
+def surely_below(ratios: Sequence[Interval]) -> str:
+    """Whether all ratios are below 1, surely; "no" where one surely is not."""
+    if any(isnan(s.mean) for s in ratios):
+        return "no run kept up"
+    if any(s.low > 1.0 for s in ratios):
+        return "no"
+    return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
+
+
+def as_in_the_basin(found: Found, trial: int) -> dict[str, Runs]:
+    """The runs of a trial with the guidance fault, as in the basin, and without."""
+    name = TRIALS[trial].name
+    return {"with the fault": found.trials[name, FAULTY], "without": found.trials[name, REGULAR]}
+
+
+def below(found: Found, thesis: str, trial: int, number: str, *pairs: tuple[str, str]) -> Verdict:
+    """Whether a number of the first of each pair of controllers is surely below that of the second."""
+    here, rows = {}, []
+    for name, runs in as_in_the_basin(found, trial).items():
+        ratios = {f"{LABELS[a]}/{LABELS[b]}": share(runs[a], runs[b], number) for a, b in pairs}
+        here[name] = surely_below(list(ratios.values()))
+        rows.append(f"{name}: {listed(ratios)}")
+    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+
+
+def held(found: Found, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
+    """Whether the mean of a number lies between two limits for every controller that kept up."""
+    here, rows = {}, []
+    for name, runs in as_in_the_basin(found, trial).items():
+        means = {LABELS[c]: mean(each, number) for c, each in runs.items()}
+        known = [m.mean for m in means.values() if m.mean == m.mean]
+        here[name] = all(low < x < high for x in known) if known else None
+        rows.append(f"{name}: {listed(means)}")
+    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+
+
+def follow(found: Found, trial: int) -> Verdict:
+    """Whether every controller keeps up in every run."""
+    runs = as_in_the_basin(found, trial)
+    fell = {name: {LABELS[c]: lost(r) for c, r in each.items()} for name, each in runs.items()}
+    return Verdict(
+        "The controllers are able to follow the figure-eight",
+        answered({name: not any(each.values()) for name, each in fell.items()}),
+        f"{TRIALS[trial].name}, runs lost, "
+        + "; ".join(f"{n}: {', '.join(f'{c} {k}' for c, k in e.items())}" for n, e in fell.items()),
+    )
+
+
+def other_sections(found: Found) -> dict[str, Sequence[Verdict]]:
+    """What the thesis says of the other three trials, by section."""
+    old, new = (RBS, ABS), (CLZ, CLE)
+    both = [(a, b) for a in old for b in new]
+    ways = [(b, a) for a, b in both]
+    crossed = ((RBS, ABS), (CLE, CLZ))
+    return {
+        "The ellipse at 0.08 m/s (6.4.2)": (
+            held(found, "The ship is inside of the desired trajectory", 0, "inside", 0.0, float("inf")),
+            below(found, "Oscillations are stronger with concurrent learning", 0, "swing", *both),
+            below(found, "IAEWWT does not show them: it is less with CL", 0, "iaewwt", *ways),
+            below(found, "CLZ tracks best", 0, "cross_track", *((CLZ, c) for c in (RBS, ABS, CLE))),
+            held(found, "Nobody adapts in surge at all", 0, "omega_hat_X", -1e-12, 1e-12),
+        ),
+        "The eight at 0.16 (6.4.3)": (
+            follow(found, 1),
+            below(found, "RBS and ABS get closer to the path than CLZ and CLE", 1, "cross_track", *both),
+            below(found, "RBS and ABS come best out of the metrics", 1, "iaewwt", *both),
+            below(found, "ABS is a bit more energy efficient than RBS", 1, "work", (ABS, RBS)),
+            below(found, "CLE is the worst", 1, "iaewwt", *((c, CLE) for c in (RBS, ABS, CLZ))),
+        ),
+        "The eight at 0.32 (6.4.5)": (
+            follow(found, 3),
+            below(found, "ABS and CLZ oscillate more than RBS and CLE", 3, "swing", *crossed),
+            below(found, "So IAEWWT of ABS surpasses that of RBS, CLZ's CLE's", 3, "iaewwt", *crossed),
+            held(found, "The period of the oscillation is near 0.1 s", 3, "frequency", 5.0, 20.0),
+        ),
+    }
 
 
 def settings(found: Found) -> dict[str, tuple[Runs, Runs]]:
     """With the guidance fault, as in the basin, and without: the slow runs and the fast ones."""
-    slow, fast = TRIALS[0].name, TRIALS[2].name
-    return {
-        name: (found.trials[slow, faulty], found.trials[fast, faulty])
-        for name, faulty in (("with the fault", FAULTY), ("without", REGULAR))
-    }
+    slow, fast = (as_in_the_basin(found, trial) for trial in (0, 2))
+    return {name: (slow[name], fast[name]) for name in slow}
 
 
 def grown(found: Found, thesis: str, number: str, unit: str) -> Verdict:

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import signal
 
 from cosim.dispatch import FinishedRun
+from fmus.hull import RotationalDamping
 
 Log = Mapping[str, np.ndarray]
 
@@ -43,6 +44,9 @@ class Outcome(NamedTuple):
         swing: RMS of the requested yaw moment above 0.5 Hz [N m]: oscillation.
         sigma: smallest singular value of the store at the end [1].
         rank: share of the time with the rank condition met [1].
+        sway: RMS of v [m/s].
+        signs: mean of the sign of v r, -1 to 1; at both ends |r|v and |v|r are one column.
+        phi: estimates of (2.30), mean over the second half; empty without adaptation.
     """
 
     done: bool
@@ -61,6 +65,9 @@ class Outcome(NamedTuple):
     swing: float
     sigma: float
     rank: float
+    sway: float
+    signs: float
+    phi: tuple[float, ...] = ()
 
     @property
     def omega(self) -> float:
@@ -68,7 +75,9 @@ class Outcome(NamedTuple):
         return self.omega_Y
 
 
-BROKEN = Outcome(False, *[float("nan")] * 15)
+BROKEN = Outcome(False, *[float("nan")] * 17, phi=())
+TRUE_PHI = tuple(RotationalDamping())
+PHI = [f"controller.phi_hat_{k + 1}" for k in range(len(TRUE_PHI))]
 
 
 def rms(x: np.ndarray) -> float:
@@ -117,6 +126,9 @@ def outcome(run: FinishedRun) -> Outcome:
         swing=rms(quick(log["controller.tau_N"], log["time"][1] - log["time"][0])[settled]),
         sigma=float(log["controller.sigma_min"][-1]) if learns else float("nan"),
         rank=float(log["controller.rank_met"][settled].mean()) if learns else float("nan"),
+        sway=rms(log["vessel.v"][settled]),
+        signs=float(np.sign(log["vessel.v"] * log["vessel.r"])[settled].mean()),
+        phi=tuple(float(log[name][half].mean()) for name in PHI if name in log),
     )
 
 

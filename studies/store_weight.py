@@ -7,15 +7,15 @@ more as printed, where learning takes the force that is asked for to be the one 
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 from .chapter5 import PATHS, UNGATED, needed
 from .monte_carlo import Content, run_all, shipped, vary
 from .outcome import Outcome, outcome, true_states
+from .store_verdicts import FULL
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import FOUR, OLD
+from .verdict import CONTROLLERS, FOUR, ORDERS, in_order, short
 
 WEIGHTS = (1.0, 0.1, 0.05, 0.01)
 # Of the table: fresh or stale, and whether samples of forces above 2 N are kept out.
@@ -27,10 +27,6 @@ FORMS = {
 }
 # Forms of which the controller is not told the clipped force, as printed.
 UNTOLD = {f"{form}, request": changes for form, changes in FORMS.items() if "ungated" in form}
-# Condition 1 is that the stored regressors have full rank: sigma_min above ``rank_tolerance``.
-TOLERANCE = 0.01
-# The thesis' order (5.3.3, 5.4.3), best first.
-ORDER = ("win_eps", "svd_eps", "win_z2", "svd_z2", "abs", "bs")
 PLAIN = "as it is"
 
 
@@ -40,7 +36,7 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
     if seconds is not None:
         base = vary(base, stop=seconds, metrics={"from": 0.5 * seconds})
     found: dict[str, Content] = {}
-    for name in dict.fromkeys([*FOUR, *OLD]):
+    for name in CONTROLLERS:
         own = true_states(vary(base, {"controller": f"{name}.fmu"}, log={"signals": needed(name)}))
         if name not in FOUR:
             found[f"{name}|{PLAIN}|1"] = own
@@ -53,35 +49,33 @@ def variants(path: str, seconds: float | None) -> dict[str, Content]:
     return found
 
 
-def label(name: str) -> str:
-    """A controller as the report calls it."""
-    return name.removeprefix("controller_").removeprefix("cl_")
-
-
 def tables(report: Report, path: str, found: Mapping[str, Sequence[Outcome]]) -> None:
-    """The position errors of one path, and whether they are in the thesis' order."""
-    plain = {label(k.split("|")[0]): o[0].position for k, o in found.items() if PLAIN in k}
+    """The position errors of one path, and whether they are in the thesis' order for it."""
+    plain = {short(k.split("|")[0]): o[0].position for k, o in found.items() if PLAIN in k}
     report.heading(path.capitalize())
     report.text(
-        "Position error, RMS [m]. " + ", ".join(f"{n}: {x:.4f}" for n, x in plain.items() if n in ORDER)
+        f"Position error, RMS [m]. {', '.join(f'{n}: {x:.4f}' for n, x in plain.items())}. The thesis' "
+        f"order on this path, best first: {', '.join(ORDERS[path])}."
     )
+    names = [short(n) for n in FOUR]
     rows, sigmas = [], []
     for form in FORMS | UNTOLD:
         for weight in WEIGHTS:
-            runs = {label(n): found[f"{n}|{form}|{weight:g}"][0] for n in FOUR}
+            runs = {short(n): found[f"{n}|{form}|{weight:g}"][0] for n in FOUR}
             errors = {name: o.position for name, o in runs.items()}
-            every = [{**errors, **plain}[n] for n in ORDER]
-            same = all(a < b for a, b in pairwise(every))
-            cells = [f"{errors[n]:.4f}" for n in ORDER[:4]]
-            rows.append([f"{form}, {weight:g}", *cells, "yes" if same else "no"])
-            shown = [f"{runs[n].sigma:.2g} ({100.0 * runs[n].rank:.0f} %)" for n in ORDER[:4]]
+            same = "yes" if in_order(errors | plain, path) else "no"
+            rows.append([f"{form}, {weight:g}", *(f"{x:.4f}" for x in errors.values()), same])
+            shown = [f"{o.sigma:.2g} ({100.0 * o.rank:.0f} %)" for o in runs.values()]
             sigmas.append([f"{form}, {weight:g}", *shown])
-    report.table(["stored errors, samples, weight", *ORDER[:4], "thesis' order"], rows)
+    report.table(["stored errors, samples, weight", *names, "thesis' order"], rows)
+    report.text(
+        f"{sum(row[-1] == 'yes' for row in rows)} of {len(rows)} settings have the thesis' order."
+    )
     report.text(
         "σ_min of the store at the end, and the share of the time in which Condition 1 is met "
-        f"(σ_min above {TOLERANCE:g}):"
+        f"(σ_min above {FULL:g}):"
     )
-    report.table(["stored errors, samples, weight", *ORDER[:4]], sigmas)
+    report.table(["stored errors, samples, weight", *names], sigmas)
 
 
 def study(out: Path, paths: Sequence[str], seconds: float | None, jobs: int | None) -> Path:

@@ -1,17 +1,26 @@
 """The conclusions of chapter 5, each with the result of our runs."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from itertools import pairwise
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from scipy import stats
 
 from .monte_carlo import Interval, interval, ratio
-from .outcome import Outcome, columns
+from .outcome import TRUE_PHI, Outcome, columns
 
 FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")
 OLD = ("controller_bs", "controller_abs", "controller_cl_svd_eps", "controller_cl_win_z2")
 CONTROLLERS = ("controller_bs", "controller_abs", *FOUR)
+# What the thesis puts first on each path, best first; the others, if there are any, come after (5.3.2,
+# 5.3.3, 5.4.3).
+ORDERS = {
+    "ellipse": ("win_eps", "svd_eps", "win_z2", "svd_z2", "abs", "bs"),
+    "eight": ("svd_eps", "win_eps"),
+}
+PRINTED = "true, stale, 0.1"  # the simulations as printed: no noise, stale errors, footnote 1
+NEAR = 0.1  # of a coefficient, within which an estimate counts as converged; chosen
 
 Table = Mapping[str, Mapping[str, list[Outcome]]]
 Paths = Mapping[str, Table]
@@ -21,6 +30,23 @@ class Verdict(NamedTuple):
     thesis: str
     here: str
     numbers: str
+
+
+def short(controller: str) -> str:
+    """A controller as the reports call it."""
+    return controller.removeprefix("controller_").removeprefix("cl_")
+
+
+def error(runs: Mapping[str, Sequence[Outcome]], name: str = "position") -> dict[str, float]:
+    """A number of each controller, mean over the seeds."""
+    return {short(c): interval(columns(o, name)).mean for c, o in runs.items()}
+
+
+def in_order(errors: Mapping[str, float], path: str) -> bool:
+    """Whether the errors of all controllers are in the thesis' order for a path."""
+    first = [errors[name] for name in ORDERS[path]]
+    others = [x for name, x in errors.items() if name not in ORDERS[path]]
+    return all(a < b for a, b in pairwise([*first, min(others, default=inf)]))
 
 
 def share(table: Table, condition: str, a: str, b: str) -> Interval:
@@ -98,16 +124,54 @@ def correlation(by_path: Paths) -> Verdict:
 def worst(by_path: Paths) -> Verdict:
     """Whether SVD with z2 is the worst of the four, and what makes it so."""
     rows = {}
-    for condition in ("mdf", "mdf, stale, 0.1", "true, stale, 0.1", "true, request"):
+    for condition in ("mdf", "mdf, stale, 0.1", PRINTED, "true, request"):
         for path, table in by_path.items():
-            errors = {n: interval(columns(o, "position")).mean for n, o in table[condition].items()}
-            four = {n: e for n, e in errors.items() if n in FOUR and e == e}
+            four = {n: e for n, e in error(table[condition]).items() if "_" in n and isfinite(e)}
             if four:
-                rows[f"{path}, {condition}"] = max(four, key=lambda n: four[n]) == FOUR[1]
+                rows[f"{path}, {condition}"] = max(four, key=lambda n: four[n]) == "svd_z2"
     ours = [rows[run] for run in rows if run.endswith(", mdf")]
     here = "reproduced" if all(ours) else "not reproduced" if not any(ours) else "on one path"
     numbers = "; ".join(f"{run}: {'worst' if is_worst else 'not'}" for run, is_worst in rows.items())
     return Verdict("CL-SVD-z2 is the worst of the four (5.3.3)", here, numbers)
+
+
+def smoothest(by_path: Paths) -> Verdict:
+    """Whether SVD with eps asks for the smoothest moment of the four."""
+    rows = {}
+    for condition in (PRINTED, "mdf"):
+        for path, table in by_path.items():
+            rows[f"{path}, {condition}"] = {
+                n: x for n, x in error(table[condition], "swing").items() if "_" in n
+            }
+    least = [min(row, key=lambda n: row[n]) == "svd_eps" for row in rows.values()]
+    here = "reproduced" if all(least) else "not reproduced" if not any(least) else "in part"
+    numbers = "; ".join(
+        f"{run}: " + ", ".join(f"{n} {x:.3g}" for n, x in row.items()) for run, row in rows.items()
+    )
+    return Verdict(
+        "CL-SVD-ε has the smoothest output (Table 5.2)",
+        here,
+        f"RMS of the requested yaw moment above 0.5 Hz [N m]: {numbers}",
+    )
+
+
+def converged(by_path: Paths) -> Verdict:
+    """How many of the coefficients of (2.30) come near their true values."""
+    count, rows = [], []
+    for condition in (PRINTED, "true"):
+        for path, table in by_path.items():
+            for name in FOUR:
+                phi = table[condition][name][0].phi
+                near = sum(abs(x - t) < NEAR * abs(t) for x, t in zip(phi, TRUE_PHI, strict=False))
+                count += [near] if condition == PRINTED else []
+                listing = ", ".join(f"{x:.3g}" for x in phi)
+                rows.append(f"{path}, {condition}, {short(name)}: {near} ({listing})")
+    return Verdict(
+        "Only a few parameters converged to the correct value (5.3.3)",
+        "reproduced" if max(count) < 0.5 * len(TRUE_PHI) else "not reproduced",
+        f"as printed {min(count)} to {max(count)} of {len(TRUE_PHI)} within {100 * NEAR:g} %; true "
+        f"{', '.join(f'{x:.3g}' for x in TRUE_PHI)}; {'; '.join(rows)}",
+    )
 
 
 def goals(by_path: Paths) -> list[Verdict]:
@@ -166,5 +230,7 @@ def claims(by_path: Paths) -> list[Verdict]:
             *senses,
         ),
         worst(by_path),
+        smoothest(by_path),
+        converged(by_path),
         correlation(by_path),
     ]

@@ -10,6 +10,7 @@ from cosim import InputError
 from diagnosis.analysis import organisation as org
 from diagnosis.analysis import partial_least_squares as pls
 from diagnosis.analysis import principal_components as pc
+from diagnosis.analysis.outlier_report import analyse, sentences
 from diagnosis.analysis.recipes import RECIPES, recipe
 from diagnosis.analysis.samples import NU, TAU, Samples, model_error
 
@@ -83,6 +84,28 @@ class TestComponents:
         assert np.mean(np.delete(bad, spikes)) < 0.02
         listed = pc.removals(m, X, NAMES, np.zeros(5000))
         assert sum(r.last - r.first + 1 for r in listed) == bad.sum()
+
+    @pytest.mark.parametrize(("kind", "why"), [("inside", "Q"), ("outside", "T2")])
+    def test_either_limit_makes_an_outlier(self, kind, why):
+        """A sample off the plane but near its middle, and one on the plane but far out."""
+        X = low_rank(2000, seed=7)
+        m = pc.fit_components(X, NAMES, 3)
+        size = 30.0 * np.sqrt(m.variance)
+        z = size[5] * m.loadings[:, 5] if kind == "inside" else size[0] * m.loadings[:, 0]
+        sample = (m.mean + m.scale * z)[None, :]
+        beyond = {"T2": m.t2(sample)[0] > m.t2_limit, "Q": m.q(sample)[0] > m.q_limit}
+        assert beyond == {"T2": why == "T2", "Q": why == "Q"}
+        assert pc.outliers(m, sample).tolist() == [True]
+        (one,) = pc.removals(m, sample, NAMES, np.zeros(1))
+        assert one.why == why
+        assert pc.outliers(m, m.mean[None, :]).tolist() == [False]
+
+    def test_limit_of_q_also_where_one_variance_left_out_stands_out(self):
+        """h0 is negative there; the limit still holds back one good sample in a hundred or fewer."""
+        variances = np.array([3.5, 2.6, *[0.414] * 7])
+        m = pc.PrincipalComponents(np.zeros(9), np.ones(9), np.eye(9), variances, 10_000, 1)
+        X = np.random.default_rng(8).normal(size=(100_000, 9)) * np.sqrt(variances)
+        assert 0.003 < np.mean(m.q(X) > m.q_limit) < 0.012
 
     def test_validated_share_by_brute_force(self):
         X = low_rank(80, seed=5)
@@ -200,6 +223,36 @@ class TestPls:
                 error = error + np.sum((s.omega[test] - m.predict(X[test])) ** 2, axis=0)
             assert press[a - 1] == pytest.approx(error)
 
+    def test_sign_changes_are_counted_by_folds(self):
+        """A coefficient whose sign the folds agree on, and one that is noise."""
+        rng = np.random.default_rng(9)
+        X = rng.normal(size=(800, 3))
+        y = np.column_stack([X[:, 0], -X[:, 0], X[:, 0]]) + 0.1 * rng.normal(size=(800, 3))
+        y[:, 2] += np.where(np.arange(800) < 100, -9.0, 1.0) * X[:, 1]  # one fold lacks what turns it
+        found = pls.fitted(X, y, (0, 1, 2), replace(recipe("PLS2"), factors=3))
+        each = np.array([pls.plain(f)[1] for f in pls.folds(X, y, 3)])
+        assert found.sign_changes[:2, 0].tolist() == [0, 0]
+        assert found.B[1, 0] < 0.0 < found.B[0, 0]
+        assert found.B[2, 1] < 0.0, "of all blocks together"
+        assert found.sign_changes[2, 1] == (each[:, 2, 1] > 0.0).sum() == 1
+
+    def test_fewest_factors_that_are_as_good_as_the_best(self):
+        error = np.array([[9.0, 1.0], [5.0, 1.0], [4.0, 1.0], [3.99, 1.0], [6.0, 1.0]])
+        assert pls.enough(error) == 3, "0.2 % above the best is as good"
+        assert pls.enough(error[::-1]) == 2
+        assert pls.enough(np.array([[1.0], [2.0], [3.0]])) == 1
+        assert pls.enough(np.array([[3.0], [2.0], [1.0]])) == 3
+
+    def test_explained_share_by_factors_is_that_of_each_regression(self):
+        s = made(n=400)
+        found = pls.fitted(s.x, s.omega, (0, 1, 2), replace(recipe("PLS2"), factors=4))
+        for a in (1, 3, 4):
+            guess = pls.regression(s.x, s.omega, a).predict(s.x)
+            left = np.sum((s.omega - guess) ** 2, axis=0)
+            r2 = 1.0 - left / np.sum((s.omega - s.omega.mean(axis=0)) ** 2, axis=0)
+            assert found.r2_by_factors[a - 1] == pytest.approx(r2)
+        assert found.r2 == pytest.approx(found.r2_by_factors[3])
+
     def test_separate_regressions_stand_side_by_side(self):
         found = pls.regressed(made(), recipe("PLS4"))
         assert len(found.parts) == 3
@@ -228,6 +281,19 @@ class TestPls:
             pls.regressed(s, recipe("PLS2"))
         with pytest.raises(InputError, match="too few"):
             pls.regressed(made(n=100), recipe("PLS2"))
+
+
+def test_remark_where_the_validated_share_exceeds_the_explained_one():
+    def said(block):
+        """Samples of which one block varies far more in the direction that is explained."""
+        s = made(n=1600)
+        s.nu[:block] *= 4.0
+        s.omega[:] = s.nu * (1.0, 1.0, 1.0) + 1e-4 * np.random.default_rng(0).normal(size=s.nu.shape)
+        a = analyse([s])
+        return "Q² exceeds R²" in " ".join(sentences(a)), (a.q2 > a.model.explained).any()
+
+    assert said(200) == (True, True)
+    assert said(0) == (False, False)
 
 
 def test_model_error_of_the_control_model_is_the_rotational_damping():

@@ -1,6 +1,8 @@
 """The thesis' analysis of runs: SysID by concurrent learning, models in the plant, the three commands."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +13,7 @@ from support.measured import sail, smoothed
 from cosim import InputError
 from diagnosis.analysis import concurrent_passes as cp
 from diagnosis.analysis import into_the_plant as plant
-from diagnosis.analysis.samples import Samples, gather_samples, model_error
+from diagnosis.analysis.samples import Samples, by_run, gather_samples, joined, model_error
 from diagnosis.analysis.sysid_report import warnings
 from diagnosis.analysis.table_7_1 import NAMES, TABLE_7_1, row
 from diagnosis.analysis.table_7_1 import plant as plant_of
@@ -24,6 +26,7 @@ from fmus.base_units import base_exponents
 from fmus.declare import variables
 from fmus.effects import STANDARD
 from fmus.effects.linear_map import AXES, REGRESSORS, parameter, regressors
+from fmus.hull import RotationalDamping
 from fmus.signals import Force
 from fmus.vessel.vessel import COMPONENT, State
 from studies import sysid4
@@ -156,6 +159,57 @@ class TestPasses:
         rich = made(row("SYSID4"), n=800)
         assert "|r|v =" not in " ".join(warnings(cp.identify([rich]), [rich]))
 
+    def test_pass_is_that_of_7_10_with_the_last_twenty_stored_samples(self):
+        """Written out from the equations, so that window, order and gain must be these."""
+        m = cp.material(made(row("SYSID2"), n=3000))
+        stored, phi = [], np.zeros(14)
+        for k in range(m.dt.size):
+            if m.stored[k]:
+                stored = [*stored, k][-20:]
+            if m.dt[k] > 0.0:
+                slope = m.F[k].T @ (m.y[k] - m.F[k] @ phi)
+                Q = m.F[k].T @ m.F[k]
+                for j in stored:
+                    slope = slope + m.F[j].T @ (m.y[j] - m.F[j] @ phi)
+                    Q = Q + m.F[j].T @ m.F[j]
+                pace = m.dt[k] / max(1.0, m.dt[k] * np.trace(np.diag(cp.GAMMA) @ Q))
+                phi = phi + pace * cp.GAMMA * slope
+        assert len(stored) == 20 < m.stored.sum()
+        assert cp.one_pass(np.zeros(14), m) == pytest.approx(phi, rel=1e-9, abs=1e-12)
+
+    def test_large_regressors_do_not_make_a_pass_diverge(self):
+        phi = row("SYSID3")
+        m = cp.material(made(phi, n=600))
+        large = replace(m, F=30.0 * m.F, y=30.0 * m.y)
+        now = cp.one_pass(np.zeros(14), large)
+        assert np.sum((now - phi) ** 2 / cp.GAMMA) < np.sum(phi**2 / cp.GAMMA)
+
+    def test_limits_from_the_data_keep_the_bulk_and_block_what_stands_out(self):
+        s = made(row("SYSID4"), n=1000)
+        s.nu_dot[:] = 0.008 * np.random.default_rng(3).normal(size=(1000, 3))
+        s.nu_dot[500] = 0.1
+        s.tau[:] *= 0.2
+        given, found = cp.allowed(s), cp.allowed(s, cp.fences([s]))
+        assert given.all(), "0.2 m/s2 is far more than this ship's acceleration"
+        assert not found[500:521].any()
+        assert found[:500].all()
+        assert found[522:].all()
+        scaled = replace(s, nu_dot=10.0 * s.nu_dot)
+        assert (cp.allowed(scaled, cp.fences([scaled])) == found).all()
+
+    def test_joined_runs_are_refused_and_taken_by_themselves(self):
+        a, b = made(row("SYSID4"), n=700), replace(made(row("SYSID4"), n=700, seed=1))
+        b.run[:] = "other"
+        both = joined([a, b])
+        for use in (cp.thinned, cp.material, lambda s: cp.identify([s]), lambda s: cp.explained([s], a)):
+            with pytest.raises(ValueError, match="time goes back"):
+                use(both)
+        one, two = by_run(both)
+        assert [s.names for s in (one, two)] == [["made"], ["other"]]
+        assert (one.time == a.time).all()
+        found = cp.identify([one, two])
+        assert found.passed == pytest.approx([1.0, 1.0], abs=0.01)
+
     def test_nothing_is_learned_for_a_second_after_a_spike(self):
         s = made(row("SYSID4"), n=400)
         s.tau[100] = 10.0
@@ -163,6 +217,23 @@ class TestPasses:
         assert not beta[100:121].any()
         assert beta[99]
         assert beta[122]
+
+
+# Table 7.1 as it is printed.
+PRINTED = """
+[-0.3, -6.5,-0.025, 0 0 0 0 -1.44, -2.7, 1.4, 8.2] [0, 0, 0]
+[-0.30,-4.0,0.225,0,0.38,0,0.067,0.02,-1.7,-0.02,-0.23] [0.36, 0, 0.23]
+[-0.33,-4.6,0.27,-0.015,1.7,0.02,0.2,0.02,-2.3,-0.026,-0.26] [0.11, 0, 0.18]
+[-0.26,-3.5,0.2,-0.014,1.55,0.017,0.2,0.017,-1.8,-0.02,-0.2] [0.3, 0, 0.31]
+"""
+
+
+def test_rows_of_table_7_1_are_the_printed_ones_in_the_order_of_7_2():
+    printed = [[float(x) for x in re.findall(r"-?[\d.]+", line)] for line in PRINTED.split("\n")[1:-1]]
+    assert [list(x) for x in TABLE_7_1.values()] == printed
+    assert NAMES[:3] == ("X_absu_u", "X_u", "X_absu_r")
+    assert NAMES[3:11] == tuple(RotationalDamping._fields)
+    assert NAMES[11:] == ("delta_X", "delta_Y", "delta_N")
 
 
 def test_rows_of_table_7_1_are_ships():
@@ -199,6 +270,29 @@ def runs(tmp_path_factory):
         columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
         pd.DataFrame(table, columns=columns).to_csv(folder / f"{name}.csv", index=False)
     return folder
+
+
+def test_acceleration_in_a_steady_turn_is_none_and_the_force_that_of_both_steps(tmp_path):
+    """Body-fixed velocities do not change in a steady turn, though the earth-fixed ones do all the time."""
+    t = 0.05 * np.arange(1200)
+    u, v, r = 0.3, 0.1, 0.4
+    psi = r * t
+    x = (u * np.sin(psi) + v * np.cos(psi)) / r
+    y = (-u * np.cos(psi) + v * np.sin(psi)) / r
+    tau = np.column_stack([np.where(np.arange(t.size) % 2, k, -0.01) for k in (0.0, 0.005, 0.02)])
+    pose = np.column_stack([x, y, np.angle(np.exp(1j * psi))])
+    pose += 2e-4 * np.random.default_rng(0).normal(size=pose.shape)
+    columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+    pd.DataFrame(np.column_stack([t, pose, tau]), columns=columns).to_csv(
+        tmp_path / "t.csv", index=False
+    )
+    (s,) = gather_samples([tmp_path / "t.csv"], "smoothed")
+    middle = (s.time > 5.0) & (s.time < 55.0)
+    assert s.nu[middle].mean(axis=0) == pytest.approx([u, v, r], abs=5e-3)
+    assert np.abs(s.nu_dot[middle].mean(axis=0)).max() < 0.2 * min(r * v, r * u)
+    rows = np.round(s.time / 0.05).astype(int)[1:]
+    assert s.tau[1:] == pytest.approx(0.5 * (tau[rows] + tau[rows - 1]))
+    assert np.abs(tau[rows] - tau[rows - 1]).min() > 0.009, "either step alone would be another force"
 
 
 def test_both_estimates_of_velocity_are_those_of_the_run(runs):

@@ -225,8 +225,11 @@ def test_adaptive_backstepping_that_is_far_better_would_be_seen():
 
 def test_those_who_fall_behind_are_told():
     fast = {c: {"lost": 1.0} for c in (trials.CLZ, trials.CLE)}
-    assert lessons.fallen(made_up(fast)).here == "reproduced"
-    assert lessons.fallen(made_up({trials.RBS: {"lost": 1.0}})).here == "not reproduced"
+    assert lessons.fallen(made_up(faulty=fast)).here == "reproduced"
+    assert lessons.fallen(made_up(fast)).here == "not reproduced", (
+        "in the basin the guidance had its fault"
+    )
+    assert lessons.fallen(made_up(fast, {**fast, trials.RBS: {"lost": 1.0}})).here == "not reproduced"
 
 
 def test_observations_of_the_swift_ellipse():

@@ -29,9 +29,10 @@ def test_parts_that_cancel_leave_nothing():
     assert surge_parts(log, phi) == pytest.approx((0.1, -0.1, 0.0))
 
 
-def found(own, other):
+def found(own, other, alone=-0.002):
     laps = {name: [Lap(other, abs(other), 0.02, (0.4, 0.1, 0.1))] * 3 for name in improved.ORIGINALS}
-    return {"mdf": {IMPROVED: [Lap(own, abs(own), 0.01, (0.0, 0.0, 0.0))] * 3, **laps}}
+    laps[improved.SURGE_ONLY] = [Lap(alone, abs(alone), 0.02, (0.4, 0.1, 0.1))] * 3
+    return {"mdf": {IMPROVED: [Lap(own, abs(own), 0.01, (0.1, 0.0, 0.0))] * 3, **laps}}
 
 
 @pytest.mark.parametrize(
@@ -44,6 +45,12 @@ def found(own, other):
 )
 def test_verdicts_follow_the_numbers(own, other, verdicts):
     assert [claim.here for claim in claims(found(own, other))[:2]] == verdicts
+
+
+@pytest.mark.parametrize(("alone", "here"), [(-0.002, "yes"), (-0.2, "no")])
+def test_damping_in_surge_alone_takes_the_lag_or_not(alone, here):
+    (claim,) = [c for c in claims(found(-0.002, -0.3, alone)) if c.thesis.startswith("(7.1) alone")]
+    assert claim.here == here
 
 
 @pytest.mark.slow
@@ -67,4 +74,4 @@ def test_improved_controller_loses_its_lag_and_the_originals_do_not(tmp_path, mo
     size = {name: runs[0]["size"] for name, runs in laps.items()}
     assert size.pop(IMPROVED) < 0.05 < 0.2 < min(size.values())
     pictures = [line for line in report.read_text().splitlines() if line.startswith("![")]
-    assert len(pictures) == 6
+    assert len(pictures) == 2 * (4 + 2)

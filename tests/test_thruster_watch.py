@@ -42,6 +42,28 @@ def test_more_force_or_a_small_loss_is_no_failure(share):
     assert watch.evidence(window(share, (2,)), watch.Usual(), (2,), 0.15)[1] == 0.0
 
 
+@pytest.mark.parametrize("share", [0.0, 0.16, 0.2, 0.3])
+def test_probability_is_that_of_bayes(share):
+    """Of two hypotheses with Gaussian errors: no loss, and the loss that fits best, so rare beforehand."""
+    p, usual = watch.Params(), watch.Usual(judged=1e9)
+    size = 0.2  # so that no error counts as an outlier
+    rows = tuple(
+        row._replace(f=tuple(size * x for x in row.f), g=tuple(size * x for x in row.g))
+        for row in window(share, (2,))
+    )
+    deviation = np.sqrt(usual.square[2] * rows[0].unsure)
+    f, g = (np.array([getattr(row, name)[2] for row in rows]) / deviation for name in "fg")
+    assert np.abs(g).max() < watch.HUBER
+    gain = max(
+        np.sum(g[:k] ** 2 - (g[:k] + share * f[:k]) ** 2)
+        for k in range(watch.LEAST_ROWS, watch.ROWS + 1)
+    )
+    before = p.failure_rate * p.sample_time
+    odds = before * np.exp(0.5 * gain)
+    _, told = watch.judged(rows, usual, p)
+    assert told.failed_bow == pytest.approx(odds / (1.0 + odds + before), rel=1e-9)
+
+
 def test_one_bad_sample_counts_little():
     rows = list(window(0.0, (2,)))
     rows[2] = rows[2]._replace(g=(0.0, 0.0, -100.0 * rows[2].f[2]))

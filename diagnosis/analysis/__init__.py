@@ -8,10 +8,26 @@ of the model error goes back into the ship by the effect ``linear_map``::
     diagnosis.model.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
 """
 
-from .analysis_figures import before_and_after, coefficient_bars, loadings, model_error_over_time
-from .concurrent_passes import GAMMA, Identified, explained, identify, material, one_pass
+from .analysis_figures import (
+    before_and_after,
+    coefficient_bars,
+    loadings,
+    model_error_over_time,
+    share_of_variance,
+)
+from .concurrent_passes import (
+    GAMMA,
+    Identified,
+    explained,
+    fences,
+    identify,
+    material,
+    one_pass,
+    regressors,
+)
 from .constrained_fit import Stable, nearest_stable
 from .into_the_plant import EffectiveThrust, as_model, effective_thrust, goes_into_the_plant, thrust_of
+from .outlier_report import analyse, sentences
 from .partial_least_squares import Regressed, regressed
 from .pls_report import correlations
 from .principal_components import PrincipalComponents, fit_components, outliers, removals
@@ -22,6 +38,7 @@ from .samples import (
     SETTLED,
     TAU,
     Samples,
+    by_run,
     gather_samples,
     joined,
     model_error,
@@ -45,12 +62,15 @@ __all__ = [
     "Regressed",
     "Samples",
     "Stable",
+    "analyse",
     "as_model",
     "before_and_after",
+    "by_run",
     "coefficient_bars",
     "correlations",
     "effective_thrust",
     "explained",
+    "fences",
     "fit_components",
     "gather_samples",
     "goes_into_the_plant",
@@ -66,8 +86,11 @@ __all__ = [
     "plant",
     "recipe",
     "regressed",
+    "regressors",
     "removals",
     "row",
+    "sentences",
+    "share_of_variance",
     "thrust_of",
     "without_outliers",
 ]

@@ -1,6 +1,7 @@
 """Figures of the analyses, drawn within the style of the report's page."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS = 1500  # at most in a cloud or a line, so that the page stays small (chosen)
-COLOURS = (AFTER, BEFORE, THIRD)
+COLOURS = (AFTER, BEFORE, THIRD, "black")
 
 
 def thinned(n: int) -> np.ndarray:
@@ -20,7 +21,9 @@ def thinned(n: int) -> np.ndarray:
     return np.unique(np.linspace(0, n - 1, min(n, POINTS)).astype(int))
 
 
-def share_of_variance(explained: np.ndarray, validated: np.ndarray, kept: int) -> "Figure":
+def share_of_variance(
+    explained: np.ndarray, validated: np.ndarray, kept: int, label: str = "components"
+) -> "Figure":
     """Explained and cross-validated variance over the number of components or factors (Fig. 7.6a)."""
     figure = figure_of(2.4)
     panel = figure.subplots()
@@ -28,7 +31,7 @@ def share_of_variance(explained: np.ndarray, validated: np.ndarray, kept: int) -
     panel.plot(count, 100.0 * explained, "o-", color=AFTER, label="R²")
     panel.plot(count, 100.0 * validated, "s--", color=BEFORE, label="Q²")
     panel.axvline(kept, color=BAND, linewidth=0.8)
-    panel.set(xlabel="components", ylabel="explained [%]", xticks=count)
+    panel.set(xlabel=label, ylabel="explained [%]", xticks=count)
     panel.legend()
     return figure
 
@@ -110,7 +113,7 @@ def model_error_over_time(
     rows = thinned(time.size)
     for k, (panel, label) in enumerate(zip(panels, ("X [N]", "Y [N]", "N [N·m]"), strict=True)):
         panel.plot(rows, measured[rows, k], color=BAND, linewidth=0.8, label="ω")
-        for colour, (name, values) in zip(COLOURS, models.items(), strict=False):
+        for colour, (name, values) in zip(cycle(COLOURS), models.items(), strict=False):
             panel.plot(rows, values[rows, k], color=colour, linewidth=1.0, label=name)
         panel.set_ylabel(f"ω {label}")
     panels[0].legend(ncols=4)

@@ -15,12 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmus.controller import cl_improved
+from fmus.controller.blocker import BlockerOptions
 from fmus.controller.models import SURGE
 from fmus.controller.parametrisation import Belief
 from fmus.controller.store import SIZE
 
 from .principal_components import sequential
-from .samples import Samples
+from .samples import Samples, joined
 
 EVERY = 0.05  # s between the samples that are used: a tenth of the quickest motion (chosen)
 CHANGE = 0.01  # of the estimate over a pass, below which it has come to rest (7.2.4)
@@ -43,18 +44,35 @@ def regressors(s: Samples) -> np.ndarray:
 
 
 def thinned(s: Samples) -> Samples:
-    """Samples no closer than EVERY in time."""
+    """Samples of one run no closer than EVERY in time.
+
+    Raises:
+        ValueError: time goes back, as where runs are joined.
+    """
+    if (np.diff(s.time) < 0.0).any():
+        raise ValueError(f"time goes back in {', '.join(s.names)}: give each run by itself (by_run)")
     place = np.floor((s.time - s.time[0]) / EVERY + 1e-9)
     return s.rows(np.concatenate([[True], np.diff(place) > 0.0]))
 
 
-def allowed(s: Samples) -> np.ndarray:
+def fences(runs: Sequence[Samples]) -> BlockerOptions:
+    """Limits of Algorithm 4 from the data: Tukey's far fence (1977) of the norms of all samples.
+
+    It is the third quartile and three times the distance of the quartiles: 4.7 standard deviations of a
+    normal distribution.
+    """
+    norms = [np.linalg.norm(getattr(joined(runs), name), axis=1) for name in ("nu_dot", "nu", "tau")]
+    low, high = np.quantile(norms, [0.25, 0.75], axis=1)
+    nu_dot, nu, tau = (high + 3.0 * (high - low)).tolist()
+    return BlockerOptions(nu_dot, nu, tau, PARAMS.blocker.block_time)
+
+
+def allowed(s: Samples, limits: BlockerOptions = PARAMS.blocker) -> np.ndarray:
     """beta (n,): False within ``block_time`` after a spike of nu_dot, nu or tau (Algorithm 4)."""
-    p = PARAMS.blocker
-    limits = ((s.nu_dot, p.nu_dot_max), (s.nu, p.nu_max), (s.tau, p.tau_max))
-    spikes = np.any([np.linalg.norm(x, axis=1) > most for x, most in limits], axis=0)
+    pairs = ((s.nu_dot, limits.nu_dot_max), (s.nu, limits.nu_max), (s.tau, limits.tau_max))
+    spikes = np.any([np.linalg.norm(x, axis=1) > most for x, most in pairs], axis=0)
     last = np.maximum.accumulate(np.where(spikes, s.time, -np.inf))
-    return s.time - last > p.block_time
+    return s.time - last > limits.block_time
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +92,10 @@ class Material:
     stored: np.ndarray
 
 
-def material(s: Samples) -> Material:
+def material(s: Samples, limits: BlockerOptions = PARAMS.blocker) -> Material:
     """What the passes over a run need; which samples are stored does not depend on the estimate."""
     s = thinned(s)
-    F, beta = regressors(s), allowed(s)
+    F, beta = regressors(s), allowed(s, limits)
     dt = np.diff(s.time, prepend=s.time[0])
     stored = np.zeros(s.time.size, bool)
     last = np.zeros(F.shape[1:])
@@ -116,6 +134,7 @@ class Identified:
         least_squares, ridge: (14,), of the same samples at once.
         condition: (3,), of the columns of each axis, divided by their norms.
         own: (14,), share of each column that the others of its axis cannot give.
+        passed: share of each run's time in which the spike blocker lets it learn.
     """
 
     phi: np.ndarray
@@ -125,6 +144,7 @@ class Identified:
     ridge: np.ndarray
     condition: np.ndarray
     own: np.ndarray
+    passed: list[float]
 
     @property
     def settled(self) -> bool:
@@ -132,13 +152,17 @@ class Identified:
         return self.change < CHANGE
 
 
-def identify(runs: Sequence[Samples]) -> Identified:
+def identify(runs: Sequence[Samples], limits: BlockerOptions = PARAMS.blocker) -> Identified:
     """Passes over runs until the estimate rests.
 
     Args:
-        runs: of the same ship.
+        runs: of the same ship, each by itself.
+        limits: of the spike blocker, those of the improved controller by default.
+
+    Raises:
+        ValueError: time goes back within a run.
     """
-    made = [material(s) for s in runs]
+    made = [material(s, limits) for s in runs]
     phi, change, count = np.zeros(GAMMA.size), np.inf, 0
     while count < MOST and change >= CHANGE:
         before = phi
@@ -155,7 +179,8 @@ def identify(runs: Sequence[Samples]) -> Identified:
         least[columns] = np.linalg.lstsq(A, y[:, axis], rcond=None)[0]
         ridge[columns] = by_ridge(A, y[:, axis])
         condition[axis], own[columns] = separability(A)
-    return Identified(phi, count, change, least, ridge, condition, own)
+    passed = [float(np.mean(m.dt > 0.0)) for m in made]
+    return Identified(phi, count, change, least, ridge, condition, own, passed)
 
 
 def penalised(A: np.ndarray, y: np.ndarray, penalty: float) -> np.ndarray:

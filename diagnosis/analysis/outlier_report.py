@@ -102,6 +102,12 @@ def sentences(a: Analysed) -> Iterator[str]:
         f"{len(VARIABLES)} variables in {m.samples} samples, "
         f"cross-validated {percent(a.q2[m.kept - 1])}."
     )
+    above = np.flatnonzero(a.q2 > m.explained + 1e-9) + 1
+    if above.size:
+        yield (
+            f"Q² exceeds R² with {', '.join(map(str, above))} components: what they explain varies more "
+            "in some of the blocks left out than in the rest; there Q² says nothing on their number."
+        )
     gone = int((~a.kept).sum())
     yield (
         f"Beyond the 99 % limits of T² ({number(m.t2_limit)}) or Q ({number(m.q_limit)}): {gone} "
@@ -112,7 +118,7 @@ def sentences(a: Analysed) -> Iterator[str]:
 def document(a: Analysed, estimates: str) -> Document:
     """The page."""
     m, s = a.model, a.samples
-    first, second = list(sentences(a))
+    told = " ".join(sentences(a))
     Z = m.scores(a.X)
     plane = m.loadings[:, :2] * np.sqrt(m.variance[:2])
     share = Section(
@@ -168,4 +174,4 @@ def document(a: Analysed, estimates: str) -> Document:
         ],
     )
     made = {"runs": ", ".join(s.names), "estimates": estimates}
-    return Document("Principal components", f"{first} {second}", [share, gone], made)
+    return Document("Principal components", told, [share, gone], made)

@@ -47,21 +47,25 @@ def folds(X: np.ndarray, Y: np.ndarray, factors: int, blocks: int = BLOCKS) -> l
     ]
 
 
-def press(X: np.ndarray, Y: np.ndarray, most: int, blocks: int = BLOCKS) -> np.ndarray:
-    """Squared error (most, p) of blocks left out, by 1 ... most factors, (3.14).
+def left_over(X: np.ndarray, Y: np.ndarray, most: int, rest: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Squared error (most, p) on rows of a regression of the rest, by 1 ... most factors.
 
     The factors of NIPALS do not depend on how many follow, so that one regression with all gives each.
     """
-    found = np.zeros((most, Y.shape[1]))
-    for rows in sequential(X.shape[0], blocks):
-        rest = np.setdiff1d(np.arange(X.shape[0]), rows)
-        m = regression(X[rest], Y[rest], most)
-        Z = m.transform(X[rows])
-        scale = Y[rest].std(axis=0, ddof=1)
-        for a in range(most):
-            guess = (Z[:, : a + 1] @ m.y_loadings_[:, : a + 1].T) * scale + Y[rest].mean(axis=0)
-            found[a] += np.sum((Y[rows] - guess) ** 2, axis=0)
-    return found
+    m = regression(X[rest], Y[rest], most)
+    Z, scale = m.transform(X[rows]), Y[rest].std(axis=0, ddof=1)
+    guess = np.cumsum(Z.T[:, :, None] * (m.y_loadings_.T * scale)[:, None, :], axis=0)
+    return np.sum((Y[rows] - Y[rest].mean(axis=0) - guess) ** 2, axis=1)
+
+
+def press(X: np.ndarray, Y: np.ndarray, most: int, blocks: int = BLOCKS) -> np.ndarray:
+    """Squared error (most, p) of blocks left out, by 1 ... most factors, (3.14)."""
+    every = np.arange(X.shape[0])
+    parts = sequential(X.shape[0], blocks)
+    return sum(
+        (left_over(X, Y, most, np.setdiff1d(every, rows), rows) for rows in parts),
+        np.zeros((most, Y.shape[1])),
+    )
 
 
 def enough(error: np.ndarray, least: float = 0.01) -> int:
@@ -82,7 +86,7 @@ class Fitted:
         std: (p, m), standard deviation of B over the folds.
         sign_changes: (p, m), folds in which the sign is another.
         r2, q2: (p,), explained and cross-validated share of the sum of squares about the mean.
-        by_factors: (most, p), q2 of 1 ... most factors.
+        by_factors, r2_by_factors: (most, p), q2 and r2 of 1 ... most factors.
     """
 
     axes: tuple[int, ...]
@@ -95,6 +99,7 @@ class Fitted:
     r2: np.ndarray
     q2: np.ndarray
     by_factors: np.ndarray
+    r2_by_factors: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +157,7 @@ def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) 
     m = regression(X, y, factors)
     c, B = plain(m)
     each = np.array([plain(f)[1] for f in folds(X, y, factors)])
-    left = np.sum((y - c - X @ B.T) ** 2, axis=0)
+    left = left_over(X, y, most, np.arange(len(y)), np.arange(len(y)))
     return Fitted(
         axes,
         factors,
@@ -161,9 +166,10 @@ def fitted(X: np.ndarray, Y: np.ndarray, axes: tuple[int, ...], recipe: Recipe) 
         B,
         each.std(axis=0, ddof=1),
         np.sum(each * B < 0.0, axis=0),
-        1.0 - left / total,
+        1.0 - left[factors - 1] / total,
         1.0 - error[factors - 1] / total,
         1.0 - error / total,
+        1.0 - left / total,
     )
 
 

@@ -124,7 +124,11 @@ def _part(r: Regressed, part: Fitted) -> Section:
         ]
         for j, n in enumerate(r.columns)
     ]
-    bars = [
+    shown = pictures.share_of_variance(
+        part.r2_by_factors.mean(axis=1), part.by_factors.mean(axis=1), part.factors, "factors"
+    )
+    bars = [Plot(shown, "Explained variance, mean of the axes (Figs. 7.6a, 7.8a, 7.9).")]
+    bars += [
         Plot(
             pictures.coefficient_bars(part.B[k] * scale, part.std[k] * scale, r.columns, axis),
             f"Force by one standard deviation of each column, {axis}.",

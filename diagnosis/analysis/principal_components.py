@@ -64,15 +64,19 @@ class PrincipalComponents:
 
     @property
     def q_limit(self) -> float:
-        """Limit of Q by Jackson and Mudholkar (1979), from the variances that are left out."""
+        """Limit of Q by Jackson and Mudholkar (1979), from the variances that are left out.
+
+        Where one of them is far larger than the others, h0 is negative, the normal approximation has no
+        upper limit from some level on, and the limit is infinite.
+        """
         left = self.variance[self.kept :]
         t1, t2, t3 = (float(np.sum(left**k)) for k in (1, 2, 3))
         if not t1 > 0.0:
             return 0.0
-        h0 = 1.0 - 2.0 * t1 * t3 / (3.0 * t2 * t2)
+        h0 = 1.0 - 2.0 * t1 * t3 / (3.0 * t2 * t2) or 1e-9
         c = float(stats.norm.ppf(LEVEL))
-        inner = c * np.sqrt(2.0 * t2 * h0 * h0) / t1 + 1.0 + t2 * h0 * (h0 - 1.0) / (t1 * t1)
-        return t1 * float(inner ** (1.0 / h0))
+        inner = c * h0 * np.sqrt(2.0 * t2) / t1 + 1.0 + t2 * h0 * (h0 - 1.0) / (t1 * t1)
+        return t1 * float(inner ** (1.0 / h0)) if inner > 0.0 else np.inf
 
 
 def standardise(X: np.ndarray, names: list[str]) -> tuple[np.ndarray, np.ndarray]:

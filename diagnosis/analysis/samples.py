@@ -77,6 +77,11 @@ def joined(parts: Sequence[Samples]) -> Samples:
     return Samples(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
+def by_run(samples: Samples) -> list[Samples]:
+    """Each run by itself, as what acts in time must have it."""
+    return [samples.rows(samples.run == name) for name in samples.names]
+
+
 def without_outliers(samples: Samples) -> Samples:
     """The samples within the limits of a PCA of model error, velocity and force (7.3).
 
