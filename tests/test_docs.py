@@ -2,8 +2,12 @@
 
 import ast
 import importlib
+import json
 import pkgutil
 import re
+import subprocess
+import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -105,6 +109,72 @@ def test_files_that_a_page_names_exist(page):
     text = page.read_text(encoding="utf-8")
     for name in re.findall(r"`((?:fmus|cosim|diagnosis|tests|studies|benchmarks)/[\w./]+)`", text):
         assert (ROOT / name).exists() or name in EXAMPLES, name
+
+
+def blocks(kind):
+    """(page, reason it is not run here, text) of each code block of a kind; CONTRIBUTING's by its tests."""
+    for page in PAGES:
+        for reason, text in re.findall(
+            rf"(?:<!-- (run by [^>]*) -->\n)?```{kind}\n(.*?)```", page.read_text("utf-8"), re.DOTALL
+        ):
+            yield pytest.param(page, reason, text, id=f"{page.name}: {text.splitlines()[0][:40]}")
+
+
+@pytest.mark.parametrize(("page", "reason", "text"), [*blocks("python")])
+def test_python_of_the_pages_is_run_by_the_test_that_a_page_names(page, reason, text):
+    compile(text, page.name, "exec")
+    if page.name == "CONTRIBUTING.md":
+        tests = ["tests/test_own_effects.py", "tests/test_fmus.py", "tests/test_faults.py"]
+        assert all("CONTRIBUTING.md" in (ROOT / test).read_text("utf-8") for test in tests)
+    elif reason:
+        (test,) = re.findall(r"tests/\w+\.py", reason)
+        assert (ROOT / test).is_file()
+        assert page.name in (ROOT / test).read_text("utf-8") or ":" in reason, "what it does instead"
+    else:
+        assert page.name in RUN_HERE, "give the block a test, or say by which one it is run"
+
+
+# Pages whose code needs no more than a learned model in the folder.
+RUN_HERE = {"stability.md", "getting_started.md"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("page", "reason", "text"), [b for b in blocks("python") if b.values[0].name in RUN_HERE]
+)
+def test_python_of_the_pages_runs(page, reason, text, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    diagnosis.model.write_model(tmp_path / "model.ssv", diagnosis.Model().plus({"delta_X_u": -2.0}))
+    exec(compile(text, page.name, "exec"), {"__name__": "page"})
+
+
+@cache
+def help_of(module):
+    """What a command of ours says of its options."""
+    return subprocess.run(
+        [sys.executable, "-m", module, "--help"], capture_output=True, text=True, cwd=ROOT, check=True
+    ).stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_commands_of_the_pages_have_the_options_that_are_shown(page):
+    for kind in ("sh", "bash"):
+        for text in re.findall(rf"```{kind}\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
+            for line in text.replace("\\\n", " ").splitlines():
+                for module, rest in re.findall(
+                    r"python -m ((?:cosim|fmus|diagnosis|studies|benchmarks)[\w.]*)([^#&]*)", line
+                ):
+                    for option in re.findall(r"(?<=\s)--[\w-]+", rest):
+                        assert option in help_of(module), f"{module} {option}"
+                    for name in re.findall(r"scenarios/[\w./]+", rest):
+                        assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize(("page", "reason", "text"), [*blocks("json")])
+def test_json_of_the_pages_can_be_read(page, reason, text):
+    text = text.strip().rstrip(",")
+    json.loads(text if text[0] in "[{" else f"{{{text}}}")  # a part of a scenario stands without braces
 
 
 EXAMPLES = {"fmus/controller/pull.py"}  # a newcomer's
