@@ -232,7 +232,9 @@ def _parser() -> argparse.ArgumentParser:
         help="result folder (results/<name>; where another run is there, results/<name>_2, ...)",
     )
     parser.add_argument(
-        "--overwrite", action="store_true", help="use results/<name>, whatever run is there"
+        "--overwrite",
+        action="store_true",
+        help="use results/<name>, whatever run is there; replace a log that is of no run",
     )
     parser.add_argument(
         "--log",

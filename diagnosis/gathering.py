@@ -15,7 +15,7 @@ from cosim import InputError
 from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
 from cosim.process import end_with_parent, without_program
 
-from .data import Run, clean, read
+from .data import Run, clean, read, thinned
 from .model import Integrals, integrals
 from .progress import Advance, silent
 from .smoothing import Smoothed, smooth
@@ -69,7 +69,7 @@ def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
 
 
 def _smoothed(run: Run, anyway: bool) -> Smoothed:
-    return smooth(clean(run, anyway))
+    return smooth(thinned(clean(run, anyway)))
 
 
 def _begin(parent: int) -> None:

@@ -20,7 +20,7 @@ from cosim.fmu import LocalInstance, Model, archive_check
 from cosim.master import loop_surroundings
 from cosim.system import own_fmus
 from fmus.build import build
-from fmus.build.building import cache_folder
+from fmus.build.cached_fmu import cache_folder
 from fmus.build.platforms import native_targets
 
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
@@ -139,9 +139,9 @@ def _ask_the_builder_once(_session_cache):
     """
     ask, cache, known = own_fmus.run_builder, cache_folder(), {}
 
-    def builder(*arguments):
+    def builder(*arguments, warnings=None):
         if arguments[0] != "--" or cache_folder() != cache:
-            return ask(*arguments)
+            return ask(*arguments, warnings=warnings)
         names = arguments[1:]
         if missing := [name for name in names if name not in known]:
             known.update(zip(missing, ask("--", *missing), strict=True))

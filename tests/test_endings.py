@@ -12,6 +12,7 @@ import numpy as np
 import pandas
 import pytest
 from filelock import FileLock
+from support import ccode
 from support.command import command
 from support.project import ROOT
 
@@ -20,6 +21,8 @@ from cosim.campaign import run_table
 from cosim.campaign.__main__ import main as campaign_main
 from cosim.campaign.conduct import SUMMARY
 from cosim.campaign.run_table import JOURNAL, TABLE
+from cosim.export.__main__ import main as export_main
+from fmus.build.__main__ import main as build_main
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no watching process here")
 
@@ -275,3 +278,168 @@ def test_an_interrupt_of_the_installed_program_is_one_line_from_its_first_line_o
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
     )
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    """A cache of the test's own, with the step loop in it."""
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "cache"))
+    assert loop_library() == ""
+    return tmp_path / "cache"
+
+
+def loop_library():
+    """Load the library in a process of its own; what it notes."""
+    code = (
+        "from cosim.compiled.library import library, prepare_library\n"
+        "print(prepare_library(None))\nlibrary()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0 or "NoLibraryError" in done.stderr, done.stderr
+    return done.stdout.strip()
+
+
+needs_compiler = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
+
+
+@linux_only
+@needs_compiler
+@pytest.mark.parametrize("size", [0, 5000])
+def test_a_damaged_library_is_made_again_and_that_is_said(size, own_cache):
+    (entry,) = own_cache.glob("loop_*.so")
+    whole = entry.read_bytes()
+    entry.write_bytes(whole[:size])
+    assert "was damaged, and is compiled again" in loop_library()
+    assert len(entry.read_bytes()) == len(whole)
+    assert loop_library() == ""
+
+
+@linux_only
+@needs_compiler
+def test_a_compiler_that_makes_nothing_leaves_nothing(tmp_path, monkeypatch):
+    fake = tmp_path / "bin" / "gcc"
+    fake.parent.mkdir()
+    fake.write_text('#!/bin/sh\nwhile [ "$1" != -o ]; do shift; done\n: > "$2"\n')
+    fake.chmod(0o755)
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "cache"))
+    path = os.environ["PATH"]
+    monkeypatch.setenv("PATH", f"{fake.parent}:{path}")
+    loop_library()
+    assert not list((tmp_path / "cache").glob("loop_*"))
+    monkeypatch.setenv("PATH", path)
+    loop_library()
+    assert len(list((tmp_path / "cache").glob("loop_*.so"))) == 1
+
+
+@linux_only
+@needs_compiler
+def test_a_library_that_others_may_write_is_not_loaded(own_cache):
+    (entry,) = own_cache.glob("loop_*.so")
+    for place in (entry, own_cache):
+        mode = place.stat().st_mode
+        place.chmod(mode | 0o020)
+        assert "may be written to by others" in loop_library()
+        place.chmod(mode)
+        if os.getuid() == 0:
+            os.chown(place, 12345, -1)
+            assert "belongs to another user" in loop_library()
+            os.chown(place, 0, -1)
+    assert loop_library() == ""
+
+
+def builder(cache, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "fmus.build", *map(str, arguments)], capture_output=True, text=True,
+        cwd=ROOT, check=False, env={**os.environ, "CYBERSHIP_CACHE": str(cache)},
+    )  # fmt: skip
+
+
+@linux_only
+def test_a_damaged_fmu_is_built_again_and_foreign_ones_are_not_used(tmp_path):
+    cache = tmp_path / "cache"
+    fmu = cache / builder(cache, "guidance_setpoint").stdout.strip()
+    whole = fmu.read_bytes()
+    fmu.write_bytes(whole[:1000])
+    done = builder(cache, "guidance_setpoint")
+    assert done.returncode == 0
+    assert "was damaged, and is built again" in done.stderr
+    assert fmu.read_bytes() == whole
+    for place in (fmu, fmu.parent, cache):
+        mode = place.stat().st_mode
+        place.chmod(mode | 0o002)
+        done = builder(cache, "guidance_setpoint")
+        assert (done.returncode, "may be written to by others" in done.stderr) == (2, True)
+        place.chmod(mode)
+    assert builder(cache, "guidance_setpoint").stderr == ""
+
+
+def test_built_fmus_replace_no_other_file(fmus, tmp_path):
+    (tmp_path / "vessel.fmu").write_text("mine")
+    done = command(build_main, "vessel", "--out", tmp_path)
+    assert (done.returncode, (tmp_path / "vessel.fmu").read_text()) == (2, "mine")
+    assert "is there already, and is another file; --overwrite replaces it" in done.stderr
+    for more in (["--overwrite"], []):
+        assert command(build_main, "vessel", "--out", tmp_path, *more).returncode == 0
+    assert (tmp_path / "vessel.fmu").read_bytes() == fmus["vessel"].read_bytes()
+
+
+def test_exports_replace_no_file(chain, tmp_path):
+    (tmp_path / "s.json").write_text(json.dumps(chain))
+    (tmp_path / "s.ssp").write_text("mine")
+    done = command(export_main, tmp_path / "s.json", "--ssp", tmp_path / "s.ssp")
+    assert (done.returncode, (tmp_path / "s.ssp").read_text()) == (2, "mine")
+    assert "is there already; --overwrite replaces it" in done.stderr
+    assert (
+        command(export_main, tmp_path / "s.json", "--ssp", tmp_path / "s.ssp", "--overwrite").returncode
+        == 0
+    )
+    for _ in range(2):
+        done = command(export_main, tmp_path / "s.json", "--osp", tmp_path / "osp")
+    assert (done.returncode, "--overwrite replaces it" in done.stderr) == (2, True)
+
+
+def test_a_run_replaces_no_log_of_the_user(ellipse, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "log.csv").write_text("mine")
+    scenario = cosim.load_scenario(ellipse | {"stop": 0.1})
+    with pytest.raises(cosim.InputError, match=r"log.csv' is of no run \(there is no log.json\)"):
+        cosim.simulate(scenario, tmp_path / "out")
+    assert (tmp_path / "out" / "log.csv").read_text() == "mine"
+    for options in ({"overwrite": True}, {}):
+        assert cosim.simulate(scenario, tmp_path / "out", **options).status == "done"
+    for empty in ("", " "):
+        with pytest.raises(cosim.InputError, match="name of a folder"):
+            cosim.simulate(scenario, empty)
+
+
+def test_more_steps_than_memory_are_told_before_anything_is_written(ellipse, tmp_path):
+    content = ellipse | {"step": 1e-6, "stop": 1e9, "faults": [], "events": []}
+    for entry in content["fmus"].values():
+        entry.pop("step", None)
+    with pytest.raises(cosim.InputError, match=r"1000000000000000 steps are too many: .* GiB of memory"):
+        cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@linux_only
+def test_no_home_folder_is_one_line(ellipse, chain, tmp_path):
+    """As of a user without HOME and without an entry among the users of the system."""
+    nobody = "import pwd\ndef unknown(_): raise KeyError\npwd.getpwuid = unknown\n"
+    (tmp_path / "sitecustomize.py").write_text(nobody)
+    kept = {
+        k: v for k, v in os.environ.items() if k not in ("HOME", "CYBERSHIP_CACHE", "XDG_CACHE_HOME")
+    }
+    kept["PYTHONPATH"] = f"{tmp_path}:{ROOT}"
+    for content, code in ((ellipse, 2), (chain, 0)):
+        (tmp_path / "s.json").write_text(json.dumps(content | {"stop": 0.5}))
+        done = subprocess.run(
+            [sys.executable, "-m", "cosim.run", "s.json", "--no-plots"],
+            cwd=tmp_path, capture_output=True, text=True, env=kept, check=False,
+        )  # fmt: skip
+        assert done.returncode == code, done.stderr
+        if code:
+            assert done.stderr.startswith("error: this user has no home folder: let CYBERSHIP_CACHE")
+            assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "~").exists()

@@ -123,7 +123,8 @@ def test_an_osp_directory_replaces_only_its_like(portable, tmp_path, capsys):
     assert [p.name for p in (tmp_path / "osp").iterdir()] == ["thesis.txt"]
     (tmp_path / "osp" / "thesis.txt").unlink()
     assert export(command) == 0
-    assert export(command) == 0
+    assert export(command) == 2
+    assert export([*command, "--overwrite"]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["osp", "s.json"]
 
 

@@ -64,6 +64,7 @@ def test_death_of_the_simulating_process_is_one_line_and_no_row_is_lost(plain_fm
 def test_death_before_the_first_row_replaces_the_earlier_run(plain_fmu, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "log.csv").write_text("time,a.y\n0.0,1.0\n")
+    (tmp_path / "out" / "log.json").write_text("{}")
     # The instance that pythonfmu makes to write the description must survive.
     die = "if 'pytest' not in __import__('sys').modules: os._exit(0)"
     done = run_alone(plain_fmu("Early", f"{GAIN}\n{die}\n"), tmp_path)

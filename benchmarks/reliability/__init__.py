@@ -2,5 +2,6 @@
 
 ``mutations`` breaks scenarios and files and reads them in this process; ``endings`` starts commands and
 kills them, interrupts them, leaves them no room on the disk, and runs an FMU that dies in every way in
-every function of FMI; ``verdict`` says what was wrong with an ending.
+every function of FMI; ``campaigns`` does so to campaigns and replays, and spoils the cache; in
+``sanitized`` the C files are called at random under sanitizers; ``judgement`` says what was wrong.
 """

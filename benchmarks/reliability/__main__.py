@@ -14,7 +14,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from . import __doc__ as about
-from . import endings, mutations
+from . import campaigns, endings, mutations, sanitized
 
 Part = tuple[str, int, Callable[[Path, Callable[[], None]], list[str]]]
 
@@ -28,6 +28,10 @@ def parts(options: argparse.Namespace) -> list[Part]:
         "kills": (options.kills, endings.kills),
         "signals": (options.signals, endings.signals),
         "short of disk": (options.disk, endings.short_of_disk),
+        "interrupted campaigns": (options.campaigns, campaigns.interrupted_campaigns),
+        "deaths in campaigns and replays": (options.elsewhere, campaigns.deaths_elsewhere),
+        "spoilt cache": (options.cache, campaigns.spoilt_cache),
+        "calls under sanitizers": (options.calls, sanitized.sanitized_calls),
     }
     found: list[Part] = [
         (name, count, partial(do, count, seed)) for name, (count, do) in numbered.items() if count
@@ -37,7 +41,17 @@ def parts(options: argparse.Namespace) -> list[Part]:
     return found
 
 
-COUNTS = {"scenarios": 1000, "files": 300, "kills": 100, "signals": 100, "disk": 30}
+COUNTS = {
+    "scenarios": 1000,
+    "files": 300,
+    "kills": 100,
+    "signals": 100,
+    "disk": 30,
+    "campaigns": 100,
+    "elsewhere": 60,
+    "cache": 100,
+    "calls": 8000,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -23,7 +23,12 @@ HARMLESS = ("fork", "fork, child ends", "flood", "SIGUSR1 to parent")
 PATIENCE = 60.0
 
 
-def start(path: Path, out: Path, *more: str, **environment: str) -> subprocess.Popen[str]:
+def environment(**variables: str) -> dict[str, str]:
+    """The environment of a command."""
+    return {**os.environ, **variables}
+
+
+def start(path: Path, out: Path, *more: str, **variables: str) -> subprocess.Popen[str]:
     """A run in the background, once its handlers are there."""
     process = subprocess.Popen(
         [sys.executable, "-m", "cosim.run", str(path), "--out", str(out), "--no-plots", *more],
@@ -32,7 +37,7 @@ def start(path: Path, out: Path, *more: str, **environment: str) -> subprocess.P
         text=True,
         errors="replace",
         cwd=ROOT,
-        env={**os.environ, **environment},
+        env=environment(**variables),
     )
     until = time.monotonic() + PATIENCE
     while time.monotonic() < until and process.poll() is None and not catches(process.pid):
@@ -67,20 +72,28 @@ def finish(process: subprocess.Popen[str]) -> str:
         return process.communicate()[1] + "\nerror: it did not end"
 
 
-def long_scenario(work: Path) -> Path:
+def long_scenario(work: Path, native: bool = False) -> Path:
     """The ellipse, without an end in sight."""
     content = json.loads((ROOT / "scenarios" / "ellipse.json").read_text())
-    path = work / "long.json"
-    path.write_text(json.dumps(content | {"stop": 100_000.0, "metrics": {}}))
+    path = work / f"long_{native}.json"
+    # Native FMUs are many times as fast.
+    stop = 1_000_000.0 if native else 100_000.0
+    path.write_text(json.dumps(content | {"stop": stop, "metrics": {}, "native": native or None}))
     return path
+
+
+def kind(work: Path, rng: random.Random) -> tuple[Path, dict[str, str]]:
+    """A long run of native or Python FMUs, and the environment of one of the two loops."""
+    path = long_scenario(work, rng.random() < 0.5)
+    return path, rng.choice(({}, {"CYBERSHIP_LOOP": "plain"}))
 
 
 def kills(count: int, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
     """Kill the simulating process, and every second time the watching one, at random times."""
-    rng, wrong, path = random.Random(seed), [], long_scenario(work)
+    rng, wrong = random.Random(seed), []
     for k in range(count):
-        out = work / f"kill{k}"
-        process = start(path, out)
+        out, (path, loop) = work / f"kill{k}", kind(work, rng)
+        process = start(path, out, **loop)
         time.sleep(rng.uniform(0.0, 2.0))
         if k % 2:
             process.kill()
@@ -102,14 +115,17 @@ def kills(count: int, seed: int, work: Path, advance: Callable[[], None]) -> lis
 
 def signals(count: int, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
     """Interrupt a run at random times, imports and instantiation included."""
-    rng, wrong, path = random.Random(seed), [], long_scenario(work)
+    rng, wrong = random.Random(seed), []
     for k in range(count):
         out, number = work / f"signal{k}", rng.choice((signal.SIGINT, signal.SIGTERM))
-        process = start(path, out)
+        path, loop = kind(work, rng)
+        process = start(path, out, **loop)
         time.sleep(rng.uniform(0.0, 1.5))
         process.send_signal(number)
+        asked = time.monotonic()
         stderr = finish(process)
-        found = faults(process.returncode, stderr, out, {130})
+        late = time.monotonic() - asked
+        found = faults(process.returncode, stderr, out, {130}, late=late)
         wrong += [f"signal {k} ({number.name}): {text}" for text in found]
         shutil.rmtree(out, ignore_errors=True)
         advance()
@@ -138,11 +154,16 @@ def short_of_disk(count: int, seed: int, work: Path, advance: Callable[[], None]
     return wrong
 
 
-def deaths(chosen: int | None, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
-    """Run the mortal FMU beside one of ours, for each way to die in each function."""
+def mortal_fmu(work: Path) -> Path:
+    """The FMU that dies as the environment says."""
     from pythonfmu.builder import FmuBuilder
 
-    fmu = FmuBuilder.build_FMU(Path(__file__).with_name("mortal.py"), dest=work)
+    return Path(FmuBuilder.build_FMU(Path(__file__).with_name("mortal.py"), dest=work))
+
+
+def deaths(chosen: int | None, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
+    """Run the mortal FMU beside one of ours, for each way to die in each function."""
+    fmu = mortal_fmu(work)
     content = {
         "name": "mortal", "step": 0.01, "stop": 1.0, "algorithm": "jacobi",
         "fmus": {"guidance": {"path": "guidance_ellipse.fmu"}, "bad": {"path": str(fmu)}},

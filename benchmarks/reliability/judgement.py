@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas
 
 import cosim
 
@@ -12,15 +13,18 @@ STATUS = {0: "done", 3: "failed", 130: "interrupted"}
 OURS = ("error: ", "interrupted")
 
 
-def faults(code: int, stderr: str, out: Path, expected: set[int], instance: str = "") -> list[str]:
-    """What is wrong with the end of ``python -m cosim.run``; empty if nothing.
+# Wall time in which an interrupt has to end a command [s]: 2 s, and as much again on a busy machine.
+PROMPT = 4.0
+
+
+def line_faults(code: int, stderr: str, expected: set[int], late: float) -> list[str]:
+    """What is wrong with exit code, messages and time of the end of any command.
 
     Args:
         code: exit code.
         stderr: what it has printed there.
-        out: the result folder.
         expected: exit codes that are right.
-        instance: the FMU that the line must name, if the run failed.
+        late: wall time since it was asked to end [s].
     """
     wrong = []
     if code not in expected:
@@ -30,10 +34,45 @@ def faults(code: int, stderr: str, out: Path, expected: set[int], instance: str 
     lines = [line for line in stderr.splitlines() if line.startswith(OURS)]
     if code and len(lines) != 1:
         wrong.append(f"{len(lines)} lines that say why")
-    if code == 3 and instance and not any(instance in line for line in lines):
-        wrong.append("the line does not name the FMU")
     if any(c < " " and c not in "\n\t" for c in stderr):
         wrong.append("control characters")
+    if late > PROMPT:
+        wrong.append(f"it ended {late:.1f} s after it was asked to")
+    return wrong
+
+
+def agreement_faults(out: Path, status: str) -> list[str]:
+    """What is wrong with journal, table and summary of a campaign that ended with a status."""
+    wrong = []
+    told = json.loads((out / "campaign.json").read_text())
+    if told["status"] != status:
+        wrong.append(f"campaign.json says '{told['status']}', not '{status}'")
+    lines = (out / "runs.jsonl").read_text().splitlines(keepends=True)
+    journal = {json.loads(line)["hash"] for line in lines if line.endswith("\n")}
+    table = set(pandas.read_parquet(out / "runs.parquet")["hash"])
+    if journal != table or len(table) != told["done"] + told["failed"]:
+        counted = told["done"] + told["failed"]
+        wrong.append(f"{len(journal)} runs in the journal, {len(table)} in the table, {counted} counted")
+    return wrong
+
+
+def faults(
+    code: int, stderr: str, out: Path, expected: set[int], instance: str = "", late: float = 0.0
+) -> list[str]:
+    """What is wrong with the end of ``python -m cosim.run``; empty if nothing.
+
+    Args:
+        code: exit code.
+        stderr: what it has printed there.
+        out: the result folder.
+        expected: exit codes that are right.
+        instance: the FMU that the line must name, if the run failed.
+        late: wall time since it was asked to end [s].
+    """
+    wrong = line_faults(code, stderr, expected, late)
+    lines = [line for line in stderr.splitlines() if line.startswith(OURS)]
+    if code == 3 and instance and not any(instance in line for line in lines):
+        wrong.append("the line does not name the FMU")
     if code == 2:
         return wrong + (["bad input left files"] if out.exists() else [])
     if (out / "log.json").is_file():

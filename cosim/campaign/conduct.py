@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
+from ..compiled.library import prepare_library
 from ..dispatch.job import Job, Row
 from ..dispatch.measured_run import Measured
 from ..dispatch.places import Place, check_address, check_workers, place_for
@@ -99,6 +100,9 @@ def run_campaign(
         every = cases(loaded.campaign)
         rule = None if stop_when is None else StopRule(stop_when, every, loaded.campaign.seed)
         for note in scenarios.check(every):
+            show(f"note: {note}")
+        # Workers would wait for each other, deaf to interrupts.
+        if note := prepare_library(loaded.base.native):
             show(f"note: {note}")
         with _only_one(folder), closing(Journal(folder)) as journal:
             if journal.unread:

@@ -1,5 +1,7 @@
 """The library of C functions: compiled at its first use on a computer, kept in the cache, loaded.
 
+An entry of the cache that is not whole is compiled again, and that is said.
+
 It is a convenience. Whatever uses it has a body in Python that gives the same bytes, and takes that
 where there is no library.
 """
@@ -15,13 +17,15 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
-from ..files import atomic_write
+from .cache_entry import is_whole, make_folder, refusal, store
 
 FOLDER = Path(__file__).parent
 SOURCES = ("loop.c", "rows.c", "powers.py")
@@ -53,31 +57,65 @@ def library(with_zig: bool = False) -> ctypes.CDLL:
         NoLibraryError: none is in the cache, and none can be made.
     """
     found = _found(with_zig)
-    if isinstance(found, str):
-        raise NoLibraryError(found)
-    return found
+    if found.library is None:
+        raise NoLibraryError(found.reason)
+    return found.library
+
+
+def prepare_library(native: bool | None) -> str:
+    """Make the library now, if a run will want it: that may take a while, and an interrupt may end it.
+
+    Args:
+        native: of the scenario: False wants none, True lets zig compile.
+
+    Returns:
+        What the user should know; usually empty.
+    """
+    return "" if native is False or asks_for_plain_loop() else _found(bool(native)).note
+
+
+class Found(NamedTuple):
+    """The library, or the reason why there is none, and what the user should know."""
+
+    library: ctypes.CDLL | None
+    reason: str = ""
+    note: str = ""
+
+
+def _cache_folder() -> Path | None:
+    if chosen := os.environ.get("CYBERSHIP_CACHE"):
+        return Path(chosen)
+    with suppress(RuntimeError):  # of newer versions; older ones give a relative path
+        if (folder := user_cache_path("cybership")).is_absolute():
+            return folder
+    return None
 
 
 @cache
-def _found(with_zig: bool) -> ctypes.CDLL | str:
+def _found(with_zig: bool) -> Found:
     """The library, or why there is none: asked once in a process."""
     content = b"".join((FOLDER / name).read_bytes() for name in SOURCES)
     key = repr((content, OPTIONS, platform.machine(), sysconfig.get_platform()))
     name = f"loop_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    chosen = os.environ.get("CYBERSHIP_CACHE")
-    folder = Path(chosen) if chosen else user_cache_path("cybership")
+    if (folder := _cache_folder()) is None:
+        return Found(None, "this user has no home folder; CYBERSHIP_CACHE may name one for the loop")
     path = folder / f"{name}{'.dll' if os.name == 'nt' else '.so'}"
+    note = ""
     try:
-        if not path.is_file():
-            folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
+        if why := refusal(path):
+            return Found(None, why, f"{why}; the plain step loop runs")
+        if not is_whole(path):
             with FileLock(folder / "loop.lock", timeout=PATIENCE):
-                if not path.is_file():
+                if not is_whole(path):
+                    if path.exists():
+                        note = f"the step loop in the cache was damaged, and is compiled again: '{path}'"
                     _compile(path, with_zig)
-        return ctypes.CDLL(str(path))
+        return Found(ctypes.CDLL(str(path)), note=note)
     except NoLibraryError as error:
-        return str(error)
+        return Found(None, str(error), note)
     except (OSError, Timeout, subprocess.SubprocessError) as error:
-        return f"the library of C functions cannot be made or loaded: {error}"
+        return Found(None, f"the library of C functions cannot be made or loaded: {error}", note)
 
 
 def _compile(path: Path, with_zig: bool) -> None:
@@ -86,25 +124,26 @@ def _compile(path: Path, with_zig: bool) -> None:
     command = _compiler(with_zig)
     with tempfile.TemporaryDirectory(prefix="cybership_") as work:
         (Path(work) / "powers.h").write_text(powers_of_ten())
-        with atomic_write(path) as scratch:
-            files = [str(FOLDER / source) for source in SOURCES if source.endswith(".c")]
-            built = Path(work) / "built"
-            linked = [] if os.name == "nt" else ["-lm"]
-            done = subprocess.run(
-                [*command, *OPTIONS, "-I", work, "-o", str(built), *files, *linked],
-                capture_output=True,
-                text=True,
-                errors="replace",
-                check=False,
-                timeout=PATIENCE,
-                cwd=work,
-            )
-            if done.returncode != 0 or not built.is_file():
-                said = [line for line in done.stderr.splitlines() if "error" in line.lower()]
-                raise NoLibraryError(
-                    f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}"
-                )
-            shutil.copyfile(built, scratch)
+        files = [str(FOLDER / source) for source in SOURCES if source.endswith(".c")]
+        built = Path(work) / "built"
+        linked = [] if os.name == "nt" else ["-lm"]
+        done = subprocess.run(
+            [*command, *OPTIONS, "-I", work, "-o", str(built), *files, *linked],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+            timeout=PATIENCE,
+            cwd=work,
+        )
+        if done.returncode != 0 or not built.is_file():
+            said = [line for line in done.stderr.splitlines() if "error" in line.lower()]
+            raise NoLibraryError(f"compiler '{command[0]}' fails: {said[0] if said else 'no message'}")
+        try:
+            ctypes.CDLL(str(built))
+        except OSError as error:
+            raise NoLibraryError(f"compiler '{command[0]}' made nothing to load: {error}") from None
+        store(built, path)
 
 
 def _compiler(with_zig: bool) -> list[str]:

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from ..compiled.library import prepare_library
 from ..errors import SimulationError
 from ..master.algorithm import Master
 from ..master.loop_surroundings import interruptible, paused_collector
 from ..master.loops.chosen_loop import choose_loop
-from ..master.recorder import Recorder
+from ..master.recorder import Recorder, demand_memory
 from ..master.simulation import UPDATE_INTERVAL, simulate
 from ..process.run_state import STATE
 from ..process.scratch import scratch_folder
@@ -67,6 +68,8 @@ def run_in_memory(
     own = {name for name, model in models.items() if model.sha256 in pool.resettable}
     system = prepare(scenario, models=models, unlogged=() if keep else own)
     log = LogInMemory(["time", *system.logged]) if keep else None
+    demand_memory(system, False)
+    prepare_library(scenario.native)
     # Collecting all garbage before each run would cost more than the run.
     with interruptible() as interrupted, paused_collector():
         master = Master(system, lambda _: None, interrupted, pool)

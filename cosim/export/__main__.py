@@ -44,12 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _export(system: System, options: argparse.Namespace) -> list[str]:
-    drop = options.drop_faults
+    how = options.drop_faults, options.overwrite
     if options.ssp is not None:
-        return export_ssp(system, options.ssp, drop)
+        return export_ssp(system, options.ssp, *how)
     if options.osp is not None:
-        return export_osp(system, options.osp, drop)
-    return export_fmu(system, options.fmu, drop)
+        return export_osp(system, options.osp, *how)
+    return export_fmu(system, options.fmu, *how)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -78,6 +78,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="SSP parameter set whose values override the scenario's; may be given several times",
     )
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
     parser.add_argument(
         "--drop-faults",
         action="store_true",

@@ -19,13 +19,14 @@ from .ssp import write_ssp
 Write = Callable[[System, Sequence[Part], Path, Path], None]
 
 
-def export_ssp(system: System, archive: Path, drop: bool = False) -> list[str]:
+def export_ssp(system: System, archive: Path, drop: bool = False, overwrite: bool = False) -> list[str]:
     """Write a system as an SSP 1.0 archive.
 
     Args:
         system: from :func:`cosim.system.prepare`.
         archive: the ``.ssp`` file to write.
         drop: leave out what the format cannot hold.
+        overwrite: whether a file that is there may be replaced.
 
     Returns:
         Notes on what is left out or different there.
@@ -33,18 +34,18 @@ def export_ssp(system: System, archive: Path, drop: bool = False) -> list[str]:
     Raises:
         InputError: the format cannot hold something, or the file cannot be written.
     """
-    return _file(system, portable.SSP, archive, ".ssp", drop, write_ssp)
+    return _file(system, portable.SSP, archive, ".ssp", drop, write_ssp, overwrite)
 
 
-def export_fmu(system: System, fmu: Path, drop: bool = False) -> list[str]:
+def export_fmu(system: System, fmu: Path, drop: bool = False, overwrite: bool = False) -> list[str]:
     """Write a system as one container FMU; as :func:`export_ssp`."""
-    return _file(system, portable.CONTAINER, fmu, ".fmu", drop, write_container)
+    return _file(system, portable.CONTAINER, fmu, ".fmu", drop, write_container, overwrite)
 
 
-def export_osp(system: System, folder: Path, drop: bool = False) -> list[str]:
-    """Write a system as an OSP directory, in place of an earlier one; as :func:`export_ssp`.
+def export_osp(system: System, folder: Path, drop: bool = False, overwrite: bool = False) -> list[str]:
+    """Write a system as an OSP directory; as :func:`export_ssp`.
 
-    Other files in the earlier directory are never deleted: they raise InputError.
+    Other files in an earlier directory are never deleted: they raise InputError.
     """
     notes = portable.check(system, portable.OSP, drop)
     with _beside(folder) as (work, target):
@@ -61,6 +62,8 @@ def export_osp(system: System, folder: Path, drop: bool = False) -> list[str]:
                 f"'{folder}' also holds {', '.join(foreign[:3])}{', ...' if foreign[3:] else ''}, which "
                 "this export does not write; take it out, or choose another folder"
             )
+        if _inside(target) and not overwrite:
+            raise InputError(f"'{folder}' is there already; --overwrite replaces it")
         _replace(target, new, work / "old")
     return notes + more
 
@@ -88,7 +91,7 @@ def _replace(folder: Path, new: Path, old: Path) -> None:
 
 
 def _file(
-    system: System, target: Format, path: Path, suffix: str, drop: bool, write: Write
+    system: System, target: Format, path: Path, suffix: str, drop: bool, write: Write, overwrite: bool
 ) -> list[str]:
     if path.suffix != suffix:
         raise InputError(f"'{path}' should end in {suffix}")
@@ -96,6 +99,8 @@ def _file(
     with _beside(path) as (work, resolved):
         if resolved.is_dir():
             raise InputError(f"'{path}' is a folder")
+        if resolved.exists() and not overwrite:
+            raise InputError(f"'{path}' is there already; --overwrite replaces it")
         parts, more = portable.pack(system, work)
         (work / "out").mkdir()
         new = work / "out" / path.name

@@ -1,18 +1,34 @@
 """Recording of the value table after every step."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..compiled.library import asks_for_plain_loop
-from ..errors import SimulationError
+from ..errors import InputError, SimulationError
 from ..results.log import CSV, LogInMemory, LogWriter
 from ..results.pending_rows import PendingRows
 from ..results.performance import needed, read
 from ..system.system import System
 from .algorithm import Master
 from .value_table import ValueTable
+
+
+def demand_memory(system: System, pictures: bool) -> None:
+    """See that there is room for the columns that metrics and pictures need until the end.
+
+    Raises:
+        InputError: this computer has less memory.
+    """
+    names = (needed if pictures else read)(list(system.signals), system.scenario.roles)
+    octets = 8 * (1 + len(names)) * (1 + system.steps)
+    if hasattr(os, "sysconf") and octets > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        raise InputError(
+            f"{system.steps} steps are too many: metrics and pictures would need "
+            f"{octets / 2**30:.3g} GiB of memory; a longer step or an earlier stop needs less"
+        )
 
 
 class Recorder:

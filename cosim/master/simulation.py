@@ -10,13 +10,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..compiled.library import prepare_library
 from ..errors import InputError, SimulationError
 from ..files import update_json, write_json, write_roomy_json
 from ..formats.ssv import read_parameters
 from ..process.run_state import LOGGING, STATE, Owner
 from ..process.scratch import sweep
 from ..results import log as logs
-from ..results.result_files import clear_results, default_folder
+from ..results.result_files import clear_results, default_folder, others_file
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
@@ -27,7 +28,7 @@ from .ending import Result, finish, interrupted_late, not_written, writing
 from .loop_surroundings import interruptible, quiet_collector
 from .loops.chosen_loop import ChosenLoop, choose_loop
 from .real_time import Pace
-from .recorder import Recorder
+from .recorder import Recorder, demand_memory
 from .run_record import describe
 
 # Wall time between two updates of progress and log [s]; chosen: smooth, and cheap beside the steps.
@@ -63,7 +64,8 @@ def simulate(
         native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
             nothing; None leaves it to the scenario, which by default compiles the loop.
         believe: SSP parameter sets that controllers and observers believe of the plant.
-        overwrite: whether the default folder is ``results/<name>``, whatever is there.
+        overwrite: whether the default folder is ``results/<name>``, whatever is there, and whether files
+            of no run may be replaced.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -71,6 +73,8 @@ def simulate(
     Raises:
         InputError: the scenario cannot be run; nothing has been written.
     """
+    if out is not None and not str(out).strip():
+        raise InputError("out is the name of a folder, and is empty")
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
     overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
@@ -90,6 +94,10 @@ def simulate(
             usual = default_folder(scenario.name, description, overwrite)
             given = usual if out is None else Path(out)
             folder = Path(os.path.abspath(given))
+            if (theirs := others_file(folder)) and not overwrite:
+                raise InputError(
+                    f"'{theirs}' is of no run (there is no {logs.SIDECAR}); --overwrite replaces it"
+                )
             moved = ""
             if out is None and given.name != scenario.name:
                 first = given.with_name(scenario.name)
@@ -136,6 +144,9 @@ def _run(
         show(f"warning: {warning}")
     if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
         raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
+    demand_memory(system, pictures)
+    if note := prepare_library(scenario.native):
+        show(f"note: {note}")
     STATE.begin(str(folder), json.dumps(description))
     with interruptible() as interrupted:
         try:

@@ -12,10 +12,21 @@ from .log import CSV, METRICS, PARQUET, SIDECAR
 RESULTS = Path("results")
 
 
+# All that a run writes; what tells that it was a run comes last.
+FILES = (CSV, PARQUET, METRICS, *(f"{picture}.png" for picture in PICTURES), SIDECAR)
+
+
+def others_file(folder: Path) -> Path | None:
+    """A file of a name that a run would write, in a folder that has no run; None if there is none."""
+    if (folder / SIDECAR).exists():
+        return None
+    return next((folder / name for name in FILES if (folder / name).exists()), None)
+
+
 def clear_results(folder: Path) -> None:
     """Make a result folder, without what an earlier run left there."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in (CSV, PARQUET, SIDECAR, METRICS, *(f"{p}.png" for p in PICTURES)):
+    for name in FILES:
         (folder / name).unlink(missing_ok=True)
         for scratch in folder.glob(f".{name}.*.part"):  # of a run that was killed
             scratch.unlink(missing_ok=True)

@@ -23,10 +23,10 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
     # A bare name is the project's own FMU; only one that the project lacks may be a file in the folder.
     beside = sorted(name for name in bare if (scenario.folder / name).is_file())
-    paths = _own_fmus(sorted(bare.difference(beside)), bool(scenario.native))
+    paths = _own_fmus(sorted(bare.difference(beside)), bool(scenario.native), warnings)
     for name in beside:
         try:
-            paths |= _own_fmus([name], bool(scenario.native))
+            paths |= _own_fmus([name], bool(scenario.native), warnings)
             warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name
@@ -40,19 +40,21 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     return found
 
 
-def _own_fmus(names: Sequence[str], native: bool) -> dict[str, Path]:
+def _own_fmus(names: Sequence[str], native: bool, warnings: list[str]) -> dict[str, Path]:
     """Paths of the project's own FMUs, built if need be; compiled ones where the scenario wants them."""
     if not names:
         return {}
     options = ("--native",) if native else ()
-    return dict(zip(names, map(Path, run_builder(*options, "--", *names)), strict=True))
+    built = run_builder(*options, "--", *names, warnings=warnings)
+    return dict(zip(names, map(Path, built), strict=True))
 
 
-def run_builder(*arguments: str | Path) -> list[str]:
+def run_builder(*arguments: str | Path, warnings: list[str] | None = None) -> list[str]:
     """Run the project's FMU builder in a process of its own.
 
     Args:
         arguments: of ``python -m fmus.build``.
+        warnings: receives what it notes.
 
     Returns:
         The lines that it prints.
@@ -66,4 +68,7 @@ def run_builder(*arguments: str | Path) -> list[str]:
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
         raise InputError(reason[0].removeprefix("error: "))
+    if warnings is not None:
+        lines = done.stderr.splitlines()
+        warnings += [line.removeprefix("note: ") for line in lines if line.startswith("note: ")]
     return done.stdout.splitlines()

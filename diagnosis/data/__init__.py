@@ -4,6 +4,7 @@ from .beside import line_beside
 from .cleaning import Counts, Track, clean, in_order, lost, repeated
 from .other_columns import other_columns
 from .reading import Run, read
+from .thinning import thinned
 
 __all__ = [
     "Counts",
@@ -16,4 +17,5 @@ __all__ = [
     "other_columns",
     "read",
     "repeated",
+    "thinned",
 ]

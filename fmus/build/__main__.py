@@ -16,7 +16,8 @@ from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD, EffectSet
 from ..interruption import program, run_interruptible
 from . import ledger
-from .building import build, cache_folder, export
+from .building import build, export
+from .cached_fmu import cache_folder
 from .finding import BuildError, load, which
 from .platforms import native_targets
 from .start_values_file import read_starts
@@ -41,6 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="with --out: replace other files of these names"
+    )
     parser.add_argument(
         "--list", action="store_true", help="list the FMUs, or the variables of those named"
     )
@@ -93,7 +97,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 made = export(options.names, options.source, starts, _note, effects)
             else:
                 native = native_targets(options.target) if options.native else None
-                made = build(options.names, options.out, starts, _note, effects, native)
+                made = build(
+                    options.names, options.out, starts, _note, effects, native, options.overwrite
+                )
             for path in made:
                 print(path)
         sys.stdout.flush()

@@ -2,19 +2,16 @@
 
 import hashlib
 import importlib.metadata
-import os
-import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path
-
 from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
 from . import ledger
+from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, pack
 from .platforms import Native
@@ -30,6 +27,7 @@ def build(
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
     native: Native | None = None,
+    overwrite: bool = False,
 ) -> list[Path]:
     """FMUs that are up to date with the source.
 
@@ -38,15 +36,18 @@ def build(
         out: folder that receives copies; None leaves them in the user's cache.
         starts: a parameter set. The FMUs that it names start with its values; without names, they are
             the ones that are built.
-        note: receives a line where a part of the parameter set is not used.
+        note: receives a line where a part of the parameter set is not used, or an FMU in the cache was
+            damaged.
         effects: that vessel and thrusters are to have.
         native: the platforms to compile for; None means FMUs that run in Python.
+        overwrite: whether other files of these names may be replaced in ``out``.
 
     Returns:
         Path of each FMU, in the order of the names.
 
     Raises:
-        BuildError: unknown name, a file that declares no component, or no compiler.
+        BuildError: unknown name, a file that declares no component, no compiler, a cache that others
+            may write to, or files in ``out`` that would be replaced.
         DeclarationError: a parameter set that does not fit.
     """
     if out is not None:
@@ -54,10 +55,19 @@ def build(
             out.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
             raise BuildError(f"'{out}' is a file, not a folder") from None
-    built = [_cached(name, effects, starts, native) for name in _every(names, starts)]
+    built = [_cached(name, effects, starts, native, note) for name in _every(names, starts)]
     if starts is not None:
         _tell_unused(starts, [fmu.stem for fmu in built], note)
-    return built if out is None else [_place(fmu, out / fmu.name) for fmu in built]
+    if out is None:
+        return built
+    there = [out / fmu.name for fmu in built if (out / fmu.name).exists()]
+    for path in there if not overwrite else ():
+        if (
+            path.is_dir()
+            or path.read_bytes() != (next(f for f in built if f.name == path.name)).read_bytes()
+        ):
+            raise BuildError(f"'{path}' is there already, and is another file; --overwrite replaces it")
+    return [place(fmu, out / fmu.name) for fmu in built]
 
 
 def export(
@@ -106,31 +116,18 @@ def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], Non
         note(f"'{starts.path}' holds no values: no FMU is changed by it")
 
 
-def _place(source: Path, target: Path) -> Path:
-    """Copy a file so that the target is either the old one or the whole new one."""
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        shutil.copyfile(source, part)
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
-    return target
-
-
-def cache_folder() -> Path:
-    """Where built FMUs are kept: ``CYBERSHIP_CACHE``, else the user's cache folder."""
-    chosen = os.environ.get("CYBERSHIP_CACHE")
-    return Path(chosen) if chosen else user_cache_path("cybership")
-
-
 def _cached(
-    name: str, effects: EffectSet, starts: Starts | None = None, native: Native | None = None
+    name: str,
+    effects: EffectSet,
+    starts: Starts | None = None,
+    native: Native | None = None,
+    note: Callable[[str], None] = lambda _: None,
 ) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = which(name)
     folder = cache_folder() / _source_hash(own_file, effects, {}, native)
     fmu = folder / f"{stem}.fmu"
-    if starts is None and fmu.is_file():
+    if starts is None and is_whole(fmu):
         return fmu
     from filelock import FileLock  # only now: most calls find what they need, and this takes a while
 
@@ -138,16 +135,13 @@ def _cached(
     if starts is not None:
         component = starts.baked(component)
         folder = cache_folder() / _source_hash(own_file, effects, component.starts, native)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BuildError(
-            f"cannot keep FMUs in '{folder}' ({error.strerror}); CYBERSHIP_CACHE may name another folder"
-        ) from None
+    make_folder(folder)
     fmu = folder / f"{component.name}.fmu"
-    python = _cached(name, effects, starts) if native is not None and native.python else None
+    python = _cached(name, effects, starts, note=note) if native is not None and native.python else None
     with FileLock(folder / "lock"):
-        if not fmu.is_file():
+        if not is_whole(fmu):
+            if fmu.exists():
+                note(f"'{fmu}' in the cache was damaged, and is built again")
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
                 if native is None:
                     built = pack(component, module, own_file, Path(work), effects)
@@ -155,7 +149,7 @@ def _cached(
                     built = _compiled(component, native, Path(work), python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
-                _place(built, fmu)
+                store(built, fmu)
     return fmu
 
 

@@ -1,0 +1,72 @@
+"""Long runs that are sampled far faster than a ship moves, at a rate that their analysis can bear."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from .cleaning import Track
+
+# Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
+MOST_ROWS = 100_000
+# s, longest time between two rows of what is thinned; chosen: a thirtieth of the weak form's kernel.
+LONGEST = 0.1
+
+
+def thinned(track: Track) -> Track:
+    """A run with fewer rows, if it has many: of each interval the median pose and the mean command.
+
+    The median is over the valid samples, at the mean of their times, of what is left of them once the
+    motion within the interval is taken off: it has less noise than a sample, and lets no spike through.
+    The mean command over the time between two rows has the impulse that acted.
+
+    Args:
+        track: a run with its samples judged.
+    """
+    run = track.run
+    row = float(np.median(np.diff(run.time)))
+    factor = min(-(-run.time.size // MOST_ROWS), int(LONGEST / row + 1e-9))
+    if factor < 2:
+        return track
+    width = factor * row
+    _, part = np.unique(np.floor((run.time - run.time[0]) / width + 1e-6), return_inverse=True)
+    valid = track.valid
+    of_valid = pd.DataFrame({"time": np.where(valid, run.time, np.nan)}).groupby(part).mean()
+    of_all = pd.DataFrame({"time": run.time}).groupby(part).mean()
+    time = of_valid["time"].fillna(of_all["time"]).to_numpy()
+    measured = np.where(valid[:, None], track.pose, np.nan)
+    pose = pd.DataFrame(measured).groupby(part).median().to_numpy()
+    moved = np.nan_to_num(np.gradient(pose, time, axis=0))[part] * (run.time - time[part])[:, None]
+    pose = pd.DataFrame(measured - moved).groupby(part).median().to_numpy()
+    marks = pd.DataFrame({"frozen": track.frozen, "dropped": track.dropped}).groupby(part).max()
+    gone = np.isnan(pose).any(axis=1)
+    frozen = gone & marks["frozen"].to_numpy(bool)
+    dropped = gone & ~frozen & marks["dropped"].to_numpy(bool)
+    commands = {
+        name: _mean(run.time, values, time)
+        for name in ("tau_cmd", "u", "five", "power")
+        if (values := getattr(run, name)) is not None
+    }
+    held = None if run.held is None else pd.Series(run.held).groupby(part).mean().to_numpy() > 0.5
+    note = (
+        f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
+        "medians of the pose, means of the commands"
+    )
+    return Track(
+        replace(run, time=time, pose=pose, held=held, **commands),
+        pose,
+        frozen,
+        dropped,
+        gone & ~frozen & ~dropped,
+        max(track.period, width),
+        track.out,
+        (*track.notes, note),
+    )
+
+
+def _mean(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Means from each edge (m,) to the next of values (n, k) that are held; the last as it is."""
+    steps = np.diff(time)[:, None] * values[:-1]
+    integral = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
+    at = np.column_stack([np.interp(edges, time, column) for column in integral.T])
+    return np.vstack([np.diff(at, axis=0) / np.diff(edges)[:, None], values[-1:]])
