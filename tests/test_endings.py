@@ -128,10 +128,8 @@ def test_a_campaign_says_that_it_runs_and_that_it_was_interrupted(runs, tmp_path
     process = started("cosim.campaign", second, "--workers", 0, "--out", out, "--overwrite")
     assert process.stdout.readline() == "here\n"
     assert json.loads((out / SUMMARY).read_text())["status"] == "running"
-    begun = time.monotonic()
     process.send_signal(signal.SIGINT)
-    code, lines = ended(process)
-    assert time.monotonic() - begun < 4.0  # 2 s on an idle machine
+    code, lines = ended(process)  # how quickly is a matter of benchmarks.reliability
     assert (code, len(lines)) == (130, 1), lines
     assert lines[0].startswith("interrupted: ")
     told = json.loads((out / SUMMARY).read_text())
@@ -208,7 +206,7 @@ def test_a_journal_whose_numbers_are_none_is_told(change, runs, tmp_path):
 
 
 def test_what_is_no_scheduler_and_no_number_of_workers_is_told_at_once(runs, tmp_path):
-    path, begun = runs([1.0, 2.0]), time.monotonic()
+    path = runs([1.0, 2.0])
     for address in ("nonsense", "tcp://", "10.0.0.1", "tcp://host"):
         done = command(campaign_main, path, "--scheduler", address, "--out", tmp_path / "out")
         assert done.returncode == 2
@@ -220,7 +218,6 @@ def test_what_is_no_scheduler_and_no_number_of_workers_is_told_at_once(runs, tmp
         cosim.run_campaign(path, tmp_path / "out", workers=-1)
     with pytest.raises(cosim.InputError, match="workers = -1"):
         cosim.dispatch.analyse_runs([], len, workers=-1)
-    assert time.monotonic() - begun < 5.0
     assert not (tmp_path / "out").exists()
 
 
@@ -258,10 +255,8 @@ def test_one_interrupt_ends_a_command_that_waits_for_another_process(ellipse, tm
             "cosim.run", tmp_path / "s.json", "--out", tmp_path / "out", "--no-plots", **fmus
         )
         time.sleep(1.0)
-        begun = time.monotonic()
         process.send_signal(signal.SIGINT)
-        code, lines = ended(process)
-    assert time.monotonic() - begun < 4.0  # 2 s on an idle machine
+        code, lines = ended(process)  # long before the other process gives the lock back
     assert (code, [line for line in lines if not line.startswith("note")]) == (130, ["interrupted"])
 
 

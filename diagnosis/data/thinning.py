@@ -1,6 +1,7 @@
 """Long runs that are sampled far faster than a ship moves, at a rate that their analysis can bear."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -31,23 +32,21 @@ def thinned(track: Track) -> Track:
     width = factor * row
     _, part = np.unique(np.floor((run.time - run.time[0]) / width + 1e-6), return_inverse=True)
     valid = track.valid
-    of_valid = pd.DataFrame({"time": np.where(valid, run.time, np.nan)}).groupby(part).mean()
-    of_all = pd.DataFrame({"time": run.time}).groupby(part).mean()
-    time = of_valid["time"].fillna(of_all["time"]).to_numpy()
+    of_valid = _by(part, np.where(valid, run.time, np.nan)).mean()
+    time = of_valid.fillna(_by(part, run.time).mean()).to_numpy()[:, 0]
     measured = np.where(valid[:, None], track.pose, np.nan)
-    pose = pd.DataFrame(measured).groupby(part).median().to_numpy()
+    pose = _by(part, measured).median().to_numpy()
     moved = np.nan_to_num(np.gradient(pose, time, axis=0))[part] * (run.time - time[part])[:, None]
-    pose = pd.DataFrame(measured - moved).groupby(part).median().to_numpy()
-    marks = pd.DataFrame({"frozen": track.frozen, "dropped": track.dropped}).groupby(part).max()
+    pose = _by(part, measured - moved).median().to_numpy()
     gone = np.isnan(pose).any(axis=1)
-    frozen = gone & marks["frozen"].to_numpy(bool)
-    dropped = gone & ~frozen & marks["dropped"].to_numpy(bool)
+    frozen = gone & _by(part, track.frozen).max().to_numpy()[:, 0]
+    dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
     commands = {
         name: _mean(run.time, values, time)
         for name in ("tau_cmd", "u", "five", "power")
         if (values := getattr(run, name)) is not None
     }
-    held = None if run.held is None else pd.Series(run.held).groupby(part).mean().to_numpy() > 0.5
+    held = None if run.held is None else _by(part, run.held).mean().to_numpy()[:, 0] > 0.5
     note = (
         f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
         "medians of the pose, means of the commands"
@@ -62,6 +61,12 @@ def thinned(track: Track) -> Track:
         track.out,
         (*track.notes, note),
     )
+
+
+def _by(part: np.ndarray, values: np.ndarray) -> Any:
+    """Values (n,) or (n, k) grouped by the interval (n,) that they lie in."""
+    table: Any = pd.DataFrame(values)
+    return table.groupby(part)
 
 
 def _mean(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
