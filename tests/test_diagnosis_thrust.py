@@ -43,9 +43,12 @@ VALUES = {
     "vsp_outage_end_1": 4.0,
     "vsp_outage_start_2": 12.0,
     "vsp_outage_end_2": 12.5,
+    "cross_vsp_sway": 0.5,
+    "cross_vsp_surge": 0.5,
 }
 EFFECTS = STANDARD.of_kind("actuator")
 BY_EFFECT = {e.id: {n: VALUES.get(n, 0.1) for n in e.coefficients} for e in EFFECTS}
+BY_EFFECT["power_exponent"] |= {"power_vsp": 0.7, "power_bow": 0.6}  # at full power it does nothing
 OTHERS = [
     n
     for n in (v.name for v in variables(COMPONENT.params))

@@ -130,7 +130,8 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         for k, shares in enumerate(acting):
             if power is not None:
                 thrusters = placed(drive, aside, chain.Power(*power[k]))
-            now = Running._make((s.t + h, s.u, s.v, s.r, *given[k], aside))
+            x, y, bow = given[k]
+            now = Running(s.t + h, s.u, s.v, s.r, x, y, bow, aside)
             forces = chain.act(tuple(shares), now, thrusters)
             s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
             found[k + 1] = vessel.measured(s, body)

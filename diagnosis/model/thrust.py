@@ -66,7 +66,9 @@ def thrust(run: Run, response: "Response", nu: np.ndarray) -> np.ndarray:
     given, acting = response.between_samples
     total = np.zeros_like(run.tau_cmd)
     for k, aside in enumerate(places(run)):
-        now = Running._make([run.time, *nu.T, *given[:, k].T, aside])
+        u, v, r = nu.T
+        x, y, bow = given[:, k].T
+        now = Running(run.time, u, v, r, x, y, bow, aside)
         drive = placed(response.model.drive, aside, power)
         total += np.column_stack(np.broadcast_arrays(*chain.act(tuple(acting[:, k].T), now, drive)))
     return total

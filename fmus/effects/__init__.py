@@ -8,6 +8,7 @@ from . import (
     linear_map,
     measurement,
     outages,
+    propellers,
     scaling,
     single_propellers,
     thrust_curves,
@@ -51,6 +52,7 @@ STANDARD = EffectSet(
     for module in (
         thrust_curves,
         single_propellers,
+        propellers,
         actuator,
         outages,
         thruster_dynamics,

@@ -82,9 +82,10 @@ class Loaded(NamedTuple):
 
 
 class Running(NamedTuple):
-    """What a thruster's force may depend on: time [s], velocity, commands -1...1, place.
+    """What a thruster's force may depend on: time [s], velocity, commands -1...1, place, power.
 
-    ``aside`` [m] is how far to starboard the propellers sit: 0 where one set stands for both.
+    ``aside`` [m] is how far to starboard the propellers sit: 0 where one set stands for both; ``l_vsp``
+    [m] how far forward; ``power_*`` are the settings by which the thrust is scaled.
     """
 
     t: Any = 0.0
@@ -95,6 +96,9 @@ class Running(NamedTuple):
     u_vsp_y: Any = 0.0
     u_bow: Any = 0.0
     aside: Any = 0.0
+    l_vsp: Any = 0.0
+    power_vsp: Any = 1.0
+    power_bow: Any = 1.0
 
 
 class Thrust(NamedTuple):

@@ -196,10 +196,11 @@ def act(shares: Triple, now: Running, b: Prepared) -> Triple:
     """
     p = b.params
     F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
+    vsp, bow = p.power
+    now = now._replace(l_vsp=l_vsp, power_vsp=vsp, power_bow=bow)
     f = Thrust(F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2])
     for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
         f = member.apply(acts, p.wrong, f, f, now)
-    vsp, bow = p.power
     X, Y, N = moments(vsp * f.vsp_x, vsp * f.vsp_y, bow * f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
     N = N + vsp * f.turn
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
@@ -264,7 +265,7 @@ def _thrusters(
         commands = command(s_x), command(s_y), command(s_bow)
         past, given = command_response(s, commands, b, h)
         u, v, r = i.velocity
-        now = Running._make((s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), *given, 0.0))
+        now = Running(s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), *given)
         past, shares = force_response(past, characteristic(now, p.model), b, h)
         vsp, bow = p.power
         tau = when(

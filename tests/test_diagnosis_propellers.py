@@ -1,0 +1,104 @@
+"""Effects of propellers with commands of their own: their forces, found where hidden and nowhere else."""
+
+import numpy as np
+import pytest
+from support.measured import NOISE, smoothed
+from test_diagnosis_selection import learn
+
+from diagnosis import Model, Run, integrals
+from diagnosis.data.reading import ASIDE, force, propellers
+from diagnosis.model.thrust import placed
+from fmus.effects import STANDARD, Running, Thrust
+from fmus.signals import Force
+from fmus.thrusters import chain
+from fmus.vessel.vessel import State
+
+H = 0.02
+HIDDEN = {
+    "cross_vsp": {"cross_vsp_sway": 0.28, "cross_vsp_surge": 0.3},
+    "inflow_vsp": {"inflow_vsp_x": 0.85, "inflow_vsp_y": 1.2},
+    "power_exponent": {"exponent_vsp": 0.4, "exponent_bow": 0.5},
+}
+
+
+def given(seconds):
+    """Five commands that swing at frequencies of their own, and settings of the power that jump."""
+    t = H * np.arange(round(seconds / H))
+    rates = np.array([0.31, 0.47, 0.37, 0.53, 0.41])
+    five = 0.25 * np.sin(np.outer(t, rates) + np.arange(5)) + 0.2 * np.sin(np.outer(t, 2.3 * rates))
+    five[:, [0, 2]] += 0.2
+    setting = np.array([[1.0, 0.8], [0.5, 1.0], [0.7, 0.4]])[(t / 11.0).astype(int) % 3]
+    return t, five, setting
+
+
+def voyage(seconds=90.0, **values):
+    """Windows of a run of the ship, whose propellers are these."""
+    t, five, setting = given(seconds)
+    model = Model(thrusters=values)
+    ready, s, poses = model.hull, State(psi=3.0), []
+    for now, shares, power in zip(t.tolist(), propellers(five).tolist(), setting.tolist(), strict=True):
+        poses.append(s[:3])
+        total = np.zeros(3)
+        for one, aside in zip(shares, ASIDE, strict=True):
+            drive = placed(model.drive, aside, chain.Power(*power))
+            total += chain.act(tuple(one), Running(now, *s[3:6], *one)._replace(aside=aside), drive)
+        s, _ = model.ship.vessel.advance(s, Force(*total.tolist()), ready, H)
+    pose = np.array(poses) + NOISE * np.random.default_rng(4).standard_normal((t.size, 3))
+    return integrals(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))
+
+
+def act(name, now, **values):
+    """Thrust of an effect on one of 0.5 N ahead and 0.2 N to starboard."""
+    e = STANDARD[name]
+    return e(Thrust(0.5, 0.2, 0.1), now, *[values.get(p.name, p.start) for p in e.parameters])
+
+
+def test_cross_forces_are_mirrored_and_cancel_but_for_a_turn():
+    port, starboard, both = (
+        act("cross_vsp", Running(aside=a), cross_vsp_sway=0.3, cross_vsp_surge=0.1)
+        for a in (*ASIDE, 0.0)
+    )
+    assert (port.vsp_y, starboard.vsp_y, both.vsp_y) == pytest.approx((0.05, 0.35, 0.2))
+    assert (port.vsp_x, starboard.vsp_x, both.vsp_x) == pytest.approx((0.52, 0.48, 0.5))
+    # Port ahead and starboard astern turn the bow to starboard.
+    assert both.turn == pytest.approx(0.055 * 0.1 * 0.2)
+
+
+def test_inflow_takes_force_from_where_the_water_comes():
+    turning = Running(u=0.2, v=0.0, r=0.1, u_vsp_x=-0.5, u_vsp_y=0.5, aside=-0.055, l_vsp=-0.4575)
+    found = act("inflow_vsp", turning, inflow_vsp_x=1.0, inflow_vsp_y=1.0)
+    assert found.vsp_x == pytest.approx(0.5 - 0.5 * (0.2 + 0.0055))
+    assert found.vsp_y == pytest.approx(0.2 + 0.5 * 0.04575)
+    assert act("inflow_vsp", turning._replace(u_vsp_x=0.0, u_vsp_y=0.0), inflow_vsp_x=1.0)[:2] == (
+        0.5,
+        0.2,
+    )
+
+
+def test_exponent_matters_at_part_power_only():
+    exponents = {"exponent_vsp": 1.0, "exponent_bow": 0.5}
+    full = act("power_exponent", Running(), **exponents)
+    assert full[:3] == pytest.approx((0.5, 0.2, 0.1))
+    part = act("power_exponent", Running(power_vsp=0.5, power_bow=0.25), **exponents)
+    assert part[:3] == pytest.approx((0.25, 0.1, 0.05))
+    none = act("power_exponent", Running(power_vsp=0.0, power_bow=0.0), **exponents)
+    assert np.isfinite(none[:3]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_hidden_one_is_found_with_its_values(hidden):
+    first = learn([voyage(**HIDDEN[hidden])], prior=0.0).effects[0]
+    assert first.id == hidden
+    for name, value in HIDDEN[hidden].items():
+        assert first.values[name] == pytest.approx(value, rel=0.15), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "other", [{}, {"loss_vsp1": 0.3}, {"bow_failure_time": 40.0}], ids=["nothing", "loss", "failure"]
+)
+def test_none_is_claimed_where_it_is_not(other):
+    found = [f.id for f in learn([voyage(**other)], prior=0.0).effects]
+    assert not set(found) & set(HIDDEN)
+    assert len(found) == len(other)
