@@ -301,7 +301,7 @@ needs_compiler = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compile
 
 @linux_only
 @needs_compiler
-@pytest.mark.parametrize("size", [0, 5000])
+@pytest.mark.parametrize("size", [0, pytest.param(5000, marks=pytest.mark.slow)])
 def test_a_damaged_library_is_made_again_and_that_is_said(size, own_cache):
     (entry,) = own_cache.glob("loop_*.so")
     whole = entry.read_bytes()
@@ -328,6 +328,7 @@ def test_a_compiler_that_makes_nothing_leaves_nothing(tmp_path, monkeypatch):
     assert len(list((tmp_path / "cache").glob("loop_*.so"))) == 1
 
 
+@pytest.mark.slow
 @linux_only
 @needs_compiler
 def test_a_library_that_others_may_write_is_not_loaded(own_cache):
@@ -351,6 +352,7 @@ def builder(cache, *arguments):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @linux_only
 def test_a_damaged_fmu_is_built_again_and_foreign_ones_are_not_used(tmp_path):
     cache = tmp_path / "cache"

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from support.project import ROOT
 from test_run import in_a_process as command
 
 import cosim
-from benchmarks.reliability import endings, mutations
+from benchmarks.reliability import campaigns, endings, mutations, sanitized
 from benchmarks.reliability.judgement import faults
 from cosim import files
 from cosim.command import LONGEST_WORD, printable
@@ -367,3 +368,13 @@ def test_campaign_in_small(tmp_path):
     assert endings.signals(4, 2, tmp_path, nothing) == []
     assert endings.short_of_disk(2, 2, tmp_path, nothing) == []
     assert endings.deaths(10, 2, tmp_path, nothing) == []
+    assert campaigns.interrupted_campaigns(2, 2, tmp_path, nothing) == []
+    assert campaigns.deaths_elsewhere(4, 2, tmp_path, nothing) == []
+    assert campaigns.spoilt_cache(2, 2, tmp_path, nothing) == []
+
+
+@pytest.mark.slow
+@linux_only
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+def test_random_calls_under_sanitizers(tmp_path):
+    assert sanitized.sanitized_calls(20, 2, tmp_path, lambda: None) == []

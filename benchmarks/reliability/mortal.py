@@ -74,14 +74,23 @@ WAYS = {
 }
 
 
+COMMANDS, FORCE = [[f"{stem}_{axis}" for axis in "XYN"] for stem in ("tau_cmd", "tau")]
+
+
 class mortal(Fmi2Slave):  # noqa: N801 - the file's name
-    """A clock whose y is the time."""
+    """A clock whose y is the time; with what a replay wants of a controller, which it leaves at zero."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.u, self.y = 0.0, 0.0
         self.register_variable(Real("u", causality=Fmi2Causality.input))
         self.register_variable(Real("y", causality=Fmi2Causality.output))
+        for name in (*(f"{a}_{b}" for a in ("x", "y", "psi") for b in ("hat", "t")), *COMMANDS):
+            setattr(self, name, 0.0)
+            self.register_variable(Real(name, causality=Fmi2Causality.input))
+        for name in FORCE:
+            setattr(self, name, 0.0)
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
         self._die("instantiate")
 
     def _die(self, where):
