@@ -1,7 +1,8 @@
-"""What a diagnosis comes to: which model, and what that leaves."""
+"""What a diagnosis comes to: which model, what that leaves, and what is believed of the findings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -10,35 +11,122 @@ from .assessment.recurrence import recurrence
 from .assessment.regions import Region
 from .assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from .assessment.remainder_text import remainder_sentence
-from .identification.acceptance import worse
-from .identification.findings import Findings
-from .identification.withdrawal import losses
+from .identification.findings import Finding, Findings
+from .identification.unseen import harm
+from .identification.withdrawal import Unseen, without
 from .model import Integrals, Model, omega
 from .model.uncertainty import omega_std
 
+Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
+
+# Confidence from which on an effect is found; and of its set from which on the set is a finding, else it
+# is a possibility; contract.
+FOUND, BELIEVED = 0.8, 0.5
 # Prior standard deviations beyond which a coefficient alone is no explanation; contract.
 MOST_MOVED = 3.0
+# Of a limit of a parameter's range: a value so near to it is not one that the data chose; contract.
+NEAR_LIMIT = 0.05
+AT_LIMIT = "{0} is at the limit of what was looked for"
+# Confidence at the most where something acts on the axes of an effect that it does not explain: whether
+# it is a cause or stands in for a part of the other is even odds, as long as the other is not known.
+EVEN_ODDS = 0.5
+BESIDE = "something that it does not explain acts on the same axis"
 
 
-def concluded(
-    found: Findings, runs: Sequence[Integrals], held_out: Sequence[Integrals], start: Model
-) -> tuple[Findings, bool]:
-    """The findings with the model that they amount to, and whether that is other coefficients alone.
+class Conclusion(NamedTuple):
+    """The model that findings amount to.
+
+    Attributes:
+        learned: the findings with that model.
+        refitted: whether that is other nominal coefficients alone.
+        dropped: effects that were accepted, of which the model has none.
+    """
+
+    learned: Findings
+    refitted: bool
+    dropped: Sequence[Finding]
+
+
+def believed(f: Finding) -> bool:
+    """Whether a finding is one, and no mere possibility; a method without confidence is believed."""
+    return not f.together < BELIEVED
+
+
+def verdict(learned: Findings, refitted: bool, remainder: Remainder) -> Verdict:
+    """The verdict, by the one rule that all words follow."""
+    told = next((f for f in learned.effects if believed(f)), None)
+    if told is not None:
+        return "found" if told.confidence >= FOUND else "ambiguous"
+    if refitted:
+        return "coefficients"
+    return "unexplained" if remainder.significant or learned.effects else "none"
+
+
+def concluded(found: Findings, runs: Sequence[Integrals], unseen: Unseen, start: Model) -> Conclusion:
+    """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
-    from what is believed of it than MOST_MOVED, and unseen data do not fit worse.
+    from what is believed of it than MOST_MOVED, and unseen data are not worse than without. They then
+    take the place of effects of which none is believed, if unseen data are not worse either.
+
+    Args:
+        found: what is left of the findings after the withdrawal.
+        runs: all runs.
+        unseen: the data that decide.
+        start: the model at first.
     """
-    if found.effects:
-        return found, False
-    other = found.refitted
-    if other is not None and all(abs(z) <= MOST_MOVED for z in found.moved.values()):
-        spoils = bool(held_out) and worse(
-            losses(held_out, other, found.sigma), losses(held_out, start, found.sigma)
-        )
+    if any(believed(f) for f in found.effects) or (found.effects and found.keep is None):
+        return Conclusion(found, False, [])
+    alone = without(found, [f.id for f in found.effects], start) if found.effects else found
+    other = alone.refitted
+    if other is not None and all(abs(z) <= MOST_MOVED for z in alone.moved.values()):
         missing, left = (_left(runs, start, m) for m in (start, other))
-        if _any(missing) and not _any(left) and not spoils:
-            return replace(found, model=other), True
-    return replace(found, model=start, suspects=[]), False
+        before = [found, start] if found.effects else [start]
+        if _any(missing) and not _any(left) and unseen.judges(alone):
+            now, *others = unseen.losses(alone, *before)
+            if not any(harm(now, each) for each in others):
+                return Conclusion(replace(alone, model=other), True, found.effects)
+    if found.effects:
+        return Conclusion(found, False, [])
+    return Conclusion(replace(found, model=start, suspects=[]), False, [])
+
+
+def limited(f: Finding, start: Model) -> Finding:
+    """A finding; with a value at the limit of its range it is none.
+
+    A limit of zero is where an effect begins. The nodes of a free curve are not values of their own.
+    """
+    effect = start.ship.effects[f.id]
+    at = [n for n, x in f.values.items() if _at_limit(start, n, start.value(n) + x)]
+    if not at or effect.search.smooth:
+        return f
+    return replace(f, confidence=0.0, together=0.0, doubt=AT_LIMIT.format(" and ".join(at)))
+
+
+def _at_limit(start: Model, name: str, value: float) -> bool:
+    allowed = start.declared(name).range
+    return any(
+        limit and abs(value - limit) <= NEAR_LIMIT * abs(limit) for limit in (allowed.min, allowed.max)
+    )
+
+
+def doubted(learned: Findings, remainder: Remainder, start: Model) -> Findings:
+    """The findings; those on whose axes a significant remainder is are even odds at the most.
+
+    Waves are a remainder themselves, and account for the one that is left beside them.
+    """
+    effects = start.ship.effects
+    left = {axis for axis, r in remainder.axes.items() if r.significant}
+    if any(effects[f.id].search.by == "spectrum" and f.confidence >= FOUND for f in learned.effects):
+        return learned
+
+    def capped(f: Finding) -> Finding:
+        effect = effects[f.id]
+        if effect.search.by == "spectrum" or not left & set(effect.axis) or not f.confidence > EVEN_ODDS:
+            return f
+        return replace(f, confidence=EVEN_ODDS, together=EVEN_ODDS, doubt=BESIDE)
+
+    return replace(learned, effects=[capped(f) for f in learned.effects])
 
 
 def _any(axes: Mapping[str, AxisRemainder]) -> bool:
@@ -47,7 +135,7 @@ def _any(axes: Mapping[str, AxisRemainder]) -> bool:
 
 def _left(runs: Sequence[Integrals], start: Model, model: Model) -> dict[str, AxisRemainder]:
     before, after = ([omega(w, m) for w in runs] for m in (start, model))
-    return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs])
+    return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start)
 
 
 def remainder_of(
@@ -65,7 +153,8 @@ def remainder_of(
         learned: the findings.
     """
     data, left = [e.integrals for e in evaluations], [e.after.omega for e in evaluations]
-    axes = axis_remainders(data, [e.before.omega for e in evaluations], left, std)
+    first = [e.before.omega for e in evaluations]
+    axes = axis_remainders(data, first, left, std, evaluations[0].model)
     how = recurrence(data, np.concatenate(left)) if _any(axes) else None
     effects = learned.model.ship.effects
     waves = any(effects[f.id].search.by == "spectrum" for f in learned.effects)

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -15,11 +14,11 @@ from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
-from .decision import concluded, remainder_of
+from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
 from .identification import DEFAULT, Method, Prior, method
-from .identification.findings import Findings
+from .identification.findings import Finding, Findings
 from .identification.prior import shares as prior_shares
-from .identification.withdrawal import Withdrawn, withdraw
+from .identification.withdrawal import Unseen, Withdrawn, withdraw
 from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
@@ -27,8 +26,6 @@ from .progress import Advance, silent
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
-
-Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +63,7 @@ class Diagnosis:
         withdrawn: effects that were accepted and taken back.
         remainder: what the learned model leaves; where nothing was learned, the first one.
         refitted: whether the learned model has other nominal coefficients and no effect.
+        dropped: effects that were accepted, where the learned model has other coefficients instead.
         shares: for each finding the share of the error's sum of squares that it explains.
         comparison: errors before and after, on the training runs and then on those held out.
         start: the initial model.
@@ -79,6 +77,7 @@ class Diagnosis:
     withdrawn: Sequence[Withdrawn]
     remainder: Remainder
     refitted: bool
+    dropped: Sequence[Finding]
     shares: Sequence[float]
     comparison: Comparison
     start: Model
@@ -89,11 +88,12 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        if self.learned.effects:
-            return "ambiguous" if self.learned.effects[0].alike else "found"
-        if self.refitted:
-            return "coefficients"
-        return "unexplained" if self.remainder.significant else "none"
+        return verdict(self.learned, self.refitted, self.remainder)
+
+    @property
+    def believed(self) -> list[bool]:
+        """Of each effect of the learned model whether it is a finding, or a possibility."""
+        return [believed(f) for f in self.learned.effects]
 
     @property
     def sound(self) -> bool:
@@ -182,8 +182,10 @@ def diagnose(
     region = OperatingRegion.of(nu)
     found = chosen.fit(train, start, prior, advance, seed)
     advance("what unseen data say")
-    kept, withdrawn = withdraw(found, held_out, start, lambda a, b: drives_on(a, b, region))
-    learned, refitted = concluded(kept, [*train, *held_out], held_out, start)
+    unseen = Unseen(train, held_out, start, found.sigma)
+    kept, withdrawn = withdraw(found, unseen, start, lambda a, b: drives_on(a, b, region))
+    kept = replace(kept, effects=[limited(f, start) for f in kept.effects])
+    learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start)
     final = learned.model if learned.effects or refitted else None
     comparison = evaluate(train, start, final, held_out, advance)
     advance("what is left")
@@ -191,6 +193,7 @@ def diagnose(
     judged = comparison.evaluations[: len(train) if learned.model.runs else None]
     std = comparison.omega_std[: len(judged)]
     remainder = remainder_of(judged, std, comparison.after.regions, learned)
+    learned = doubted(learned, remainder, start)
     advance("stability")
     stability = check_stability(learned.model, start, advance, region)
     shares = _shares(learned, start, held_out)
@@ -200,6 +203,7 @@ def diagnose(
         withdrawn,
         remainder,
         refitted,
+        dropped,
         shares,
         comparison,
         start,

@@ -76,28 +76,28 @@ def commanded(fall: Fall) -> str:
 
 def vsp_curve(found: DiagnosisContent) -> str:
     """The shape of the VSP's surge force."""
-    came = [e.id for e in found.effects if e.id in SHAPES]
+    came = [e.id for e in found.accepted if e.id in SHAPES]
     if came:
         return ", ".join(came)
-    alike = [i for e in found.effects for i in e.indistinguishable if i in SHAPES]
+    alike = [i for e in found.accepted for i in e.indistinguishable if i in SHAPES]
     return f"only as indistinguishable ({', '.join(dict.fromkeys(alike))})" if alike else "no"
 
 
 def coefficients(found: DiagnosisContent, axis: str) -> str:
     """Damping coefficients of an axis: as effects, and as nominal ones that are likely wrong."""
-    effects = [e.id for e in found.effects if e.id.startswith(f"{axis}_")]
+    effects = [e.id for e in found.accepted if e.id.startswith(f"{axis}_")]
     suspects = [f"{s.name} = {s.value:.3g}" for s in found.suspect_coefficients if s.name[0] == axis]
     return ", ".join(effects + suspects) or "no"
 
 
 def delay(found: DiagnosisContent) -> str:
     """A pure delay of the thrusters, and whether it is as long as expected."""
-    for e in found.effects:
+    for e in found.accepted:
         value = e.coefficients["delay"].value if e.id == "delay" else None
         if value is not None:
             within = DELAY[0] <= value <= DELAY[1]
             return f"{value:.3g} s" + ("" if within else ", not as expected")
-    others = [e.id for e in found.effects if e.id in ("lag", "clock_offset")]
+    others = [e.id for e in found.accepted if e.id in ("lag", "clock_offset")]
     return f"no; {', '.join(others)} in its place" if others else "no"
 
 

@@ -165,7 +165,7 @@ def write_findings(report: Report, name: str, d: DiagnosisContent) -> None:
         numbers = [f"{x:.2f}" for x in (e.confidence or 0.0, e.share_of_error or 0.0)]
         return [f"`{e.id}`", e.equation, *numbers, ", ".join(e.indistinguishable) or "none"]
 
-    if d.effects:
+    if d.accepted:
         header = [
             "effect",
             "with 95 % intervals",
@@ -173,7 +173,7 @@ def write_findings(report: Report, name: str, d: DiagnosisContent) -> None:
             "share of error",
             "indistinguishable",
         ]
-        report.table(header, [row(e) for e in d.effects], words=True)
+        report.table(header, [row(e) for e in d.accepted], words=True)
     else:
         report.text("No effect was found.")
     suspects = [f"{s.name} = {s.value:.3g} (z = {s.z:.1f})" for s in d.suspect_coefficients]

@@ -12,16 +12,19 @@ from diagnosis import Model, Run, integrals, omega
 from diagnosis.assessment.evaluation import evaluate_run
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
-from diagnosis.assessment.remainder import axis_remainders
+from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
+from diagnosis.decision import doubted, limited, verdict
 from diagnosis.identification.acceptance import worse
-from diagnosis.identification.confidence import confidence, evidence
+from diagnosis.identification.confidence import confidence, credible, evidence
 from diagnosis.identification.findings import Finding, Findings
 from diagnosis.identification.map_regression import Scored, first_share
 from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.withdrawal import withdraw
+from diagnosis.identification.unseen import Losses, harm
+from diagnosis.identification.withdrawal import Unseen, withdraw
 from diagnosis.model.correlation import correlated_windows
 from diagnosis.model.ship_model import of_one_run
 from diagnosis.model.uncertainty import omega_std
+from diagnosis.model.weak_form import commanded
 from diagnosis.report import diagnosis_content
 
 SHORT = {"count": 2, "seconds": 90.0}
@@ -32,7 +35,7 @@ def left(runs, model=None):
     """Remainder of a model, of which the nominal one is the first."""
     first, model = Model(), model or Model()
     before, after = ([omega(w, m) for w in runs] for m in (first, model))
-    return axis_remainders(runs, before, after, [omega_std(w, first) for w in runs])
+    return axis_remainders(runs, before, after, [omega_std(w, first) for w in runs], first)
 
 
 @pytest.mark.parametrize("noise", [1.0, pytest.param(10.0, marks=pytest.mark.slow)])
@@ -194,20 +197,153 @@ def test_effect_that_spoils_unseen_runs_is_withdrawn_and_another_kept():
     right, wrong = finding(start, delta_X_u=-3.0), finding(start, delta_N_r=1.0)
     model = start.plus({"delta_X_u": -3.0, "delta_N_r": 1.0})
     found = Findings([right, replace(wrong, model=model)], model=model, sigma=np.full(3, 0.01))
-    kept, gone = withdraw(found, runs[1:], start, lambda a, b: False)
+    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
     assert [w.id for w in gone] == ["N_r"]
     assert "held-out" in gone[0].reason
     assert [f.id for f in kept.effects] == ["X_u"]
     assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
-    assert withdraw(kept, runs[1:], start, lambda a, b: False) == (kept, [])
+    assert withdraw(kept, unseen, start, lambda a, b: False) == (kept, [])
 
 
 def test_less_dissipation_needs_unseen_data_that_show_it():
     runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
     start = Model()
     found = Findings([finding(start, delta_N_uv=1e-6)], model=start, sigma=np.full(3, 0.01))
-    assert withdraw(found, runs, start, lambda a, b: False)[1] == []
-    assert [w.id for w in withdraw(found, runs, start, lambda a, b: True)[1]] == ["N_uv"]
+    unseen = Unseen([], runs, start, found.sigma)
+    assert withdraw(found, unseen, start, lambda a, b: False)[1] == []
+    assert [w.id for w in withdraw(found, unseen, start, lambda a, b: True)[1]] == ["N_uv"]
+
+
+def misses(omega=1.0, position=1.0, heading=1.0, seed=0):
+    """Losses of 40 blocks and windows, of so many times the usual size."""
+    draws = np.random.default_rng(seed).exponential(1.0, (3, 40))
+    return Losses(*(size * x for size, x in zip((omega, position, heading), draws, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("its", "harms"),
+    [
+        ({}, False),
+        ({"omega": 1.5}, True),
+        ({"position": 1.5}, True),
+        ({"heading": 1.5}, True),
+        ({"position": 0.5, "heading": 0.9}, False),
+        ({"position": 0.1, "heading": 1.3}, False),
+        ({"position": 0.9, "heading": 3.0}, True),
+        ({"position": np.inf}, True),
+    ],
+)
+def test_harm_is_by_the_model_error_or_by_predictions(its, harms):
+    assert bool(harm(misses(**its), misses())) == harms
+
+
+class OnPredictions(Unseen):
+    """Unseen data whose model errors are the same for every model, so that predictions alone decide."""
+
+    def losses(self, *found):
+        made = super().losses(*found)
+        return [each._replace(omega=made[0].omega) for each in made]
+
+
+def test_effect_that_spoils_predictions_alone_is_withdrawn_and_one_that_mends_them_stays():
+    """However sure an effect is: the right one has confidence 0 here, the wrong one 0.9."""
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    start = Model()
+    right, wrong = finding(start, delta_X_u=-3.0), finding(start, delta_N_r=1.0)
+    model = start.plus({"delta_X_u": -3.0, "delta_N_r": 1.0})
+    found = Findings(
+        [replace(right, confidence=0.0, together=0.0), replace(wrong, model=model)],
+        model=model,
+        sigma=np.full(3, 0.01),
+    )
+    unseen = OnPredictions(runs[:1], runs[1:], start, found.sigma)
+    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    assert [f.id for f in kept.effects] == ["X_u"]
+    assert [w.id for w in gone] == ["N_r"]
+    assert "predictions of held-out runs are worse" in gone[0].reason
+
+
+def left_on(**significant):
+    """A remainder that is significant on some axes."""
+    axes = {a: AxisRemainder(1.0, 0.1, 0.5, 1.0, 0.5, 0.1, significant.get(a, False)) for a in "XYN"}
+    return Remainder(axes, "")
+
+
+def told(confidence, together, ids=("X_u",), start=None):
+    effects = [
+        replace(
+            finding(start or Model(), **{f"delta_{i}": -1.0}), confidence=confidence, together=together
+        )
+        for i in ids
+    ]
+    return Findings(effects)
+
+
+@pytest.mark.parametrize(
+    ("found", "refitted", "remains", "said"),
+    [
+        (told(0.8, 0.8), False, False, "found"),
+        (told(0.79, 0.99), False, False, "ambiguous"),
+        (told(0.3, 0.5), False, False, "ambiguous"),
+        (told(0.3, 0.49), False, False, "unexplained"),
+        (told(np.nan, np.nan), False, False, "ambiguous"),
+        (Findings(), True, False, "coefficients"),
+        (Findings(), False, True, "unexplained"),
+        (Findings(), False, False, "none"),
+    ],
+)
+def test_verdict_follows_the_confidence(found, refitted, remains, said):
+    assert verdict(found, refitted, left_on(X=remains)) == said
+
+
+def test_verdict_goes_on_without_what_is_not_believed():
+    unlikely, sure = told(0.1, 0.2, ["N_r"]), told(0.9, 0.9)
+    both = replace(sure, effects=[*unlikely.effects, *sure.effects])
+    assert verdict(both, False, left_on()) == "found"
+
+
+@pytest.mark.parametrize(
+    ("weights", "others"),
+    [
+        ({"a": 0.96, "b": 0.04}, []),
+        ({"a": 0.5, "b": 0.46, "c": 0.04}, ["b"]),
+        ({"b": 0.5, "a": 0.3, "c": 0.2}, ["b", "c"]),
+    ],
+)
+def test_set_holds_95_percent_of_the_weights_that_confidence_comes_from(weights, others):
+    assert credible("a", weights) == others
+
+
+def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does_not():
+    found = told(0.99, 0.99)
+    (there,) = doubted(found, left_on(X=True), Model()).effects
+    (beside,) = doubted(found, left_on(N=True), Model()).effects
+    assert there.confidence == there.together == 0.5
+    assert "same axis" in there.doubt
+    assert beside == found.effects[0]
+
+
+@pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])
+def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
+    start = Model()
+    assert start.declared("delta_m").range.max == 100.0
+    f = Finding("mass", {"delta_m": kilograms}, {}, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = limited(f, start)
+    assert (seen.confidence == 0.99) == is_finding
+    assert ("limit of what was looked for" in seen.doubt) != is_finding
+
+
+def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():
+    (w, *_) = voyages(**SHORT)
+    model = Model()
+    run = replace(w.run, tau_cmd=w.run.tau_cmd * [1.0, 0.0, 1.0])
+    idle = replace(w, smoothed=replace(w.smoothed, track=replace(w.smoothed.track, run=run)))
+    force, with_sway = commanded([idle], model), commanded([w], model)
+    assert np.array_equal(force[:, [0, 2]], with_sway[:, [0, 2]])
+    nu = np.nan_to_num(w.smoothed.nu)
+    inertia = model.mass @ np.array([0.0, np.sqrt(np.mean(np.gradient(nu[:, 1], w.run.time) ** 2)), 0.0])
+    assert 0.5 * inertia[1] < np.sqrt(np.mean(force[:, 1] ** 2)) < 2.0 * inertia[1]
 
 
 def test_worse_is_more_than_two_paired_standard_errors():

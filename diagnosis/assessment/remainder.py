@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from ..model import Integrals
+from ..model import Integrals, Model
 from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
 from ..model.weak_form import EVERY, OVERLAP, commanded
 from .covariates import AXES
@@ -63,6 +63,7 @@ def axis_remainders(
     before: Sequence[np.ndarray],
     after: Sequence[np.ndarray],
     std: Sequence[np.ndarray],
+    model: Model,
 ) -> dict[str, AxisRemainder]:
     """What a model leaves on each axis, X, Y and N.
 
@@ -70,8 +71,9 @@ def axis_remainders(
         data: windows of each run.
         before, after: of each run the model error (K, 3) of the first model and of this [N, N, N m].
         std: of each run its standard deviation by noise (K, 3) [N, N, N m].
+        model: the first one.
     """
-    command = commanded(data)
+    command = commanded(data, model)
     first, left, noise = (np.concatenate(x) for x in (before, after, std))
     groups = spans(data)
     found = {}

@@ -9,12 +9,13 @@ import numpy as np
 from ..model import Model
 from ..model.uncertainty import omega_std
 from .candidates import model_error
-from .confidence import Evidence, confidence, evidence
+from .confidence import Evidence, confidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, gram_table
-from .map_regression import RIDGE, Scored, score
+from .map_regression import RIDGE, Scored, regression, score
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance, refit
+from .unseen import block_folds
 
 SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
 NORMAL_95 = 1.96
@@ -27,16 +28,14 @@ class Place:
     Attributes:
         id: of the effect.
         names: of its parameters.
-        intervals: 95 % interval of each change point [s].
-        bagged: its probability beside the other candidates.
-        alike: ids that these data cannot tell from it.
+        intervals: 95 % interval of each change point [s], and of each parameter that it is not smooth in.
+        weights: id -> probability of the effect and of its rivals, of the candidates together 1.
     """
 
     id: str
     names: Sequence[str]
     intervals: Mapping[str, tuple[float, float]]
-    bagged: float
-    alike: Sequence[str]
+    weights: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,18 +79,20 @@ class Search:
         for k, p in enumerate(self.places):
             values = {n: self.at.values[n] for n in p.names}
             own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
-            seen = self._evidence(p)
+            seen, alike = self._evidence(p), credible(p.id, p.weights)
+            together = seen._replace(bagged=p.weights[p.id] + sum(p.weights[i] for i in alike))
             effects.append(
                 Finding(
                     p.id,
                     values,
-                    dict(p.intervals) | own,
+                    own | dict(p.intervals),
                     confidence(seen),
-                    p.alike,
+                    alike,
                     sum(shares[: k + 1]),
                     shares[k],
                     nested[k],
                     seen,
+                    confidence(together),
                 )
             )
         t = self.t
@@ -105,10 +106,21 @@ class Search:
             np.asarray(t.sigma),
             self.at.without(self.at.values).model(prior) if believed and not effects else None,
             moved,
-            self._scored(self.at, self._along).runs,
-            by_block(t.blocks, self.lacking * t.weight),
+            self._fold_models(),
             self.findings,
         )
+
+    def _fold_models(self) -> list[Model]:
+        """The model fitted without each fold of the data, by one step about the fit to all."""
+        t, fitted = self.t, self.at.fitted
+        table = gram_table(t.error(self.at), t.blocks, [], self._along, np.asarray(t.sigma))
+        all_of_it = regression(table, -1, 0)
+        models = []
+        for held in block_folds(t.data):
+            change = -all_of_it.fitted(table.total - table.grams[held].sum(axis=0)).left[1:]
+            step = dict(zip(fitted, change.tolist(), strict=False))
+            models.append(self.at.plus(step, change[len(fitted) :]).model(t.prior))
+        return models
 
     def _of(self, at: Estimate) -> Nuisance:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""
@@ -159,12 +171,7 @@ class Search:
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
-        return evidence(p.bagged, without - left, left, std, self.t.blocks)
-
-
-def by_block(blocks: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Sum of squares (blocks,) of an error (K, 3) in each of the blocks (K,)."""
-    return np.bincount(np.unique(blocks, return_inverse=True)[1], np.sum(error**2, axis=1))
+        return evidence(p.weights[p.id], without - left, left, std, self.t.blocks)
 
 
 def interval(value: float, std: float) -> tuple[float, float]:

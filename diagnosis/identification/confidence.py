@@ -12,6 +12,7 @@ The last two are root mean squares beyond what noise gives, so that neither grow
 from evidence to probability is a logistic regression.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from ..model.uncertainty import NOISE_TOLERANCE
 SURE = 4.6
 PER_LEFT = 14.0
 PER_VARIATION = 14.0
+CREDIBLE = 0.95  # probability of the set of ids that are told together, of the candidates'
 
 
 class Evidence(NamedTuple):
@@ -44,6 +46,21 @@ def confidence(e: Evidence) -> float:
     """Probability that the id is a true cause."""
     a_candidate_is_right = 1.0 / (1.0 + np.exp(PER_LEFT * e.left + PER_VARIATION * e.varies - SURE))
     return float(e.bagged * a_candidate_is_right)
+
+
+def credible(own: str, weights: Mapping[str, float]) -> list[str]:
+    """The other ids of the smallest set that holds one and has the probability CREDIBLE.
+
+    Args:
+        own: the id.
+        weights: id -> probability, its own included; together 1.
+
+    Returns:
+        The most likely first; empty where the id has that probability alone.
+    """
+    others = sorted((i for i in weights if i != own), key=lambda i: -weights[i])
+    before = weights[own] + np.cumsum([0.0, *(weights[i] for i in others)])
+    return [i for i, sum_so_far in zip(others, before, strict=False) if sum_so_far < CREDIBLE]
 
 
 def evidence(

@@ -12,11 +12,23 @@ from .confidence import Evidence
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
-    """A candidate in the order of its score: cross-validated loss, lower is better, and Q^2."""
+    """A candidate in the order of its score.
+
+    Attributes:
+        id: of the effect.
+        score: cross-validated loss; lower is better.
+        q2: cross-validated share of the model error that it explains with the nominal coefficients.
+        beyond: share of what those coefficients leave, alone, that it explains; NaN: not known.
+        behind, behind_std: its score less that of the first, and the standard error of that difference,
+            paired over blocks; NaN: not known.
+    """
 
     id: str
     score: float
     q2: float
+    beyond: float = np.nan
+    behind: float = np.nan
+    behind_std: float = np.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +55,14 @@ class Finding:
         values: its parameters as additions to the nominal ones; named ``parameter@run`` if of one run.
         ci95: interval of each that is fitted, at the final step.
         confidence: probability that it is a true cause; NaN where a method has none.
-        alike: ids that these data cannot tell from it, itself not among them.
+        alike: the other ids of the smallest set that holds it and 95 % of the candidates' probability,
+            by the weights that its confidence comes from; the most likely first.
         q2: cross-validated share of the model error that is explained, with all found before.
         share: how much of the cross-validated model error went with this finding.
         model: with this and all earlier findings.
         evidence: what the confidence is made of; None where a method has none.
+        together: probability that it or one of ``alike`` is a true cause; NaN where a method has none.
+        doubt: what speaks against it beside the confidence, as a part of a sentence.
     """
 
     id: str
@@ -59,6 +74,8 @@ class Finding:
     share: float
     model: Model = field(default_factory=Model)
     evidence: Evidence | None = None
+    together: float = np.nan
+    doubt: str = ""
 
     @property
     def of_runs(self) -> list[str]:
@@ -81,9 +98,8 @@ class Findings:
         refitted: the most likely model without an effect, but other nominal coefficients; None where a
             method does not fit them.
         moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
-        left_out: (blocks,), loss of each block by a fit that has not seen its run, or, of one run, the
-            block; None where a method has none.
-        left_out_at_first: the same of the model that it started from.
+        fold_models: the model fitted without each fold of the training runs, see
+            :func:`.unseen.folds`; empty where a method has none.
         keep: the findings with some of the effects only, everything else fitted anew; None where a
             method cannot.
     """
@@ -95,6 +111,5 @@ class Findings:
     sigma: np.ndarray = field(default_factory=lambda: np.ones(3))
     refitted: Model | None = None
     moved: Mapping[str, float] = field(default_factory=dict)
-    left_out: np.ndarray | None = None
-    left_out_at_first: np.ndarray | None = None
+    fold_models: Sequence[Model] = ()
     keep: "Callable[[Sequence[str]], Findings] | None" = None

@@ -22,10 +22,11 @@ from .acceptance import better, beyond_chance, harmful, matters
 from .conclusion import Place, Search
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
-from .map_regression import first_share
+from .map_regression import Scored, first_share
 from .prior import MEASURED, NominalPrior, Prior
+from .profile import profiled
 from .refinement import Estimate, TrainingSet, nuisance, refit
-from .shortlist import Ranking, Shortlist, alike, rank, reweighted, scored_alone
+from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
 from .waves import Waves, find_waves
 
 MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
@@ -93,7 +94,7 @@ def search(
     t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())
-    lacking, command = ranking.base, commanded(data)
+    lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
     places: list[Place] = []
     before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
@@ -101,13 +102,13 @@ def search(
         advance(f"effect {len(places) + 1}: the best candidates refined")
         t, ranking, best = reweighted(t, at, ranking)
         total = float(np.sum((lacking * t.weight) ** 2))
-        ranked = ranked or in_one_order(ranking, best)
         first = best.scored[0]
         without = best.winner.without(best.starts[first.candidate].values)
         left = best.refined[first.candidate].left
         # As well fitted as the candidates are: what other coefficients give is not an effect's.
         alone = refit(t, at, ranking.nuisance).estimate
         nothing = scored_alone(t, alone)
+        ranked = ranked or in_one_order(ranking, best, nothing)
         shows = matters(lacking, t.error(without), left, command)
         if not (shows and beyond_chance(nothing, first, total)):
             break
@@ -126,6 +127,9 @@ def search(
         t, at = before
         del places[-1]
     at = refit(t, at, nuisance(t, at, t.error(at))).estimate
+    for k, p in enumerate(places):
+        at, intervals = profiled(t, at, p)
+        places[k] = replace(p, intervals={**p.intervals, **intervals})
     return Search(t, at, places, ranked, lacking)
 
 
@@ -170,23 +174,37 @@ def place(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> Place:
         rng: for the bootstrap.
         chosen: number of the candidate in its order.
     """
-    first = best.scored[chosen]
-    others = [s for s in best.scored if s is not first]
+    first = best.scored[chosen].candidate
+    shares = first_share(best.scored, REPLICATES, rng).tolist()
     return Place(
-        best.ids[first.candidate],
-        tuple(best.starts[first.candidate].values),
-        best.refined[first.candidate].intervals,
-        float(first_share(best.scored, REPLICATES, rng)[chosen]),
-        [best.ids[s.candidate] for s in others if alike(best.table, first, s)],
+        best.ids[first],
+        tuple(best.starts[first].values),
+        best.refined[first].intervals,
+        {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
     )
 
 
-def in_one_order(ranking: Ranking, best: Shortlist) -> list[Ranked]:
-    """Every candidate in order, those of the shortlist as refined."""
+def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ranked]:
+    """Every candidate in order, those of the shortlist as refined.
+
+    Args:
+        ranking: all candidates.
+        best: the shortlist.
+        nothing: the score of the nominal coefficients alone.
+    """
     refined = [(best.ids[s.candidate], s) for s in best.scored]
     rest = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order[len(refined) :]]
-    found = [Ranked(i, s.score, 1.0 - float(s.blocks.sum()) / ranking.size) for i, s in refined + rest]
-    return sorted(found, key=lambda r: r.score)
+    in_order = sorted(refined + rest, key=lambda named: named[1].score)
+    first, alone = in_order[0][1], float(nothing.blocks.sum())
+
+    def ranked(name: str, s: Scored) -> Ranked:
+        d, left = s.blocks - first.blocks, float(s.blocks.sum())
+        std = float(np.sqrt(d.size) * d.std())
+        return Ranked(
+            name, s.score, 1.0 - left / ranking.size, 1.0 - left / alone, s.score - first.score, std
+        )
+
+    return [ranked(name, s) for name, s in in_order]
 
 
 def of_waves(e: Effect, found: Waves, start: Model) -> Finding:

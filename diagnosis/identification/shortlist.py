@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from ..model.correlation import independent
 from .candidates import Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
-from .map_regression import RIDGE, Regression, Scored, regression, score
+from .map_regression import RIDGE, Scored, regression, score
 from .refinement import (
     Estimate,
     Refined,
@@ -27,14 +27,8 @@ from .refinement import (
 from .segmentation import FLOOR
 
 LENGTH = 8  # of the shortlist
-# Share of a force that must be its own for data to tell its cause from another, or from those found:
-# below 5 % no manoeuvre of the study in which this was tried could (method of the project, chosen).
-SEPARATION = 0.05
 REWEIGHTINGS = 4  # at the most
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
-# A curve that can do what an effect with this many parameters fewer does is no other explanation of it:
-# it has three nodes at the least, a law one parameter.
-FREE_SHAPE = 2
 # Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
 # own: as much as its score must fall to be accepted.
 NEW = 10.0
@@ -213,36 +207,3 @@ def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
     size = len(fitted)
     precision = np.zeros((size, size)) if shape.precision is None else shape.precision
     return Start(values, fitted, precision)
-
-
-def alike(t: GramTable, best: Scored, other: Scored) -> bool:
-    """Whether another candidate is within two paired standard errors, or can do what the best does.
-
-    A free curve of which the best is a special case is no rival of it: it could always do the same.
-    """
-    mine, its = (regression(t, s.candidate, s.shape) for s in (best, other))
-    inseparable = separation(t, mine, its) < SEPARATION
-    if inseparable and its.free >= mine.free + FREE_SHAPE:
-        return False
-    d = other.blocks - best.blocks
-    behind = float(d.sum()) + other.penalty - best.penalty
-    return inseparable or behind <= TIE * float(np.sqrt(len(d)) * d.std())
-
-
-def separation(t: GramTable, mine: Regression, its: Regression) -> float:
-    """Share of the best one's force that the other and the nominal coefficients cannot give."""
-    force = own_force(t, mine)
-    force[mine.use[: mine.free]] += mine.fitted(t.total).beta
-    offset = 0.0 * t.entries[-1, 0].offset
-    nothing = Regression(force, mine.use[mine.free :], 0, t.precision, offset, 0)
-    other = its._replace(target=force - own_force(t, its), offset=0.0 * its.offset)
-    costs = [float(f.loss(t.total)) + f.penalty for f in (x.fitted(t.total) for x in (nothing, other))]
-    return costs[1] / max(costs[0], 1e-12)
-
-
-def own_force(t: GramTable, which: Regression) -> np.ndarray:
-    """(p,), the force of what is given of a candidate, without the coefficients that moved with it."""
-    force = -which.target
-    force[0] = 0.0
-    force[t.nuisance] -= which.offset[which.free :] - t.entries[-1, 0].offset
-    return force

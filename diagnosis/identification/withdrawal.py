@@ -1,7 +1,7 @@
-"""Withdrawal: effects with which unseen data fit worse are taken back, once, after the search.
+"""Withdrawal of effects with which unseen data fit worse, or are predicted worse, after the search.
 
-Unseen are held-out runs; where there are none, each training run by a fit to the others. They only veto:
-what is withdrawn is replaced by nothing.
+They only veto: what is withdrawn is replaced by nothing. How sure an effect is does not count: what
+makes predictions better stays in the model.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import Integrals, Model, omega
+from ..model import Integrals, Model
 from .acceptance import worse
 from .findings import Findings
+from .unseen import Losses, Part, block_folds, harm, losses
 
-MEASURED = "with it the model fits {where} worse"
-WHOLE_SET = "with it and what was found before it the model fits {where} worse than at first"
+ALONE = "with it {harm}"
+WHOLE_SET = "with it and what was found before it {harm} than at first"
 DRIVES = "with it the hull drives the ship on, and {where} do not show that it does"
 
 
@@ -26,51 +27,78 @@ class Withdrawn(NamedTuple):
     reason: str
 
 
+class Unseen:
+    """The data that decide, and what findings miss there.
+
+    Args:
+        train: runs that were learned from.
+        held_out: runs of which nothing was learned; where there are any, they decide.
+        start: the model at first.
+        sigma: (3,), what a model error is divided by [N, N, N m].
+    """
+
+    def __init__(
+        self, train: Sequence[Integrals], held_out: Sequence[Integrals], start: Model, sigma: np.ndarray
+    ) -> None:
+        self._start, self._sigma, self._held_out = start, sigma, bool(held_out)
+        self.where = "held-out runs" if held_out else "data left out of the fit"
+        if held_out or len(train) > 1:
+            self._parts = [Part(w) for w in held_out or train]
+        else:
+            self._parts = [Part(train[0], blocks) for blocks in block_folds(train)]
+
+    def judges(self, found: Findings) -> bool:
+        """Whether a method's findings can be held against these data."""
+        return self._held_out or len(found.fold_models) == len(self._parts)
+
+    def losses(self, *found: Findings | Model) -> list[Losses]:
+        """What models miss, each fitted without the part that it is held against."""
+        return losses(self._parts, [self._models(f) for f in found], self._sigma)
+
+    def _models(self, found: Findings | Model) -> Sequence[Model]:
+        if isinstance(found, Findings):
+            if not self._held_out:
+                return found.fold_models
+            found = found.model if found.effects else found.refitted or self._start
+        return [found] * len(self._parts)
+
+
 def withdraw(
-    found: Findings,
-    held_out: Sequence[Integrals],
-    start: Model,
-    drives: Callable[[Model, Model], bool],
+    found: Findings, unseen: Unseen, start: Model, drives: Callable[[Model, Model], bool]
 ) -> tuple[Findings, list[Withdrawn]]:
     """Take back what makes unseen data worse.
 
+    Waves and failures are not judged: no model has waves, and the times of a failure are those of the
+    run in which it was found.
+
     Args:
         found: the findings on the training runs.
-        held_out: runs of which nothing was learned; may be empty.
+        unseen: the data that decide.
         start: the model at first.
         drives: whether the hull of the first model drives the ship on where that of the second does not.
 
     Returns:
         The findings that are left, all else fitted anew, and what was withdrawn.
     """
-    fitted = [f for f in found.effects if start.ship.effects[f.id].search.by == "regression"]
-    # Held-out runs say nothing of what holds in others alone.
-    judged = [f.id for f in fitted if not (held_out and f.of_runs)]
-    where = "held-out runs" if held_out else "data left out of the fit"
-    if not judged or (not held_out and found.left_out is None):
+    search = {f.id: start.ship.effects[f.id].search for f in found.effects}
+    judged = [i for i, s in search.items() if s.by == "regression" and not s.times]
+    if not judged or not unseen.judges(found):
         return found, []
-
-    def loss(findings: Findings) -> np.ndarray:
-        if not held_out and findings.left_out is not None:
-            return findings.left_out
-        model = findings.model if findings.effects else findings.refitted or start
-        return losses(held_out, model, found.sigma)
-
     gone: list[Withdrawn] = []
-    full = loss(found)
-    for i in judged:
-        rest = without(found, [i], start)
-        beside = loss(rest)
-        if worse(full, beside):
-            gone.append(Withdrawn(i, MEASURED.format(where=where)))
-        elif drives(found.model, _model(rest, start)) and not worse(beside, full):
-            gone.append(Withdrawn(i, DRIVES.format(where=where)))
+    rests = {i: without(found, [i], start) for i in judged}
+    full, *beside = unseen.losses(found, *rests.values())
+    for (i, rest), other in zip(rests.items(), beside, strict=True):
+        harmed = harm(full, other)
+        if harmed:
+            gone.append(Withdrawn(i, ALONE.format(harm=harmed.format(where=unseen.where))))
+        elif drives(found.model, _model(rest, start)) and not worse(other.omega, full.omega):
+            gone.append(Withdrawn(i, DRIVES.format(where=unseen.where)))
     kept = without(found, [w.id for w in gone], start) if gone else found
-    first = losses(held_out, start, found.sigma) if held_out else found.left_out_at_first
     for i in reversed([i for i in judged if all(i != w.id for w in gone)]):
-        if first is None or not worse(loss(kept), first):
+        harmed = harm(*unseen.losses(kept, start))
+        if not harmed:
             break
-        gone.append(Withdrawn(i, WHOLE_SET.format(where=where)))
+        gone.append(Withdrawn(i, WHOLE_SET.format(harm=harmed.format(where=unseen.where))))
         kept = without(found, [w.id for w in gone], start)
     return kept, gone
 
@@ -89,19 +117,3 @@ def without(found: Findings, ids: Sequence[str], start: Model) -> Findings:
         model = model.plus(f.values)
         effects.append(replace(f, model=model))
     return replace(found, effects=effects, model=model)
-
-
-def losses(data: Sequence[Integrals], model: Model, sigma: np.ndarray) -> np.ndarray:
-    """Sum of squares of the model error in each block of some runs (blocks,), axes weighted by noise.
-
-    Args:
-        data: windows of each run.
-        model: whose error it is.
-        sigma: (3,), what an error is divided by [N, N, N m].
-    """
-    found = []
-    for w in data:
-        squares = np.sum((omega(w, model) / sigma) ** 2, axis=1)
-        number = np.unique(w.block, return_inverse=True)[1]
-        found.append(np.bincount(number, squares))
-    return np.concatenate(found)

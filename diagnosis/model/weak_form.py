@@ -181,9 +181,23 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 
-def commanded(data: Sequence[Integrals]) -> np.ndarray:
-    """Commanded force (K, 3) [N, N, N m], averaged over the windows of some runs."""
-    return np.concatenate([w.held @ w.run.tau_cmd for w in data])
+def commanded(data: Sequence[Integrals], model: Model) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
+
+    That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
+    sideways, what its inertia asks for the motion that was measured.
+
+    Args:
+        data: windows of each run.
+        model: by whose inertia an acceleration is a force.
+    """
+    force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
+    idle = ~force.any(axis=0)
+    if idle.any():
+        nu = [np.where(w.known[:, None], w.smoothed.nu, 0.0) for w in data]
+        change = np.concatenate([w.slope @ x for w, x in zip(data, nu, strict=True)])
+        force[:, idle] = (change @ model.reference_mass.T)[:, idle]
+    return force
 
 
 def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np.ndarray:

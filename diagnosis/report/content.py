@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypedDict, TypeVar
@@ -55,20 +56,19 @@ def diagnosis_content(
     """
     learned, comparison, s = diagnosis.learned, diagnosis.comparison, diagnosis.stability
     prior = diagnosis.prior
-    unique = unique_shares(learned, diagnosis.start, comparison.evaluations)
-    effects = [
-        _effect(diagnosis, f, share, alone)
-        for f, share, alone in zip(learned.effects, diagnosis.shares, unique, strict=True)
-    ]
+    effects, possibilities = _effects(diagnosis)
     suspects = [result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects]
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
-        sentence=headline(diagnosis.verdict, effects, suspects, diagnosis.remainder.beyond_chance),
+        sentence=headline(
+            diagnosis.verdict, effects, possibilities, suspects, diagnosis.remainder.beyond_chance
+        ),
         remainder=_remainder(diagnosis.remainder),
         effects=effects,
+        possibilities=possibilities,
         withdrawn=[result_keys.WithdrawnResult(id=w.id, reason=w.reason) for w in diagnosis.withdrawn],
         suspect_coefficients=suspects,
-        ranking=[result_keys.RankedResult(id=r.id, score=r.score, q2=r.q2) for r in learned.ranking],
+        ranking=[result_keys.RankedResult(**asdict(r)) for r in learned.ranking],
         data=_data(comparison.evaluations),
         errors=[_errors(e) for e in comparison.evaluations],
         where=_where(comparison.before),
@@ -181,6 +181,26 @@ def _profile(p: Profile) -> result_keys.ProfileResult:
     )
 
 
+def _effects(
+    diagnosis: Diagnosis,
+) -> tuple[list[result_keys.EffectResult], list[result_keys.PossibilityResult]]:
+    """The findings, and what is only possible."""
+    learned, ship = diagnosis.learned, diagnosis.start.ship
+    unique = unique_shares(learned, diagnosis.start, diagnosis.comparison.evaluations)
+    found, possible = [], []
+    for f, share, alone, told in zip(
+        learned.effects, diagnosis.shares, unique, diagnosis.believed, strict=True
+    ):
+        result = _effect(diagnosis, f, share, alone)
+        if told:
+            found.append(result)
+        else:
+            possible.append((result, ship.effects[f.id].search.by == "regression"))
+    possible += [(_effect(diagnosis, f, f.share, None), False) for f in diagnosis.dropped]
+    results = [result_keys.PossibilityResult(**r.model_dump(), in_model=here) for r, here in possible]
+    return found, results
+
+
 def _effect(
     diagnosis: Diagnosis, f: Finding, share: float, unique: float | None
 ) -> result_keys.EffectResult:
@@ -211,6 +231,7 @@ def _effect(
         equation=equation(effect, _shown(diagnosis, values), _shown(diagnosis, ci95)),
         separation=separation_note(f.id, f.alike),
         share_unique=unique,
+        doubt=f.doubt,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from cosim.results import thin
 
 from ..assessment.evaluation import Evaluation
+from ..identification.shortlist import TIE
 from ..model.weak_form import EVERY
 from .panels import breaks, figure_of, legend, plain_numbers, stack
 from .profiles import BinnedError, Quantity
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 MAX_RANKED = 14  # candidates in the figure; chosen
-LOG_SPREAD = 20.0  # ratio of scores from which on their axis is logarithmic; chosen
+LOG_SPREAD = 20.0  # standard errors from which on the axis of scores is logarithmic; chosen
 GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; chosen
 
 
@@ -76,47 +77,63 @@ def profile(quantity: Quantity, errors: Sequence[BinnedError], learned: bool) ->
     return figure
 
 
-def ranking(ranked: Sequence[RankedResult], alike: Sequence[str]) -> "Figure":
-    """Candidates by their loss: the best, and hollow those that are indistinguishable from the first."""
-    shown = [r for k, r in enumerate(ranked) if k < MAX_RANKED or r.id in alike]
+def ranking(ranked: Sequence[RankedResult]) -> "Figure":
+    """Candidates by how much worse than the first they are, with the standard error of that difference.
+
+    Hollow are those within two of it.
+    """
+    shown = ranked[:MAX_RANKED]
     figure = figure_of(0.8 + 0.24 * len(shown))
     panel = figure.subplots()
-    scores = np.array([r.score for r in shown], float)
     for k, r in enumerate(shown):
-        tied = k == 0 or r.id in alike
-        panel.plot(
-            scores[k],
+        behind, std = _behind(r, shown[0])
+        tied = behind <= TIE * std
+        panel.errorbar(
+            behind,
             k,
-            "o",
+            xerr=std,
+            fmt="o",
             ms=7.0 if tied else 5.5,
             color=AFTER if tied else BAND,
             mfc=AFTER if k == 0 else ("none" if tied else BAND),
             mew=1.6,
+            elinewidth=1.2,
         )
         panel.annotate(
-            _explained(r.q2),
+            _explained(r.beyond if r.beyond is not None else r.q2),
             (1.0, k),
             xycoords=("axes fraction", "data"),
             xytext=(4, 0),
             textcoords="offset points",
             va="center",
         )
-    panel.locator_params(axis="x", nbins=5)
-    if scores.min() > 0.0 and scores.max() > LOG_SPREAD * scores.min():
-        panel.set_xscale("log")
+    linear = max((std for _, std in (_behind(r, shown[0]) for r in shown)), default=0.0)
+    if _behind(shown[-1], shown[0])[0] > LOG_SPREAD * linear > 0.0:
+        panel.set_xscale("symlog", linthresh=TIE * linear)
         plain_numbers(panel.xaxis)
+    else:
+        panel.locator_params(axis="x", nbins=5)
     panel.margins(x=0.06)
     panel.set_yticks(range(len(shown)), [r.id for r in shown])
     panel.set_ylim(len(shown) - 0.5, -0.5)
-    panel.set_xlabel("cross-validated loss [1], lower is better; right: explained")
+    panel.set_xlabel(
+        "score behind the first, with its standard error [1]; right: explained beyond coefficients"
+    )
     return figure
 
 
-def _explained(q2: float | None) -> str:
-    """The share q2 beside a candidate; a negative one without its size, which means nothing."""
-    if q2 is None:
+def _behind(r: RankedResult, first: RankedResult) -> tuple[float, float]:
+    """By how much a candidate's score is behind, and its standard error; 0 where a method has none."""
+    if r.behind is not None:
+        return r.behind, r.behind_std or 0.0
+    return (r.score or 0.0) - (first.score or 0.0), 0.0
+
+
+def _explained(share: float | None) -> str:
+    """The share beside a candidate; a negative one without its size, which means nothing."""
+    if share is None:
         return ""
-    return f"{100.0 * q2:.0f} %" if q2 >= 0.0 else "< 0 %"
+    return f"{100.0 * share:.0f} %" if share >= 0.0 else "< 0 %"
 
 
 def curve(c: Curve) -> "Figure":

@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 
+from ..decision import FOUND
 from .finding_text import listed
-from .result_keys import EffectResult, SuspectResult
+from .result_keys import DiagnosisContent, EffectResult, PossibilityResult, SuspectResult
 
-# Confidence from which on a finding is told as a fact; chosen: nobody may act on less as on one.
-SURE = 0.8
 NOTHING_FOUND = "Nothing is missing that these data show."
 TOO_LITTLE = "What is missing is more than noise, but too little to matter."
 UNEXPLAINED = "Something is missing, and no effect that is known here explains it."
+NOT_BELIEVED = (
+    "Something is missing, and no effect that is known here is likely enough to be told as its cause."
+)
 VERDICTS = {
     "found": "Something is missing, and it was found",
     "ambiguous": "Something is missing, and more than one cause fits",
@@ -17,8 +19,8 @@ VERDICTS = {
     "unexplained": "Something is missing, and nothing known here explains it",
     "none": "Nothing is missing that these data show",
 }
-UNSURE = "Something is missing, and what it is, is not sure"  # heading of findings of which none is
-
+# Headings where one cause fits and is not sure, and where effects are possible and none is believed.
+UNSURE = "Something is missing, and what it is, is not sure"
 
 MOST_NAMED = 4  # of the coefficients; chosen
 
@@ -32,30 +34,32 @@ def _names(suspects: Sequence[SuspectResult]) -> str:
 
 def is_sure(e: EffectResult) -> bool:
     """Whether a finding is told as a fact; one of a method without confidence is not."""
-    return (e.confidence or 0.0) >= SURE and not e.indistinguishable
-
-
-def possibility(e: EffectResult) -> str:
-    """A finding that is not sure, in a sentence."""
-    others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
-    sure = "" if e.confidence is None else f" ({100.0 * e.confidence:.0f} % for {e.id})"
-    return f"Possibly {e.id}{others}{sure}: {e.sentence}"
+    return (e.confidence or 0.0) >= FOUND
 
 
 def told(e: EffectResult) -> str:
-    """A finding in a sentence, as a fact or as a possibility."""
-    return e.sentence if is_sure(e) else possibility(e)
+    """A finding in a sentence: a fact, or a possibility with its rivals and its probability."""
+    if is_sure(e):
+        return e.sentence
+    others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
+    sure = "" if e.confidence is None else f" ({100.0 * e.confidence:.2g} % for {e.id})"
+    doubt = f" But {e.doubt}." if e.doubt else ""
+    left_out = isinstance(e, PossibilityResult) and not e.in_model
+    model = " The learned model does not have it." if left_out else ""
+    return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
 
 
-def verdict_title(verdict: str, effects: Sequence[EffectResult]) -> str:
-    """A verdict as a heading, which claims no more than the findings do."""
-    unsure = verdict == "found" and not any(is_sure(e) for e in effects)
-    return UNSURE if unsure else VERDICTS[verdict]
+def verdict_title(r: DiagnosisContent) -> str:
+    """The verdict as a heading, which claims no more than the findings do."""
+    one_cause = r.verdict == "ambiguous" and not r.effects[0].indistinguishable
+    possible = r.verdict == "unexplained" and r.possibilities
+    return UNSURE if one_cause or possible else VERDICTS[r.verdict]
 
 
 def headline(
     verdict: str,
     effects: Sequence[EffectResult],
+    possibilities: Sequence[EffectResult],
     suspects: Sequence[SuspectResult],
     something: bool,
 ) -> str:
@@ -64,6 +68,7 @@ def headline(
     Args:
         verdict: that of the diagnosis.
         effects: that were found, in the order of acceptance.
+        possibilities: that were accepted and are not believed.
         suspects: nominal coefficients that are wrong.
         something: whether more than noise is left.
     """
@@ -75,5 +80,5 @@ def headline(
             f"Other values of the nominal coefficients explain these data{names}; no effect is missing."
         )
     if verdict == "unexplained":
-        return UNEXPLAINED
+        return NOT_BELIEVED if possibilities else UNEXPLAINED
     return TOO_LITTLE if something else NOTHING_FOUND

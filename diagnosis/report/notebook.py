@@ -74,16 +74,15 @@ class Plots:
         ranked = [r for r in self._content.ranking if r.score is not None]
         if not ranked:
             raise InputError("no candidates were compared")
-        first = self._content.effects[0].indistinguishable if self._content.effects else []
-        return _drawn(lambda: figures.ranking(ranked, first))
+        return _drawn(lambda: figures.ranking(ranked))
 
 
 def as_html(content: DiagnosisContent, plots: Plots) -> str:
     """The finding, the errors of all runs, and where the model fails, as a part of a page."""
-    lines = [f"<p><b>{escape(verdict_title(content.verdict, content.effects))}</b></p>"]
+    lines = [f"<p><b>{escape(verdict_title(content))}</b></p>"]
     lines += [f"<p>{escape(text)}</p>" for text in (content.sentence, content.remainder.sentence)]
     rows = "".join(
-        f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.effects
+        f"<tr><td>{escape(e.id)}</td><td>{escape(e.equation)}</td></tr>" for e in content.accepted
     )
     lines += [f"<table>{rows}</table>"] if rows else []
     cells = "".join(map(_row, content.errors))

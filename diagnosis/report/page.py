@@ -73,7 +73,7 @@ def write_report(
     text = _template().render(
         content=content,
         diagnosis=diagnosis,
-        verdict="" if diagnosis is None else verdict_title(diagnosis.verdict, diagnosis.effects),
+        verdict="" if diagnosis is None else verdict_title(diagnosis),
         title="Model against measurements" if diagnosis is None else "Diagnosis",
         learned=learned,
         figures=drawn,
@@ -171,14 +171,14 @@ def _profiles(
 def _ranking(d: DiagnosisContent) -> Iterator[Drawing]:
     ranked = [r for r in d.ranking if r.score is not None]
     if ranked:
-        first = d.effects[0] if d.effects else None
-        figure = figures.ranking(ranked, first.indistinguishable if first else ())
+        figure = figures.ranking(ranked)
         caption = f"The best of {len(ranked)} candidates."
-        yield _draw(figure, "ranking", "Candidates in the order of their loss", caption)
+        yield _draw(figure, "ranking", "Candidates in the order of their score", caption)
 
 
 def _shapes(d: DiagnosisContent, evaluations: Sequence[Evaluation]) -> Iterator[Drawing]:
-    shapes: list[Curve] = curves([e.model_dump(mode="json") for e in d.effects], evaluations)
+    learned = [e.model_dump(mode="json") for e in d.accepted]
+    shapes: list[Curve] = curves(learned, evaluations)
     for k, c in enumerate(shapes):
         caption = f"{c.id}: before and learned. Grey: hardly any data."
         yield _draw(figures.curve(c), f"curve-{k}", f"Learned shape of {c.id}", caption)

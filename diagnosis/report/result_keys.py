@@ -133,7 +133,10 @@ class Coefficient(Part):
 
 
 class EffectResult(Part):
-    """An effect that was accepted; share_unique: of the error, what nothing else explains."""
+    """An effect that was accepted; share_unique: of the error, what nothing else explains.
+
+    doubt: what speaks against it beside the confidence.
+    """
 
     id: str
     axis: Axes
@@ -146,6 +149,13 @@ class EffectResult(Part):
     equation: str
     separation: str
     share_unique: Number = None
+    doubt: str = ""
+
+
+class PossibilityResult(EffectResult):
+    """An effect that was accepted, but is not believed; in_model: whether ``model.ssv`` has it."""
+
+    in_model: bool
 
 
 class AxisRemainderResult(Part):
@@ -180,11 +190,18 @@ class SuspectResult(Part):
 
 
 class RankedResult(Part):
-    """A candidate of the first step; a lower score is better."""
+    """A candidate of the first step; a lower score is better.
+
+    beyond: share of what the nominal coefficients alone leave that it explains. behind, behind_std: its
+    score less that of the first, and the standard error of that, paired over blocks.
+    """
 
     id: str
     score: Number
     q2: Number
+    beyond: Number
+    behind: Number
+    behind_std: Number
 
 
 class StabilityResult(Part):
@@ -205,6 +222,7 @@ class DiagnosisContent(Part):
     sentence: str
     remainder: RemainderResult
     effects: list[EffectResult]
+    possibilities: list[PossibilityResult]
     withdrawn: list[WithdrawnResult]
     suspect_coefficients: list[SuspectResult]
     ranking: list[RankedResult]
@@ -219,3 +237,8 @@ class DiagnosisContent(Part):
     model: str | None
     files: list[str]
     versions: dict[str, str]
+
+    @property
+    def accepted(self) -> list[EffectResult]:
+        """The effects that were found, then those that are only possible."""
+        return [*self.effects, *self.possibilities]

@@ -30,10 +30,13 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
     yield from _lines("What is left without an explanation", [r.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [r.sentence])
-    told = sorted(r.effects, key=lambda e: not is_sure(e))  # the sure ones first, else as accepted
-    for k, effect in enumerate(told, 1):
-        what = "Finding" if is_sure(effect) else "Possibility"
-        yield from _lines(f"{what} {k}: {effect.id}" if len(told) > 1 else what, _effect(effect))
+    several = len(r.effects) > 1
+    for k, effect in enumerate(
+        sorted(r.effects, key=lambda e: not is_sure(e)), 1
+    ):  # the sure ones first
+        yield from _lines(f"Finding {k}: {effect.id}" if several else "Finding", _effect(effect))
+    for effect in r.possibilities:
+        yield from _lines(f"Possibility: {effect.id}", _effect(effect))
     if r.withdrawn:
         yield from _lines("Withdrawn", [f"{w.id}: {w.reason}" for w in r.withdrawn])
     if r.suspect_coefficients:
@@ -42,22 +45,22 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
             for s in r.suspect_coefficients
         ]
         yield from _lines("Suspect coefficients", suspects)
-    if r.effects:
+    if r.effects or r.possibilities:
         first, *others = r.ranking[:MAX_CANDIDATES]
-        behind = [f"{c.id} +{(c.score or 0.0) - (first.score or 0.0):.3g}" for c in others]
+        behind = [f"{c.id} +{_number(c.behind)} (± {_number(c.behind_std, 2)})" for c in others]
         yield from _lines(
             "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
         )
-    yield from _errors(r.errors, learned=bool(r.effects) or r.verdict == "coefficients")
+    yield from _errors(r.errors, learned=has_learned(r))
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)
 
 
 def summary(r: DiagnosisContent) -> str:
     """The result in at most ten lines."""
-    sure = sorted(r.effects, key=lambda e: not is_sure(e))[:MAX_SUMMARY]
-    lines = [f"{r.verdict}: {verdict_title(r.verdict, r.effects)}"]
-    lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in sure] or [f"  {r.sentence}"]
+    first = [*sorted(r.effects, key=lambda e: not is_sure(e)), *r.possibilities][:MAX_SUMMARY]
+    lines = [f"{r.verdict}: {verdict_title(r)}"]
+    lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in first] or [f"  {r.sentence}"]
     lines += [f"  {r.remainder.sentence}"]
     for e in r.errors[:MAX_SUMMARY]:
         position = e.window_position_rmse
@@ -105,6 +108,11 @@ def _data(data: Data) -> Iterator[RenderableType]:
 
 def _run(name: str, held_out: bool) -> Text:
     return Text(f"{name} (held out)" if held_out else name)
+
+
+def has_learned(r: DiagnosisContent) -> bool:
+    """Whether the learned model is another than the one at first."""
+    return bool(r.effects) or r.verdict == "coefficients" or any(p.in_model for p in r.possibilities)
 
 
 def _effect(e: EffectResult) -> Iterator[str]:

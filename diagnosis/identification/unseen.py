@@ -1,0 +1,137 @@
+"""Unseen data: held-out runs, or parts of the training runs beside fits that have not seen them.
+
+A part is a run; of a single training run it is one of FOLDS stretches of time. What a model misses there
+is its model error, by blocks, and the error of its window predictions, by windows.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+
+from ..assessment.windows import Windows
+from ..model import Integrals, Model, omega
+from .acceptance import worse
+
+FOLDS = 4  # stretches of a single run: each as long as the shortest run that can be learned from; chosen
+FITS = "the model fits {where} worse"
+PREDICTS = "predictions of {where} are worse"
+
+
+class Losses(NamedTuple):
+    """What a model misses on unseen data.
+
+    Attributes:
+        omega: (blocks,), sum of squares of the model error in each block, axes weighted by noise.
+        position, heading: (windows,), mean square error of prediction in each window [m2], [rad2].
+    """
+
+    omega: np.ndarray
+    position: np.ndarray
+    heading: np.ndarray
+
+
+def block_folds(data: Sequence[Integrals]) -> list[np.ndarray]:
+    """Numbers of the blocks of each part, counted through all runs."""
+    counts = [np.unique(w.block).size for w in data]
+    if len(data) == 1:
+        return np.array_split(np.arange(counts[0]), min(FOLDS, counts[0]))
+    return np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+
+
+class Part:
+    """A run, or a stretch of one.
+
+    Args:
+        w: windows of the run.
+        blocks: numbers of the blocks of the stretch; None: all.
+    """
+
+    def __init__(self, w: Integrals, blocks: np.ndarray | None = None) -> None:
+        self.data = w
+        number = np.unique(w.block, return_inverse=True)[1]
+        self._rows = np.ones(number.size, bool) if blocks is None else np.isin(number, blocks)
+        self._block = number[self._rows]
+        first, last = w.middle[self._rows][[0, -1]]
+        self._span = (-np.inf, np.inf) if blocks is None else (first, last)
+
+    @cached_property
+    def _windows(self) -> Windows | None:
+        try:
+            return Windows([self.data.smoothed])
+        except InputError:  # no window has enough samples
+            return None
+
+    def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
+        """What each of some models misses here, sigma (3,) being what an error is divided by."""
+        found = []
+        for model, (position, heading) in zip(models, self._predicted(models), strict=True):
+            squares = np.sum((omega(self.data, model)[self._rows] / sigma) ** 2, axis=1)
+            of_block = np.bincount(self._block, squares)
+            found.append(Losses(of_block[np.unique(self._block)], position, heading))
+        return found
+
+    def _predicted(self, models: Sequence[Model]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Mean square errors in the windows that begin here, of each model."""
+        if self._windows is None:
+            return [(np.zeros(0), np.zeros(0))] * len(models)
+        clocks = sorted({m.clock for m in models})
+        inside = (self._windows.start >= self._span[0]) & (self._windows.start <= self._span[1])
+        found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        for clock in clocks:
+            chosen = [k for k, m in enumerate(models) if m.clock == clock]
+            residuals = self._windows.residuals(stacked([models[k] for k in chosen]))
+            errors = self._windows.summary(residuals.reshape(len(chosen), -1, 3))
+            for k, position, heading in zip(chosen, errors.position, errors.heading, strict=True):
+                found[k] = (position[inside] ** 2, heading[inside] ** 2)
+        return [found[k] for k in range(len(models))]
+
+
+def stacked(models: Sequence[Model]) -> Model:
+    """Several models with the same clock as one whose parameters are arrays (p, 1) where they differ."""
+
+    def together(part: str) -> dict[str, Any]:
+        values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
+        names = dict.fromkeys(name for each in values for name in each)
+        of = models[0].ship.parameters[part]
+        columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
+        return {n: x[:, None] if np.ptp(x) else float(x[0]) for n, x in columns.items()}
+
+    return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
+
+
+def losses(
+    parts: Sequence[Part], variants: Sequence[Sequence[Model]], sigma: np.ndarray
+) -> list[Losses]:
+    """What each of some variants misses on all parts.
+
+    Args:
+        parts: of the unseen data.
+        variants: of each variant the model of each part.
+        sigma: (3,), what an error is divided by [N, N, N m].
+    """
+    by_part = [p.losses([v[k] for v in variants], sigma) for k, p in enumerate(parts)]
+    return [
+        Losses._make(map(np.concatenate, zip(*one, strict=True))) for one in zip(*by_part, strict=True)
+    ]
+
+
+def harm(its: Losses, others: Losses) -> str:
+    """In what a model is worse than another by more than two paired standard errors; empty: in nothing.
+
+    Where it predicts positions better and headings worse by as much, or the reverse, the relative
+    changes of both mean squares count together.
+    """
+    if worse(its.omega, others.omega):
+        return FITS
+    pairs = [(its.position, others.position), (its.heading, others.heading)]
+    if not its.position.size or not any(worse(a, b) for a, b in pairs):
+        return ""
+    if any(worse(b, a) for a, b in pairs):
+        change = sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs)
+        return PREDICTS if change > 0.0 else ""
+    return PREDICTS
