@@ -28,7 +28,7 @@ class Place:
     Attributes:
         id: of the effect.
         names: of its parameters.
-        intervals: 95 % interval of each change point [s], and of each parameter that it is not smooth in.
+        intervals: 95 % interval of each change point [s] and of each parameter that it is not smooth in.
         weights: id -> probability of the effect and of its rivals, of the candidates together 1.
     """
 

@@ -1,14 +1,18 @@
-"""Intervals of parameters in which an effect is not smooth, such as the radius of a circle that it acts in.
+"""Intervals of parameters in which an effect is not smooth, such as the radius of a circle of force.
 
-A slope by such a parameter depends on its step, so that neither Gauss-Newton steps nor the curvature of the
-cost mean anything. Of a single one the profile of the cost, all else fitted anew at each value, gives the
-best value and the interval (W. Q. Meeker and L. A. Escobar, Teaching about approximate confidence regions
-based on maximum likelihood estimation, The American Statistician 49, 1995). Of several there is none.
+A slope by such a parameter depends on its step, so that neither Gauss-Newton steps nor the curvature of
+the cost mean anything. Of a single one the profile of the cost, all else fitted anew at each value, has
+the best value and the interval (W. Q. Meeker, L. A. Escobar, Teaching about approximate confidence
+regions based on maximum likelihood estimation, The American Statistician 49, 1995). Of several there is
+none.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
 from .conclusion import Place
@@ -54,14 +58,17 @@ def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str
     trial = _profile(t, at, p, name)
     present = at.start.value(name) + at.values[name]
     ends = sorted((present / REACH, present * REACH))
-    found = minimize_scalar(
+    found: Any = minimize_scalar(
         lambda x: trial(x).cost, bounds=ends, method="bounded", options={"maxiter": TRIALS}
     )
     best = min((trial(present), trial(float(found.x))), key=lambda r: r.cost)
     value = best.estimate.values[name]
     low, high = (_end(trial, best.cost, at.start.value(name) + value, sign) for sign in (-1.0, 1.0))
     start = at.start.value(name)
-    return best.estimate, {name: (low - start, high - start)}
+    own = [n for n in p.names if n in at.fitted]
+    kept = [at.fitted.index(n) for n in own]
+    precision = block_diag(best.estimate.precision, at.precision[kept][:, kept])
+    return replace(best.estimate, precision=np.asarray(precision)), {name: (low - start, high - start)}
 
 
 def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
