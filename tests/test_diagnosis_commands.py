@@ -118,6 +118,7 @@ def test_json_has_every_key_of_the_format(learned):
     assert {
         "verdict",
         "effects",
+        "possibilities",
         "suspect_coefficients",
         "ranking",
         "data",
@@ -135,7 +136,7 @@ def test_json_has_every_key_of_the_format(learned):
     }
     assert effect <= set(content["effects"][0])
     assert {"value", "unit", "ci95"} == set(content["effects"][0]["coefficients"]["delta_X_u"])
-    assert {"id", "score", "q2"} == set(content["ranking"][0])
+    assert {"id", "score", "q2", "beyond", "behind", "behind_std"} == set(content["ranking"][0])
     assert {r["id"] for r in content["ranking"]} <= set(STANDARD)
     counts = {"samples", "frozen", "dropped", "spikes", "used"}
     assert counts <= set(content["data"])

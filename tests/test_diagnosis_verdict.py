@@ -327,8 +327,8 @@ def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])
 def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     start = Model()
-    assert start.declared("delta_m").range.max == 100.0
-    f = Finding("mass", {"delta_m": kilograms}, {}, 0.99, [], 0.9, 0.9, together=0.99)
+    assert start.declared("mass").range.max == 100.0
+    f = Finding("mass", {"mass": kilograms}, {}, 0.99, [], 0.9, 0.9, together=0.99)
     seen = limited(f, start)
     assert (seen.confidence == 0.99) == is_finding
     assert ("limit of what was looked for" in seen.doubt) != is_finding

@@ -77,6 +77,7 @@ def nothing(evaluations):
         "verdict": "none",
         "sentence": "Nothing is missing that these data show.",
         "effects": [],
+        "possibilities": [],
         "withdrawn": [],
         "remainder": {
             "significant": False,
@@ -99,6 +100,12 @@ def nothing(evaluations):
     }
 
 
+def ranked(name, score, q2, beyond, std):
+    """A candidate, 10 being the first one's score."""
+    behind = {"behind": score - 10.0, "behind_std": std}
+    return {"id": name, "score": score, "q2": q2, "beyond": beyond, **behind}
+
+
 def found(evaluations):
     """Content of diagnosis.json."""
     values = {n: {"value": v, "unit": "1", "ci95": [v - 0.01, v + 0.01]} for n, v in HIDDEN.items()}
@@ -119,9 +126,9 @@ def found(evaluations):
         "effects": [effect],
         "suspect_coefficients": [{"name": "N_r", "z": -4.2, "value": -2.3}],
         "ranking": [
-            {"id": "thrust_curve", "score": 10.0, "q2": 0.99},
-            {"id": "curve_vsp_x(c)", "score": 12.0, "q2": 0.98},
-            {"id": "X_u", "score": 900.0, "q2": -0.1},
+            ranked("thrust_curve", 10.0, 0.99, 0.9, 0.0),
+            ranked("curve_vsp_x(c)", 12.0, 0.98, 0.8, 3.0),
+            ranked("X_u", 900.0, -0.1, -0.2, 40.0),
         ],
         "sentence": f"The propellers of {EVIL} give too little.",
     }

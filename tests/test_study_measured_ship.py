@@ -164,7 +164,7 @@ def found(*effects, suspects=()):
         coefficient = {"delay": SimpleNamespace(value=value)}
         made.append(SimpleNamespace(id=name, coefficients=coefficient, indistinguishable=alike))
     named = [SimpleNamespace(name=n, value=v) for n, v in suspects]
-    return SimpleNamespace(effects=made, suspect_coefficients=named)
+    return SimpleNamespace(accepted=made, suspect_coefficients=named)
 
 
 def test_expectations_say_what_came():

@@ -18,7 +18,10 @@ from diagnosis import (
     method,
     smooth,
 )
+from diagnosis.decision import believed
+from diagnosis.identification.acceptance import worse
 from diagnosis.progress import silent
+from diagnosis.session import Comparison
 
 from .cells import Key
 from .problems import Problem, kept, slug
@@ -36,8 +39,9 @@ def answer(problem: Problem, peers: bool) -> Answer:
     Returns:
         ``diagnosis.json`` without what no score needs; besides ``evidence``, what the confidence of each
         finding is made of (None where the method has none), ``seconds`` of processor time from measured
-        runs to the answer, ``truth_mm``, the window position error of the true model on the run
-        held out (None where the diagnosis has none of its form), and ``peers``, what others find first.
+        runs to the answer, ``worse``, which predictions of the run held out became worse, ``truth_mm``,
+        the window position error of the true model on that run (None where the diagnosis has none of its
+        form), and ``peers``, what others find first.
     """
     if problem.note:
         return {"note": problem.note}
@@ -50,12 +54,22 @@ def answer(problem: Problem, peers: bool) -> Answer:
         return {"note": str(error)}
     seconds = time.process_time() - begun
     found = {name: value for name, value in content.items() if name not in LEFT_OUT}
-    told = [getattr(f, "evidence", None) for f in diagnosis.learned.effects]
+    told = [f.evidence for f in diagnosis.learned.effects if believed(f)]
     found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
     found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
+    found["worse"] = [name for name, is_worse in predictions(diagnosis.comparison).items() if is_worse]
     if peers and problem.hidden:
         found["peers"] = {peer: first_effect(peer, train) for peer in PEERS}
     return found
+
+
+def predictions(comparison: Comparison) -> dict[str, bool]:
+    """Whether positions and headings of the last run are predicted worse than before."""
+    before, after = comparison.evaluations[-1].before.errors, comparison.evaluations[-1].after.errors
+    if before is None or after is None:
+        return {}
+    names = ("position", "heading")
+    return {n: worse(getattr(after, n) ** 2, getattr(before, n) ** 2) for n in names}
 
 
 def truth(problem: Problem, held_out: Integrals) -> float | None:

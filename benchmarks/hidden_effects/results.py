@@ -32,6 +32,8 @@ class Row:
         reported: the first id, and those that the data do not distinguish from it.
         suspects: nominal coefficients that it says are wrong.
         withdrawn: ids that were accepted, and made unseen data worse.
+        possible_ids: ids that were accepted, and are not believed.
+        worse: position and heading, where predictions of the run held out became worse.
         remainder: whether the model leaves a significant remainder, "1" or "0"; empty if not told.
         intervals, covered: 95 % intervals of right findings, and how many hold the true value.
         alike: ids that could do the same within 5 %, by the truth; "" is no effect at all.
@@ -61,6 +63,8 @@ class Row:
     reported: list[str] = field(default_factory=list)
     suspects: list[str] = field(default_factory=list)
     withdrawn: list[str] = field(default_factory=list)
+    possible_ids: list[str] = field(default_factory=list)
+    worse: list[str] = field(default_factory=list)
     remainder: str = ""
     intervals: int = 0
     covered: int = 0

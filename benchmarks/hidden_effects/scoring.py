@@ -68,6 +68,8 @@ def _told(made: Row, answer: Answer) -> None:
     made.reported = [effects[0]["id"], *effects[0]["indistinguishable"]] if effects else []
     made.suspects = [s["name"] for s in answer["suspect_coefficients"]]
     made.withdrawn = [w["id"] for w in answer.get("withdrawn", [])]
+    made.possible_ids = [e["id"] for e in answer.get("possibilities", [])]
+    made.worse = answer.get("worse", [])
     remainder = answer.get("remainder")
     made.remainder = "" if remainder is None else "01"[bool(remainder["significant"])]
     held_out = next(e for e in answer["errors"] if e["held_out"])["window_position_rmse"]

@@ -82,6 +82,14 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
         ),
         ("the same, wrong", "", reached(wrong)),
     ]
+    found.append(
+        (
+            "held-out predictions worse by more than two paired standard errors",
+            "0",
+            share(good, lambda r: bool(r.worse)),
+        )
+    )
+    found.append(("a wrong finding at >= 0.9", "0", share(good, lambda r: r.surest >= SURE)))
     for noise in NOISE:
         some = [r for r in exact if r.noise == noise]
         found.append((f"held-out position error falls, exact, {noise}", "", fall(some)))

@@ -41,10 +41,15 @@ def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
     """Whether a loss by blocks (blocks,) exceeds another by more than two paired standard errors.
 
     Args:
-        its, others: losses.
+        its, others: losses; infinite where a model runs away.
         charge: added to the difference.
     """
-    d = its - others
+    known = np.isfinite(others)
+    if not np.isfinite(its[known]).all():
+        return True
+    d = (its - others)[known]
+    if not d.size:
+        return charge > 0.0
     return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
 
 

@@ -85,7 +85,8 @@ class Part:
         for clock in clocks:
             chosen = [k for k, m in enumerate(models) if m.clock == clock]
             residuals = self._windows.residuals(stacked([models[k] for k in chosen]))
-            errors = self._windows.summary(residuals.reshape(len(chosen), -1, 3))
+            each = np.broadcast_to(residuals, (len(chosen), *residuals.shape[-2:]))
+            errors = self._windows.summary(each)
             for k, position, heading in zip(chosen, errors.position, errors.heading, strict=True):
                 found[k] = (position[inside] ** 2, heading[inside] ** 2)
         return [found[k] for k in range(len(models))]
