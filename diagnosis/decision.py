@@ -12,10 +12,10 @@ from .assessment.regions import Region
 from .assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from .assessment.remainder_text import remainder_sentence
 from .identification.findings import Finding, Findings
-from .identification.unseen import harm
-from .identification.withdrawal import Unseen, without
 from .model import Integrals, Model, omega
 from .model.uncertainty import omega_std
+from .unseen import harm
+from .withdrawal import Unseen, without
 
 Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 

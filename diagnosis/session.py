@@ -18,11 +18,11 @@ from .decision import Verdict, believed, concluded, doubted, limited, remainder_
 from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Finding, Findings
 from .identification.prior import shares as prior_shares
-from .identification.withdrawal import Unseen, Withdrawn, withdraw
 from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
 from .progress import Advance, silent
+from .withdrawal import Unseen, Withdrawn, withdraw
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen

@@ -40,6 +40,8 @@ DIAGNOSIS_LAYERS = (
     ("model",),
     ("gathering",),
     ("identification", "assessment"),
+    ("unseen",),
+    ("withdrawal",),
     ("decision",),
     ("session",),
     ("report",),

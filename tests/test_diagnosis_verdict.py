@@ -19,13 +19,13 @@ from diagnosis.identification.confidence import confidence, credible, evidence
 from diagnosis.identification.findings import Finding, Findings
 from diagnosis.identification.map_regression import Scored, first_share
 from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.unseen import Losses, harm
-from diagnosis.identification.withdrawal import Unseen, withdraw
 from diagnosis.model.correlation import correlated_windows
 from diagnosis.model.ship_model import of_one_run
 from diagnosis.model.uncertainty import omega_std
 from diagnosis.model.weak_form import commanded
 from diagnosis.report import diagnosis_content
+from diagnosis.unseen import Losses, harm
+from diagnosis.withdrawal import Unseen, withdraw
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}

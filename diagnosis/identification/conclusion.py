@@ -11,11 +11,10 @@ from ..model.uncertainty import omega_std
 from .candidates import model_error
 from .confidence import Evidence, confidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
-from .gram import Nuisance, gram_table
+from .gram import Nuisance, block_folds, gram_table
 from .map_regression import RIDGE, Scored, regression, score
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance, refit
-from .unseen import block_folds
 
 SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
 NORMAL_95 = 1.96

@@ -99,7 +99,7 @@ class Findings:
             method does not fit them.
         moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
         fold_models: the model fitted without each fold of the training runs, see
-            :func:`.unseen.folds`; empty where a method has none.
+            :func:`.gram.block_folds`; empty where a method has none.
         keep: the findings with some of the effects only, everything else fitted anew; None where a
             method cannot.
     """

@@ -12,11 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..model import Integrals
 from ..model.weak_form import OVERLAP
 from .candidates import Candidate
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
 FOLDS = 8  # of cross-validation over blocks
+# Stretches of a single run that are left out in turn, as long as the shortest run that can be learned
+# from; chosen.
+STRETCHES = 4
 # Ridge of the regression for the noise, relative to the regressors: they may be collinear.
 NOISE_RIDGE = 1e-6
 
@@ -179,3 +183,11 @@ def gram_table(
         grams[k] = part.T @ part
     rows = np.array([(blocks == name).sum() for name in names])
     return GramTable(grams, rows, names // RUN, entries, indices, nuisance.precision, sigma)
+
+
+def block_folds(data: Sequence[Integrals]) -> list[np.ndarray]:
+    """Numbers of the blocks of each run, counted through all; of a single run those of its stretches."""
+    counts = [np.unique(w.block).size for w in data]
+    if len(data) == 1:
+        return np.array_split(np.arange(counts[0]), min(STRETCHES, counts[0]))
+    return np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])

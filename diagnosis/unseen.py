@@ -1,6 +1,6 @@
 """Unseen data: held-out runs, or parts of the training runs beside fits that have not seen them.
 
-A part is a run; of a single training run it is one of FOLDS stretches of time. What a model misses there
+A part is a run; of a single training run it is one of some stretches of time. What a model misses there
 is its model error, by blocks, and the error of its window predictions, by windows.
 """
 
@@ -13,11 +13,10 @@ import numpy as np
 
 from cosim import InputError
 
-from ..assessment.windows import Windows
-from ..model import Integrals, Model, omega
-from .acceptance import worse
+from .assessment.windows import Windows
+from .identification.acceptance import worse
+from .model import Integrals, Model, omega
 
-FOLDS = 4  # stretches of a single run: each as long as the shortest run that can be learned from; chosen
 FITS = "the model fits {where} worse"
 PREDICTS = "predictions of {where} are worse"
 
@@ -33,14 +32,6 @@ class Losses(NamedTuple):
     omega: np.ndarray
     position: np.ndarray
     heading: np.ndarray
-
-
-def block_folds(data: Sequence[Integrals]) -> list[np.ndarray]:
-    """Numbers of the blocks of each part, counted through all runs."""
-    counts = [np.unique(w.block).size for w in data]
-    if len(data) == 1:
-        return np.array_split(np.arange(counts[0]), min(FOLDS, counts[0]))
-    return np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
 
 
 class Part:

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import Integrals, Model
-from .acceptance import worse
-from .findings import Findings
-from .unseen import Losses, Part, block_folds, harm, losses
+from .identification.acceptance import worse
+from .identification.findings import Findings
+from .identification.gram import block_folds
+from .model import Integrals, Model
+from .unseen import Losses, Part, harm, losses
 
 ALONE = "with it {harm}"
 WHOLE_SET = "with it and what was found before it {harm} than at first"
