@@ -59,7 +59,7 @@ class Part:
 
     def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
         """What each of some models misses here, sigma (3,) being what an error is divided by."""
-        found = []
+        found, models = [], [m.during(self.data.run.name) for m in models]
         for model, (position, heading) in zip(models, self._predicted(models), strict=True):
             squares = np.sum((omega(self.data, model)[self._rows] / sigma) ** 2, axis=1)
             of_block = np.bincount(self._block, squares)

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
+from ..model.ship_model import parameter_and_run
 from .conclusion import Place
 from .refinement import (
     SMALLEST_SCALE,
@@ -23,7 +24,6 @@ from .refinement import (
     Start,
     TrainingSet,
     bounded,
-    change_points,
     nuisance,
     refine,
     slope,
@@ -73,8 +73,10 @@ def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str
 
 def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
     """Whether a slope by a parameter depends on its step, so that it is none."""
-    effect = next(e for e in at.start.ship.effects.values() if name in {q.name for q in e.parameters})
-    if effect.linear or effect.search.smooth or name in change_points(at.start.ship):
+    parameter, run = parameter_and_run(name)
+    effects = at.start.ship.effects.values()
+    effect = next(e for e in effects if parameter in {q.name for q in e.parameters})
+    if run or effect.linear or effect.search.smooth:
         return False
     model, left = at.model(t.prior), t.error(at)
     size = max(abs(at.start.value(name) + at.values[name]), SMALLEST_SCALE)
