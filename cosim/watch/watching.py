@@ -115,8 +115,24 @@ class _Watch:
         if STATE.numbers[HELD]:
             signal.setitimer(signal.ITIMER_REAL, LOOK)
         else:
+            self._send(signal.SIGSTOP)  # it starts no more processes
+            for pid in _descendants(
+                self._child
+            ):  # one that loses its parent while it starts would say so
+                with suppress(OSError):
+                    os.kill(pid, signal.SIGKILL)
             self._send(signal.SIGKILL)
 
     def _send(self, number: int) -> None:
         with suppress(ProcessLookupError):
             os.kill(self._child, number)
+
+
+def _descendants(pid: int) -> list[int]:
+    """The processes that a process has started, and theirs (on Linux)."""
+    found: list[int] = []
+    with suppress(OSError):
+        for task in os.listdir(f"/proc/{pid}/task"):
+            with open(f"/proc/{pid}/task/{task}/children") as file:
+                found += map(int, file.read().split())
+    return found + [each for child in found for each in _descendants(child)]
