@@ -17,7 +17,7 @@ from .endings import EXCEPTIONS, HANGING, HARMLESS, PATIENCE, ROOT, environment,
 from .judgement import agreement_faults, line_faults
 from .mortal import WAYS
 
-RUNS = 40  # of a campaign; more than end before the interrupt
+RUNS = 4000  # of a campaign; more than end before the interrupt
 
 
 def campaign_file(work: Path, native: bool, stop: float = 3.0) -> Path:
