@@ -17,7 +17,12 @@ from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
 
-DIAGNOSIS, MODEL, REPORT = FILES = ("diagnosis.json", "model.ssv", "report.html")
+DIAGNOSIS, MODEL, POSTERIOR, REPORT = FILES = (
+    "diagnosis.json",
+    "model.ssv",
+    "posterior.json",
+    "report.html",
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -52,7 +57,9 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
                 write_model(new / MODEL, diagnosis.learned.model)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        files = [name for name in FILES if not (refused and name == MODEL)]
+        if not refused:
+            diagnosis.posterior.write(new / POSTERIOR)
+        files = [name for name in FILES if not (refused and name in (MODEL, POSTERIOR))]
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
         comparison = diagnosis.comparison

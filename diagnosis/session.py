@@ -17,10 +17,15 @@ from .assessment.stability import OperatingRegion, Stability, check_stability, d
 from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
 from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Finding, Findings
+from .identification.prior import NominalPrior
 from .identification.prior import shares as prior_shares
 from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
+from .prediction_error.bands import prediction_bands
+from .prediction_error.posterior import Posterior
+from .prediction_error.refit import to_predictions
+from .prediction_error.unrecorded import Unrecorded
 from .progress import Advance, silent
 from .withdrawal import Unseen, Withdrawn, withdraw
 
@@ -71,6 +76,8 @@ class Diagnosis:
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
+        posterior: of all fitted values; of none where nothing was learned.
+        unrecorded: what acts on the ship and is in no command and no effect.
     """
 
     learned: Findings
@@ -85,6 +92,8 @@ class Diagnosis:
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
+    posterior: Posterior
+    unrecorded: Unrecorded
 
     @property
     def verdict(self) -> Verdict:
@@ -186,8 +195,24 @@ def diagnose(
     kept, withdrawn = withdraw(found, unseen, start, lambda a, b: drives_on(a, b, region))
     kept = replace(kept, effects=[limited(f, start) for f in kept.effects])
     learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start)
-    final = learned.model if learned.effects or refitted else None
+    advance("fit to predictions")
+    something = bool(learned.effects) or refitted
+    fit = to_predictions(learned, train, NominalPrior.of(start, prior), something)
+    learned = fit.findings
+    final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)
+    comparison = replace(
+        comparison,
+        evaluations=[
+            replace(
+                e,
+                bands=prediction_bands(
+                    e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push
+                ),
+            )
+            for e in comparison.evaluations
+        ],
+    )
     advance("what is left")
     # What fails at times of its own in a run held out says nothing of what was learned of others.
     judged = comparison.evaluations[: len(train) if learned.model.runs else None]
@@ -211,6 +236,8 @@ def diagnose(
         (u, v, r),
         prior,
         seed,
+        fit.posterior,
+        fit.unrecorded,
     )
 
 

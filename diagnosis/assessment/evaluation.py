@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from cosim import InputError
 from ..model import Integrals, Model, omega
 from ..smoothing import Smoothed
 from .windows import WindowErrors, Windows
+
+if TYPE_CHECKING:
+    from ..prediction_error.bands import Bands
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,7 @@ class Evaluation:
         held_out: whether nothing was learned from it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
+        bands: about the predictions of the learned model; None if there are none.
     """
 
     model: Model
@@ -62,6 +67,7 @@ class Evaluation:
     held_out: bool
     before: PredictionError
     after: PredictionError
+    bands: "Bands | None" = None
 
     @property
     def smoothed(self) -> Smoothed:

@@ -158,18 +158,18 @@ class RunWindows(NamedTuple):
         return row / parts, self.smoothed.track.run.five is not None
 
 
-def usable_windows(smoothed: Smoothed) -> RunWindows:
-    """The windows of a run that have their first sample and at least half of all."""
+def usable_windows(smoothed: Smoothed, length: float = LENGTH) -> RunWindows:
+    """The windows of a length [s] of a run that have their first sample and at least half of all."""
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
     since = smoothed.time - smoothed.time[0] + 0.25 * period
-    number = np.floor(since / LENGTH).astype(int)
-    complete = int((since[-1] + period) // LENGTH)
+    number = np.floor(since / length).astype(int)
+    complete = int((since[-1] + period) // length)
     measured = np.flatnonzero(~track.between & (number < complete))
     _, at = np.unique(number[measured], return_index=True)
     first = measured[at]  # the first sample of each window that has any
-    prompt = since[first] - LENGTH * number[first] < period
+    prompt = since[first] - length * number[first] < period
     chosen, samples = np.unique(number[used], return_counts=True)
-    full = chosen[samples >= MIN_COVERAGE * round(LENGTH / period)]
+    full = chosen[samples >= MIN_COVERAGE * round(length / period)]
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))

@@ -72,7 +72,7 @@ class Search:
             at = self.at.without(gone)
             at = refit(self.t, at, self._of(at)).estimate
             return replace(self, at=at, places=kept).findings()
-        names, std = self.at.fitted, self._std()
+        names, std = self.at.fitted, laplace_std(self.t, self._along)
         nested, shares = self._nested()
         effects = []
         for k, p in enumerate(self.places):
@@ -107,6 +107,8 @@ class Search:
             moved,
             self._fold_models(),
             self.findings,
+            self.at,
+            prior,
         )
 
     def _fold_models(self) -> list[Model]:
@@ -127,14 +129,6 @@ class Search:
         kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
         a = self._along
         return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept])
-
-    def _std(self) -> np.ndarray:
-        """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
-        along, weight = self._along, self.t.weight
-        A = np.moveaxis(along.columns * weight[:, None], 2, 0).reshape(along.offset.size, -1).T
-        H = A.T @ A + along.precision
-        H += RIDGE * np.diag(np.diag(H) + 1.0)
-        return np.sqrt(np.diag(np.linalg.inv(H)))
 
     def _nested(self) -> tuple[list[Model], list[float]]:
         """The models with each effect and those before it, and its share of the first model error.
@@ -171,6 +165,14 @@ class Search:
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
         std = np.concatenate([omega_std(w, model) for w in data])
         return evidence(p.weights[p.id], without - left, left, std, self.t.blocks)
+
+
+def laplace_std(t: TrainingSet, along: Nuisance) -> np.ndarray:
+    """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
+    A = np.moveaxis(along.columns * t.weight[:, None], 2, 0).reshape(along.offset.size, -1).T
+    H = A.T @ A + along.precision
+    H += RIDGE * np.diag(np.diag(H) + 1.0)
+    return np.sqrt(np.diag(np.linalg.inv(H)))
 
 
 def interval(value: float, std: float) -> tuple[float, float]:

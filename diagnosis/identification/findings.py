@@ -2,12 +2,17 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Model
 from ..model.ship_model import parameter_and_run
 from .confidence import Evidence
+from .prior import NominalPrior
+
+if TYPE_CHECKING:
+    from .refinement import Estimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +107,9 @@ class Findings:
             :func:`.gram.block_folds`; empty where a method has none.
         keep: the findings with some of the effects only, everything else fitted anew; None where a
             method cannot.
+        estimate: the most likely parameters, from which a fit to predictions begins; None where a method
+            has no such.
+        searched: the prior of the coefficients in which its offsets are.
     """
 
     effects: Sequence[Finding] = field(default_factory=list)
@@ -113,3 +121,5 @@ class Findings:
     moved: Mapping[str, float] = field(default_factory=dict)
     fold_models: Sequence[Model] = ()
     keep: "Callable[[Sequence[str]], Findings] | None" = None
+    estimate: "Estimate | None" = None
+    searched: NominalPrior | None = None

@@ -27,17 +27,27 @@ def independent(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
 
 def correlated_windows(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
     """tau (3,) of a model error; arguments as of :func:`independent`."""
-    sums, pairs = np.zeros((LONGEST + 1, 3)), np.zeros(LONGEST + 1)
-    edges = np.cumsum([w.middle.size for w in data])[:-1]
-    for w, part in zip(data, np.split(error, edges), strict=True):
-        apart = np.minimum(np.round(np.diff(w.middle) / EVERY), LONGEST + 1.0)  # not a gap of years
-        place = np.concatenate([[0], np.cumsum(apart)]).astype(int)
-        series, there = np.zeros((place[-1] + 1, 3)), np.zeros(place[-1] + 1)
-        series[place], there[place] = part, 1.0
-        for lag in range(min(LONGEST + 1, place[-1] + 1)):
-            sums[lag] += (series[lag:] * series[: len(series) - lag]).sum(axis=0)
-            pairs[lag] += there[lag:] @ there[: len(there) - lag]
-    mean = sums / np.maximum(pairs, 1.0)[:, None]
+    mean = autocovariance(data, error, LONGEST)
     rho = mean / np.maximum(mean[0], np.finfo(float).tiny)
     positive = np.cumprod(rho[1:] > 0.0, axis=0)
     return 1.0 + 2.0 * np.sum(rho[1:] * positive, axis=0)
+
+
+def autocovariance(data: Sequence[Integrals], error: np.ndarray, longest: int) -> np.ndarray:
+    """(longest + 1, 3), mean product of a model error with itself some windows later.
+
+    Args:
+        data, error: as of :func:`independent`.
+        longest: lag [windows].
+    """
+    sums, pairs = np.zeros((longest + 1, 3)), np.zeros(longest + 1)
+    edges = np.cumsum([w.middle.size for w in data])[:-1]
+    for w, part in zip(data, np.split(error, edges), strict=True):
+        apart = np.minimum(np.round(np.diff(w.middle) / EVERY), longest + 1.0)  # not a gap of years
+        place = np.concatenate([[0], np.cumsum(apart)]).astype(int)
+        series, there = np.zeros((place[-1] + 1, 3)), np.zeros(place[-1] + 1)
+        series[place], there[place] = part, 1.0
+        for lag in range(min(longest + 1, place[-1] + 1)):
+            sums[lag] += (series[lag:] * series[: len(series) - lag]).sum(axis=0)
+            pairs[lag] += there[lag:] @ there[: len(there) - lag]
+    return sums / np.maximum(pairs, 1.0)[:, None]

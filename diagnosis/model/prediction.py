@@ -5,7 +5,7 @@ parameters. Of the five commands of the real ship each propeller is a thruster s
 there is one.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from .ship_model import Model
 from .thrust import Response, commanded_shares, placed, places
 
 LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
+COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
 
@@ -74,7 +75,7 @@ class Starts:
         found = []
         for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
             response = Response(smoothed.track.run, model, not at_rest(smoothed))
-            if response.slow:
+            if response.slow or self.h > COARSE * smoothed.track.period:
                 start = smoothed.time[rows] + np.arange(self.steps)[:, None] * self.h
                 found.append(response.mean(start, start + self.h))
             else:
@@ -115,27 +116,47 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         each = zip(starts.runs, names, strict=True)
         parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
         return np.concatenate(parts, axis=-1)
-    body, drive, h = model.hull, model.drive, starts.h
-    p = drive.params
-    arriving = [starts.arriving(single) for single in singles(model)]
-    given, acting = (np.concatenate(part, axis=3) for part in zip(*arriving, strict=True))
-    aside = np.array(places(starts.runs[0][0].track.run))[:, None, None]
-    s = first_state(starts, body)
-    shape = np.broadcast_shapes(*sizes(body.params, p), acting.shape[-2:], s.x.shape)
+    body, thrust = model.hull, arriving(starts, model)
+    shape = np.broadcast_shapes(*sizes(body.params, model.drive.params), thrust[1].shape[-2:])
     found = np.empty((starts.steps + 1, 3, *shape))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        found[0] = vessel.measured(s, body)
-        power = starts.power(model.clock) if starts.powered else None
-        thrusters = placed(drive, aside, None)
-        for k, shares in enumerate(acting):
+        for k, s in enumerate(propagate(starts, model, thrust)):
+            found[k] = vessel.measured(s, body)
+    return found
+
+
+def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Commands that arrive and shares of full force that act, each (steps, 3, sets, p or 1, w)."""
+    found = [starts.arriving(single) for single in singles(model)]
+    given, acting = (np.concatenate(part, axis=3) for part in zip(*found, strict=True))
+    return given, acting
+
+
+def propagate(
+    starts: Starts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
+) -> Iterator[vessel.State]:
+    """The state at the start, and after each step; arrays (p, w) or what broadcasts to that.
+
+    Args:
+        starts: where to begin.
+        model: as of :func:`predict`.
+        thrust: commands that arrive and shares that act, from :func:`arriving`.
+    """
+    body, drive, h = model.hull, model.drive, starts.h
+    aside = np.array(places(starts.runs[0][0].track.run))[:, None, None]
+    power = starts.power(model.clock) if starts.powered else None
+    thrusters = placed(drive, aside, None)
+    s = first_state(starts, body)
+    yield s
+    for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
+        with np.errstate(all="ignore"):
             if power is not None:
                 thrusters = placed(drive, aside, chain.Power(*power[k]))
-            x, y, bow = given[k]
+            x, y, bow = given
             now = Running(s.t + h, s.u, s.v, s.r, x, y, bow, aside)
             forces = chain.act(tuple(shares), now, thrusters)
             s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
-            found[k + 1] = vessel.measured(s, body)
-    return found
+        yield s
 
 
 def singles(model: Model) -> list[Model]:

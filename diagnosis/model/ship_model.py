@@ -104,7 +104,7 @@ class Model:
         runs = {run: dict(values) for run, values in self.runs.items()}
         for name, value in changes.items():
             parameter, run = parameter_and_run(name)
-            place = runs.setdefault(run, {}) if run else parts[self._owner(parameter)]
+            place = runs.setdefault(run, {}) if run else parts[self.owner(parameter)]
             place[parameter] = self.value(name) + value
         return Model(**parts, ship=self.ship, origin=self.origin or self, runs=runs)
 
@@ -115,7 +115,7 @@ class Model:
             InputError: there is none.
         """
         parameter, _ = parameter_and_run(name)
-        return self.ship.parameters[self._owner(parameter)][parameter]
+        return self.ship.parameters[self.owner(parameter)][parameter]
 
     def value(self, name: str) -> float:
         """A parameter of any part of the ship, or its value in one run.
@@ -125,12 +125,12 @@ class Model:
         """
         parameter, run = parameter_and_run(name)
         at = self.during(run)
-        return at._value(at._owner(parameter), parameter)
+        return at._value(at.owner(parameter), parameter)
 
     def _value(self, part: str, name: str) -> float:
         return getattr(self, part).get(name, self.ship.parameters[part][name].start)
 
-    def _owner(self, name: str) -> str:
+    def owner(self, name: str) -> str:
         for part, declared in self.ship.parameters.items():
             if name in declared:
                 return part

@@ -14,6 +14,7 @@ from ..assessment.regions import ErrorRegions, Profile, Region
 from ..assessment.remainder import Remainder
 from ..identification.findings import Finding
 from ..model.ship_model import of_one_run, parameter_and_run
+from ..prediction_error.unrecorded import Unrecorded
 from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit
@@ -67,6 +68,12 @@ def diagnosis_content(
         effects=effects,
         possibilities=possibilities,
         withdrawn=[result_keys.WithdrawnResult(id=w.id, reason=w.reason) for w in diagnosis.withdrawn],
+        unrecorded=_unrecorded(diagnosis.unrecorded),
+        correlation=result_keys.CorrelationResult(
+            names=list(diagnosis.posterior.names),
+            matrix=diagnosis.posterior.correlation.tolist(),
+            together=diagnosis.posterior.together,
+        ),
         suspect_coefficients=suspects,
         ranking=[result_keys.RankedResult(**asdict(r)) for r in learned.ranking],
         data=_data(comparison.evaluations),
@@ -93,6 +100,16 @@ def _remainder(r: Remainder) -> result_keys.RemainderResult:
         for name, a in r.axes.items()
     }
     return result_keys.RemainderResult(significant=r.significant, axes=axes, sentence=r.sentence)
+
+
+def _unrecorded(u: Unrecorded) -> result_keys.UnrecordedResult:
+    return result_keys.UnrecordedResult(
+        size=u.push.size.tolist(),
+        time=u.push.time.tolist(),
+        values=dict(u.differing),
+        stretches=[result_keys.StretchResult(**s._asdict()) for s in u.stretches],
+        sentence=u.sentence,
+    )
 
 
 class _Provenance(TypedDict):
@@ -142,6 +159,7 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
         window_position_rmse=result_keys.Change(before=b.position, after=a.position),
         window_heading_rmse=result_keys.Change(before=b.heading, after=a.heading),
         omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
+        coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
     )
 
 

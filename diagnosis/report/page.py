@@ -134,6 +134,10 @@ def _tracks(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawin
         if worst is not None:
             caption = f"{name}: the worst window."
             yield _draw(worst, f"worst-{k}", f"The worst window of {e.name}", caption)
+        heading = tracks.heading_bands(e)
+        if heading is not None:
+            caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
+            yield _draw(heading, f"heading-{k}", f"Heading in the worst window of {e.name}", caption)
 
 
 def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:

@@ -63,13 +63,17 @@ class AxesChange(Part):
 
 
 class RunErrors(Part):
-    """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m]."""
+    """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m].
+
+    coverage_90: share of the windows' samples, positions and headings alike, within the 90 % band.
+    """
 
     run: str
     held_out: bool
     window_position_rmse: Change
     window_heading_rmse: Change
     omega_rms: AxesChange
+    coverage_90: Number = None
 
 
 class RegionResult(Part):
@@ -215,6 +219,38 @@ class StabilityResult(Part):
     notes: list[str]
 
 
+class StretchResult(Part):
+    """A stretch of a run [s] in which the unrecorded force is large, and its size [N or N m]."""
+
+    run: str
+    axis: str
+    start: Number
+    end: Number
+    size: Number
+
+
+class UnrecordedResult(Part):
+    """The force that is in no command and no effect: size [N, N, N m] and time [s] of X, Y, N.
+
+    values: of which the fit to the model error and that to predictions differ by more than their
+    intervals; each with both.
+    """
+
+    size: list[Number]
+    time: list[Number]
+    values: dict[str, tuple[Number, Number]]
+    stretches: list[StretchResult]
+    sentence: str
+
+
+class CorrelationResult(Part):
+    """Correlations of all fitted values, and the groups of those that are known only together."""
+
+    names: list[str]
+    matrix: list[list[Number]]
+    together: list[list[str]]
+
+
 class DiagnosisContent(Part):
     """The content of ``diagnosis.json``; at its end what it was made with."""
 
@@ -224,6 +260,8 @@ class DiagnosisContent(Part):
     effects: list[EffectResult]
     possibilities: list[PossibilityResult]
     withdrawn: list[WithdrawnResult]
+    unrecorded: UnrecordedResult
+    correlation: CorrelationResult
     suspect_coefficients: list[SuspectResult]
     ranking: list[RankedResult]
     data: Data

@@ -5,8 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fmus.ops import wrap
+
 from ..assessment.evaluation import Evaluation, PredictionError
 from ..assessment.windows import LENGTH
+from ..prediction_error.bands import LEVELS
 from .panels import breaks, figure_of, legend, plain_numbers
 from .svg import AFTER, BEFORE, INK, WIDTH
 
@@ -41,12 +44,43 @@ def track(e: Evaluation, learned: bool) -> "Figure":
     return figure
 
 
-def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
+def worst_of(e: Evaluation) -> int | None:
     """The window with the largest position error of the initial model; None where there is no window."""
     if e.windows is None or e.before.errors is None:
         return None
-    finite = np.where(np.isfinite(e.before.errors.position), e.before.errors.position, -1.0)
-    inside = e.windows.sample_window == int(np.argmax(finite))
+    return int(
+        np.argmax(np.where(np.isfinite(e.before.errors.position), e.before.errors.position, -1.0))
+    )
+
+
+def heading_bands(e: Evaluation) -> "Figure | None":
+    """Heading over the worst window, with the bands of the learned model; None where there are none."""
+    worst = worst_of(e)
+    if worst is None or e.windows is None or e.bands is None:
+        return None
+    inside = e.windows.sample_window == worst
+    since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
+    centre = np.interp(since, e.bands.since, predicted)
+    figure = figure_of(2.4)
+    panel = figure.subplots()
+    measured = centre + wrap(e.windows.measured[inside, 2] - centre)
+    panel.plot(since, np.degrees(measured), color=INK, lw=3.4, alpha=0.3, label="measured")
+    panel.plot(e.bands.since, np.degrees(predicted), color=AFTER, lw=1.5, label="after")
+    for level in LEVELS:
+        low, high = np.degrees(e.bands.headings(worst, level))
+        panel.fill_between(e.bands.since, low, high, color=AFTER, alpha=0.15, lw=0.0)
+    panel.set_xlabel("time since the window began [s]")
+    panel.set_ylabel("heading [°]")
+    legend(figure, panel, 2)
+    return figure
+
+
+def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
+    """The worst window, with the bands of the learned model; None where there is no window."""
+    worst = worst_of(e)
+    if worst is None or e.windows is None:
+        return None
+    inside = e.windows.sample_window == worst
     measured = e.windows.measured[inside]
     paths = [(_finite(measured - p.residuals[inside]), c, label) for p, c, label in _models(e, learned)]
     low, high = measured.min(axis=0), measured.max(axis=0)
@@ -54,6 +88,10 @@ def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
     near = [np.clip(p, low - far, high + far) for p, _, _ in paths]
     figure, panel = _map(np.concatenate([measured, *near])[:, :2])
     panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
+    if e.bands is not None:
+        for level in LEVELS:
+            for ellipse in e.bands.ellipses(worst, level):
+                panel.fill(ellipse[:, 1], ellipse[:, 0], color=paths[-1][1], alpha=0.08, lw=0.0)
     for predicted, colour, label in paths:
         panel.plot(predicted[:, 1], predicted[:, 0], color=colour, lw=1.5, label=label)
         panel.plot(predicted[-1:, 1], predicted[-1:, 0], "o", color=colour, ms=4.5)

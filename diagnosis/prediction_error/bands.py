@@ -1,0 +1,104 @@
+"""How far to trust a prediction: its covariance by posterior, initial state, unrecorded force, noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ..assessment.windows import LENGTH, Windows
+from ..model import Model
+from ..smoothing import Smoothed
+from .posterior import Posterior
+from .push import Push, covariance
+from .shooting import Shooting
+
+LEVELS = (0.5, 0.9)
+POINTS = 41  # of an ellipse that is drawn; chosen
+STEP = 0.1  # posterior standard deviations, of the finite differences; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """The covariance of predictions in the windows of a run.
+
+    Attributes:
+        windows: of the run.
+        since: (T,), time from a window's start [s], zero included.
+        predicted: (w, T, 3), pose [m, m, rad].
+        covariance: (w, T, 3, 3), of measured minus predicted pose.
+    """
+
+    windows: Windows
+    since: np.ndarray
+    predicted: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def at_samples(self) -> np.ndarray:
+        """(samples, 3, 3), covariance at each sample that is used, see :class:`Windows`."""
+        place = self.windows.since / (self.since[1] - self.since[0])
+        k = np.clip(np.floor(place).astype(int), 0, self.since.size - 2)
+        share = (place - k)[:, None, None]
+        window = self.windows.sample_window
+        return (1.0 - share) * self.covariance[window, k] + share * self.covariance[window, k + 1]
+
+    def inside(self, residuals: np.ndarray, level: float) -> np.ndarray:
+        """(samples, 2), whether position and heading lie within a band.
+
+        Args:
+            residuals: (samples, 3), measured minus predicted pose, see :meth:`Windows.residuals`.
+            level: probability of the band: of an ellipse about the position, an interval of heading.
+        """
+        V = self.at_samples
+        place = residuals[:, :2, None]
+        squares = np.swapaxes(place, 1, 2) @ np.linalg.solve(V[:, :2, :2], place)
+        position = squares[:, 0, 0] <= stats.chi2.ppf(level, 2)
+        heading = residuals[:, 2] ** 2 <= stats.chi2.ppf(level, 1) * V[:, 2, 2]
+        return np.column_stack([position, heading])
+
+    def ellipses(self, window: int, level: float) -> np.ndarray:
+        """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
+        around = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        circle = np.sqrt(stats.chi2.ppf(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
+        factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
+        return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
+
+    def headings(self, window: int, level: float) -> np.ndarray:
+        """(2, T), lower and upper end of the band about the predicted heading of a window [rad]."""
+        reach = np.sqrt(stats.chi2.ppf(level, 1) * self.covariance[window, :, 2, 2])
+        return np.stack([-reach, reach]) + self.predicted[window, :, 2]
+
+    def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:
+        """Share of the samples, positions and headings alike, within a band; arguments as above."""
+        return float(np.mean(self.inside(residuals, level)))
+
+
+def prediction_bands(
+    smoothed: Smoothed, windows: Windows | None, model: Model, posterior: Posterior, push: Push
+) -> Bands | None:
+    """The bands about a model's predictions in the windows of a run.
+
+    Args:
+        smoothed: the run.
+        windows: of it; None: there is none, and there are no bands.
+        model: that predicts.
+        posterior: of its fitted values.
+        push: the unrecorded force.
+    """
+    if windows is None:
+        return None
+    shots = Shooting([smoothed], LENGTH)
+    std = posterior.std
+    around = shots.around(model, {n: STEP * s for n, s in std.items() if s > 0.0})
+    kept = [k for k, s in enumerate(std.values()) if s > 0.0]
+    C = posterior.covariance[np.ix_(kept, kept)]
+    later = covariance(around.motion, shots.at_start, push)
+    first = smoothed.eta[shots.starts.runs[0][1]]
+    predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
+    instants = np.arange(shots.since.size)
+    found = np.zeros((len(later), shots.since.size + 1, 3, 3))
+    found[:, 1:] = later[:, instants, :, instants].swapaxes(0, 1)
+    found[:, 1:] += around.slopes @ C @ np.swapaxes(around.slopes, -1, -2)
+    found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
+    found[..., range(3), range(3)] += smoothed.noise**2
+    return Bands(windows, np.concatenate([[0.0], shots.since]), predicted, found)

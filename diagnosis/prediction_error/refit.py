@@ -1,0 +1,103 @@
+"""What was found, fitted to predictions: the same effects, with values, intervals and a posterior."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..identification.candidates import model_error
+from ..identification.conclusion import interval, laplace_std, suspected
+from ..identification.findings import Findings
+from ..identification.gram import RUN
+from ..identification.prior import NominalPrior
+from ..identification.refinement import Estimate, TrainingSet, nuisance, refit
+from ..model import Integrals
+from ..model.uncertainty import omega_std
+from .fit import fit_predictions, shootings
+from .posterior import Posterior
+from .push import Push, estimate
+from .unrecorded import Unrecorded, unrecorded
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The end of a fit.
+
+    Attributes:
+        findings: with the values of the fit.
+        posterior: of all fitted values; of none where nothing was fitted.
+        unrecorded: the force that nobody recorded.
+    """
+
+    findings: Findings
+    posterior: Posterior
+    unrecorded: Unrecorded
+
+
+def to_predictions(
+    found: Findings, runs: Sequence[Integrals], prior: NominalPrior, fits: bool
+) -> Outcome:
+    """Fit what was found to predictions.
+
+    Args:
+        found: the findings by the model error.
+        runs: that they were found on.
+        prior: of the nominal coefficients.
+        fits: whether anything was learned that can be fitted.
+    """
+    begin, searched, windows = found.estimate, found.searched, shootings(runs) if fits else []
+    known = begin is None or not (begin.fitted or any(prior.std.values()))
+    if known or begin is None or searched is None or not windows:
+        return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, _push(runs, found), {}))
+    begin = replace(begin, offset=rescaled(begin.offset, searched, prior))
+    weak, weak_std = _weak_form(begin, found.sigma, runs, prior)
+    fitted = fit_predictions(runs, windows, weak, prior)
+    posterior, at = Posterior.of(fitted, prior), fitted.estimate
+    model, std = at.model(prior), posterior.std
+    effects = []
+    for f in found.effects:
+        values = {n: at.values.get(n, v) for n, v in f.values.items()}
+        own = {n: interval(v, std[n]) for n, v in values.items() if n in std}
+        effects.append(replace(f, values=values, ci95=dict(f.ci95) | own))
+    if effects:
+        effects[-1] = replace(effects[-1], model=model)
+    share = np.array([std.get(n, 0.0) / s if s else 0.0 for n, s in prior.std.items()])
+    first = weak.model(prior)
+    differ = {
+        n: (first.value(n), model.value(n))
+        for n, s in std.items()
+        if abs(first.value(n) - model.value(n)) > interval(0.0, s + weak_std[n])[1]
+    }
+    learned = replace(
+        found,
+        effects=effects,
+        model=model,
+        suspects=suspected(prior, at.offset, share),
+        moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
+        estimate=at,
+    )
+    return Outcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
+
+
+def _push(runs: Sequence[Integrals], found: Findings) -> Push:
+    std = np.concatenate([omega_std(w, found.model) for w in runs])
+    return estimate(runs, model_error(runs, found.model), std)
+
+
+def rescaled(offset: np.ndarray, old: NominalPrior, new: NominalPrior) -> np.ndarray:
+    """Offsets (q,) in standard deviations of one prior, in those of another."""
+    pairs = zip(offset.tolist(), old.std.values(), new.std.values(), strict=True)
+    return np.array([k * a / b if b else 0.0 for k, a, b in pairs])
+
+
+def _weak_form(
+    at: Estimate, sigma: np.ndarray, runs: Sequence[Integrals], prior: NominalPrior
+) -> tuple[Estimate, dict[str, float]]:
+    """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
+    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(runs)])
+    t = TrainingSet(runs, blocks, sigma, prior)
+    along = nuisance(t, at, t.error(at))
+    last = refit(t, at, along).estimate
+    unit = np.array([*[1.0] * len(at.fitted), *prior.std.values()])
+    std = laplace_std(t, along) * unit
+    return last, dict(zip([*at.fitted, *prior.std], std.tolist(), strict=True))

@@ -1,0 +1,162 @@
+"""The fit to predictions: its windows, the unrecorded force, the posterior, and the bands."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from support.measured import sail, smoothed
+
+from diagnosis.assessment.windows import LENGTH, Windows
+from diagnosis.identification.prior import NominalPrior
+from diagnosis.identification.refinement import Estimate
+from diagnosis.model import Model, integrals
+from diagnosis.model.weak_form import EVERY
+from diagnosis.prediction_error import push as pushes
+from diagnosis.prediction_error.bands import prediction_bands
+from diagnosis.prediction_error.fit import fit_predictions, shootings
+from diagnosis.prediction_error.posterior import Posterior
+from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
+from diagnosis.prediction_error.shooting import Linear, Shooting
+from diagnosis.prediction_error.unrecorded import unrecorded
+
+STEPS = {"N_r": 1e-3, "plant_F_vsp": 1e-3, "delta_X_u": 1e-3, "lag": 1e-2}
+DRAG = -2.0  # N s/m, hidden
+
+
+@cache
+def windows():
+    return Shooting([smoothed(sail()[0])], LENGTH)
+
+
+@cache
+def hidden():
+    """A run of a ship with more drag than the model has."""
+    return integrals(smoothed(sail(ship={"delta_X_u": DRAG})[0]))
+
+
+@cache
+def fitted():
+    prior = NominalPrior.of(Model(), {"damping": 0.1})
+    at = Estimate(Model(), np.zeros(prior.size), {"delta_X_u": -0.5}, np.zeros((1, 1)))
+    return fit_predictions([hidden()], shootings([hidden()]), at, prior), prior
+
+
+def test_slopes_are_those_of_one_model_after_the_other():
+    around = windows().around(Model(), STEPS)
+    first = windows().residuals(Model())
+    np.testing.assert_allclose(around.residuals, first, rtol=0.0, atol=1e-12)
+    for k, (name, step) in enumerate(STEPS.items()):
+        alone = (first - windows().residuals(Model().plus({name: step}))) / step
+        np.testing.assert_allclose(around.slopes[..., k], alone, rtol=0.0, atol=1e-9)
+        assert np.abs(alone).max() > 1e-3
+
+
+def test_coarse_steps_predict_what_fine_ones_do():
+    run = smoothed(sail(noise=0.0)[0])
+    coarse = Shooting([run], LENGTH).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
+    fine = Windows([run])
+    last = np.flatnonzero(np.diff(fine.sample_window, append=-1))
+    exact = fine.residuals(Model(vessel={"N_r": -0.6}))[last]
+    assert np.abs(exact).max() > 0.05
+    np.testing.assert_allclose(coarse, exact, atol=0.02 * np.abs(exact).max())
+
+
+def test_lasting_push_moves_a_ship_at_rest_by_half_the_acceleration_times_time_squared():
+    slope = np.zeros((1, 8, 6, 6))
+    slope[:, :, [0, 1, 2], [3, 4, 5]] = 1.0
+    motion = Linear(slope, np.diag([0.1, 0.2, 0.5]), 0.25)
+    V = covariance(motion, np.zeros((1, 6)), Push(np.array([1.0, 2.0, 3.0]), np.full(3, 1e9)))
+    moved = 0.5 * np.array([0.1, 0.4, 1.5]) * 2.0**2
+    np.testing.assert_allclose(np.sqrt(np.diag(V[0, -1, :, -1])), moved, rtol=1e-5)
+    at_half = V[0, 3, :, -1] / V[0, -1, :, -1].diagonal()
+    np.testing.assert_allclose(at_half.diagonal(), 0.25, rtol=1e-5)
+
+
+def test_initial_state_alone_gives_its_own_covariance():
+    start = np.array([[1.0, 2.0, 0.0, 0.1, 0.0, 0.5]])
+    slope = np.zeros((1, 4, 6, 6))
+    slope[:, :, [0, 1, 2], [3, 4, 5]] = 1.0
+    V = covariance(Linear(slope, np.eye(3), 0.5), start, NO_PUSH)
+    np.testing.assert_allclose(np.diag(V[0, -1, :, -1]), [1.0 + 0.4, 2.0, 2.0], atol=1e-12)
+
+
+def test_push_is_recovered_from_what_it_leaves_in_the_windows():
+    """An Ornstein-Uhlenbeck series of 0.1 N that lasts 2 s, seen through the windows of 32 runs."""
+    w, rng = hidden(), np.random.default_rng(3)
+    t = w.run.time
+    keep = np.exp(-(t[1] - t[0]) / 2.0)
+    errors = []
+    for _ in range(32):
+        force = np.zeros((t.size, 3))
+        force[0] = 0.1 * rng.standard_normal(3)
+        for k, e in enumerate(0.1 * np.sqrt(1.0 - keep**2) * rng.standard_normal((t.size - 1, 3)), 1):
+            force[k] = keep * force[k - 1] + e
+        errors.append(w.held @ force)
+    found = estimate([w] * 32, np.concatenate(errors), np.zeros((32 * w.middle.size, 3)))
+    np.testing.assert_allclose(found.size, 0.1, rtol=0.15)
+    np.testing.assert_allclose(found.time, 2.0, rtol=0.5)
+
+
+def test_noise_alone_is_no_push():
+    std = np.full((hidden().middle.size, 3), 0.01)
+    assert pushes.OF_NOISE[0] == 1.0
+    assert abs(pushes.OF_NOISE[round(3.0 / EVERY) :]).max() < 1e-4
+    error = 0.01 * np.random.default_rng(1).standard_normal(std.shape)
+    assert estimate([hidden()], error, std).size.max() < 0.005
+
+
+def test_fit_finds_what_was_hidden_within_its_interval():
+    fit, prior = fitted()
+    k = list(fit.names).index("delta_X_u")
+    found, std = fit.estimate.values["delta_X_u"], np.sqrt(fit.covariance[k, k])
+    assert abs(found - DRAG) < 3.0 * std
+    assert std < 0.5
+    before = Windows([hidden().smoothed]).errors(Model()).over_all()[0]
+    after = Windows([hidden().smoothed]).errors(fit.estimate.model(prior)).over_all()[0]
+    assert after < 0.1 * before
+
+
+def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):
+    fit, prior = fitted()
+    posterior = Posterior.of(fit, prior)
+    posterior.write(tmp_path / "posterior.json")
+    read = json.loads((tmp_path / "posterior.json").read_text())
+    mean = dict(zip(read["names"], read["mean"], strict=True))
+    assert mean["vessel.N_r"] == pytest.approx(fit.estimate.model(prior).value("N_r"))
+    assert read["units"][read["names"].index("vessel.m")] == "kg"
+    assert np.linalg.eigvalsh(read["covariance"]).min() > -1e-12
+    drag, own = (read["names"].index(f"vessel.{n}") for n in ("delta_X_u", "X_u"))
+    assert posterior.correlation[drag, own] < -0.1  # the sum is what the data know
+
+
+def test_pair_that_is_correlated_at_98_percent_is_known_only_together():
+    covariance = np.array([[1.0, 0.98 * 3.0, 0.0], [0.98 * 3.0, 9.0, 0.1], [0.0, 0.1, 4.0]])
+    posterior = Posterior(["vessel.a", "vessel.b", "vessel.c"], ["1"] * 3, np.zeros(3), covariance)
+    assert posterior.together == [["vessel.a", "vessel.b"]]
+    assert posterior.std == {"a": 1.0, "b": 3.0, "c": 2.0}
+
+
+def test_bands_hold_what_they_say_and_widen_with_a_push():
+    fit, prior = fitted()
+    run, model = hidden().smoothed, fit.estimate.model(prior)
+    posterior, seen = Posterior.of(fit, prior), Windows([hidden().smoothed])
+    narrow = prediction_bands(run, seen, model, posterior, fit.push)
+    wide = prediction_bands(run, seen, model, posterior, Push(np.full(3, 0.5), np.full(3, 2.0)))
+    assert narrow is not None
+    assert wide is not None
+    residuals = seen.residuals(model)
+    assert 0.75 < narrow.coverage(residuals) <= 1.0
+    assert narrow.coverage(residuals, 0.5) < narrow.coverage(residuals)
+    assert wide.coverage(residuals) > 0.99
+    assert narrow.coverage(residuals + [1.0, 0.0, 1.0]) < 0.01
+    assert wide.ellipses(0, 0.9).shape == (narrow.since.size, 41, 2)
+    assert prediction_bands(run, None, model, posterior, fit.push) is None
+
+
+def test_fits_that_agree_tell_of_nothing_and_those_that_differ_tell_when():
+    w, some = hidden(), Push(np.full(3, 0.1), np.ones(3))
+    assert unrecorded([w], Model(), some, {}).sentence == ""
+    told = unrecorded([w], Model(), some, {"N_r": (-0.1, -0.6)})
+    assert "N_r" in told.sentence
+    assert all(0.0 <= s.start <= s.end <= w.run.time[-1] for s in told.stretches)
