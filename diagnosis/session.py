@@ -22,8 +22,8 @@ from .identification.prior import shares as prior_shares
 from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
-from .prediction_error.bands import prediction_bands
-from .prediction_error.posterior import Posterior
+from .prediction_error.joint_posterior import Posterior
+from .prediction_error.predicted_bands import prediction_bands
 from .prediction_error.refit import to_predictions
 from .prediction_error.unrecorded import Unrecorded
 from .progress import Advance, silent

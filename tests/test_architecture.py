@@ -40,6 +40,7 @@ DIAGNOSIS_LAYERS = (
     ("model",),
     ("gathering",),
     ("identification", "assessment"),
+    ("prediction_error",),
     ("unseen",),
     ("withdrawal",),
     ("decision",),

@@ -92,7 +92,12 @@ def learned(runs, shared):
 def test_the_files_are_there_and_nothing_else(learned):
     out, code, _ = learned
     assert code == 0
-    assert sorted(p.name for p in out.iterdir()) == ["diagnosis.json", "model.ssv", "report.html"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "diagnosis.json",
+        "model.ssv",
+        "posterior.json",
+        "report.html",
+    ]
 
 
 def test_the_hidden_drag_is_found_and_the_error_falls(learned):

@@ -162,5 +162,10 @@ def test_command_writes_what_another_method_finds(name, file, tmp_path, capsys):
     assert found["effects"][0]["id"] == "loss_yaw"
     assert found["effects"][0]["confidence"] is None
     assert found["effects"][0]["coefficients"]["loss_yaw"]["value"] == pytest.approx(0.3, rel=0.1)
-    assert {p.name for p in out.iterdir()} == {"diagnosis.json", "model.ssv", "report.html"}
+    assert {p.name for p in out.iterdir()} == {
+        "diagnosis.json",
+        "model.ssv",
+        "posterior.json",
+        "report.html",
+    }
     assert "loss_yaw" in capsys.readouterr().out

@@ -13,9 +13,9 @@ from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, integrals
 from diagnosis.model.weak_form import EVERY
 from diagnosis.prediction_error import push as pushes
-from diagnosis.prediction_error.bands import prediction_bands
 from diagnosis.prediction_error.fit import fit_predictions, shootings
-from diagnosis.prediction_error.posterior import Posterior
+from diagnosis.prediction_error.joint_posterior import Posterior
+from diagnosis.prediction_error.predicted_bands import prediction_bands
 from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
 from diagnosis.prediction_error.shooting import Linear, Shooting
 from diagnosis.prediction_error.unrecorded import unrecorded
@@ -149,7 +149,7 @@ def test_bands_hold_what_they_say_and_widen_with_a_push():
     assert 0.75 < narrow.coverage(residuals) <= 1.0
     assert narrow.coverage(residuals, 0.5) < narrow.coverage(residuals)
     assert wide.coverage(residuals) > 0.99
-    assert narrow.coverage(residuals + [1.0, 0.0, 1.0]) < 0.01
+    assert narrow.coverage(residuals + np.ones(3)) < 0.01
     assert wide.ellipses(0, 0.9).shape == (narrow.since.size, 41, 2)
     assert prediction_bands(run, None, model, posterior, fit.push) is None
 

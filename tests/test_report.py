@@ -84,6 +84,18 @@ def nothing(evaluations):
             "axes": {a: {"rms": 0.01, "uncertainty": 0.01, "share": 1.0} for a in "XYN"},
             "sentence": "Nothing that matters.",
         },
+        "unrecorded": {
+            "size": [0.0] * 3,
+            "time": [1.0] * 3,
+            "values": {},
+            "stretches": [],
+            "sentence": "",
+        },
+        "correlation": {
+            "names": ["vessel.N_r", "vessel.Y_r"],
+            "matrix": [[1.0, 0.98], [0.98, 1.0]],
+            "together": [["vessel.N_r", "vessel.Y_r"]],
+        },
         "suspect_coefficients": [],
         "ranking": [],
         "where_after": NO_REGION,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +9,8 @@ from cosim import InputError
 
 from ..model import Integrals, Model, omega
 from ..smoothing import Smoothed
+from .bands import Bands
 from .windows import WindowErrors, Windows
-
-if TYPE_CHECKING:
-    from ..prediction_error.bands import Bands
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +64,7 @@ class Evaluation:
     held_out: bool
     before: PredictionError
     after: PredictionError
-    bands: "Bands | None" = None
+    bands: Bands | None = None
 
     @property
     def smoothed(self) -> Smoothed:

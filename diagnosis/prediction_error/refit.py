@@ -14,7 +14,7 @@ from ..identification.refinement import Estimate, TrainingSet, nuisance, refit
 from ..model import Integrals
 from ..model.uncertainty import omega_std
 from .fit import fit_predictions, shootings
-from .posterior import Posterior
+from .joint_posterior import Posterior
 from .push import Push, estimate
 from .unrecorded import Unrecorded, unrecorded
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from fmus.ops import wrap
 
+from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
 from ..assessment.windows import LENGTH
-from ..prediction_error.bands import LEVELS
 from .panels import breaks, figure_of, legend, plain_numbers
 from .svg import AFTER, BEFORE, INK, WIDTH
 

@@ -1,20 +1,14 @@
-"""How far to trust a prediction: its covariance by posterior, initial state, unrecorded force, noise."""
+"""How far to trust a prediction: bands about predicted positions and headings."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
-from ..assessment.windows import LENGTH, Windows
-from ..model import Model
-from ..smoothing import Smoothed
-from .posterior import Posterior
-from .push import Push, covariance
-from .shooting import Shooting
+from .windows import Windows
 
 LEVELS = (0.5, 0.9)
 POINTS = 41  # of an ellipse that is drawn; chosen
-STEP = 0.1  # posterior standard deviations, of the finite differences; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,34 +65,3 @@ class Bands:
     def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:
         """Share of the samples, positions and headings alike, within a band; arguments as above."""
         return float(np.mean(self.inside(residuals, level)))
-
-
-def prediction_bands(
-    smoothed: Smoothed, windows: Windows | None, model: Model, posterior: Posterior, push: Push
-) -> Bands | None:
-    """The bands about a model's predictions in the windows of a run.
-
-    Args:
-        smoothed: the run.
-        windows: of it; None: there is none, and there are no bands.
-        model: that predicts.
-        posterior: of its fitted values.
-        push: the unrecorded force.
-    """
-    if windows is None:
-        return None
-    shots = Shooting([smoothed], LENGTH)
-    std = posterior.std
-    around = shots.around(model, {n: STEP * s for n, s in std.items() if s > 0.0})
-    kept = [k for k, s in enumerate(std.values()) if s > 0.0]
-    C = posterior.covariance[np.ix_(kept, kept)]
-    later = covariance(around.motion, shots.at_start, push)
-    first = smoothed.eta[shots.starts.runs[0][1]]
-    predicted = np.concatenate([first[:, None], shots.measured - around.residuals], axis=1)
-    instants = np.arange(shots.since.size)
-    found = np.zeros((len(later), shots.since.size + 1, 3, 3))
-    found[:, 1:] = later[:, instants, :, instants].swapaxes(0, 1)
-    found[:, 1:] += around.slopes @ C @ np.swapaxes(around.slopes, -1, -2)
-    found[:, 0, range(3), range(3)] = shots.at_start[:, :3]
-    found[..., range(3), range(3)] += smoothed.noise**2
-    return Bands(windows, np.concatenate([[0.0], shots.since]), predicted, found)
