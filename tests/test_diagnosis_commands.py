@@ -163,7 +163,7 @@ def test_terminal_tells_what_the_file_tells_within_80_columns(learned):
     ):
         assert " ".join(part.split()) in flat
     assert "b (held out)" in flat
-    assert flat.endswith(f"diagnosis.json, model.ssv, report.html in {out}")
+    assert flat.endswith(f"diagnosis.json, model.ssv, posterior.json, report.html in {out}")
 
 
 @pytest.mark.slow
