@@ -140,7 +140,7 @@ def test_json_has_every_key_of_the_format(learned):
         "advice",
     }
     assert effect <= set(content["effects"][0])
-    assert {"value", "unit", "ci95"} == set(content["effects"][0]["coefficients"]["delta_X_u"])
+    assert {"value", "unit", "ci95", "run"} == set(content["effects"][0]["coefficients"]["delta_X_u"])
     assert {"id", "score", "q2", "beyond", "behind", "behind_std"} == set(content["ranking"][0])
     assert {r["id"] for r in content["ranking"]} <= set(STANDARD)
     counts = {"samples", "frozen", "dropped", "spikes", "used"}
