@@ -26,7 +26,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
-    from .assessment.plausibility import refuse_implausible
     from .gathering import gather
     from .model import Model, read_model
     from .report import comparison_content, show_comparison, write_report
@@ -34,9 +33,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     with together(options.out, FILES) as new:
         craft = ship_with(options.effects)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
-        runs = gather(options.runs, advance, options.anyway)
-        if not options.anyway:
-            refuse_implausible(runs, options.runs, model)
+        runs = gather(options.runs, advance, options.anyway, model)
         comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")
         content = comparison_content(comparison, options.model, FILES)

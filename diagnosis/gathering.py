@@ -15,36 +15,52 @@ from cosim import InputError
 from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
 from cosim.process import end_with_parent, without_program
 
-from .data import Run, clean, read, thinned
-from .model import Integrals, integrals
+from .assessment.plausibility import refuse_implausible
+from .data import Run, Track, clean, read, thinned
+from .data.unit_check import GO_ON
+from .model import Integrals, Model, integrals
+from .model.weak_form import WIDTH
 from .progress import Advance, silent
 from .smoothing import Smoothed, smooth
 
 PROCESSES = 2  # more need more memory than they save time (chosen)
+# Samples in a window of the weak form. Derived: with so many its kernel's slope integrates a velocity
+# that grows evenly to 2 %, with five to 3 %, with three to 23 %.
+FEWEST = 6
+MOST_SPIKES = 0.05  # of the samples; beyond, they are no faults of single ones. Chosen.
 # Rows in all; below, a second process takes longer to start than it saves.
 WORTH = 60_000
 
 
 def gather(
-    paths: Sequence[str | Path], advance: Advance = silent, anyway: bool = False
+    paths: Sequence[str | Path],
+    advance: Advance = silent,
+    anyway: bool = False,
+    model: Model | None = None,
 ) -> list[Integrals]:
-    """Read and smooth measured runs.
+    """Read and smooth measured runs, and refuse those whose files say something else than was meant.
+
+    All commands, and :func:`diagnosis.load`, get their runs here.
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`.
         advance: progress callback.
-        anyway: whether units that no ship's motion can be in are believed.
+        anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
+        model: the initial one, by which that is judged; the nominal one by default.
 
     Returns:
         For each run its windows of the weak form; names are unique.
 
     Raises:
-        InputError: a run cannot be used, or is given twice, by whatever name.
+        InputError: a run cannot be used, is given twice by whatever name, or seems to be misread.
     """
     advance("reading")
     runs = [read(path) for path in paths]
     _refuse_twice(runs, paths)
-    return [_windows(s) for s in _smooth_all(_distinct(runs, paths), advance, anyway)]
+    windows = [_windows(s, anyway) for s in _smooth_all(_distinct(runs, paths), advance, anyway)]
+    if not anyway:
+        refuse_implausible(windows, model or Model())
+    return windows
 
 
 def _refuse_twice(runs: Sequence[Run], paths: Sequence[str | Path]) -> None:
@@ -96,16 +112,39 @@ def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable
             pool.shutdown(cancel_futures=True)
 
 
-def _windows(smoothed: Smoothed) -> Integrals:
+def _windows(smoothed: Smoothed, anyway: bool) -> Integrals:
     """Windows of a run, at least one.
 
     Raises:
-        InputError: the thrusters are never at work, or too much is missing.
+        InputError: the thrusters are never at work, too much is missing or disagrees with the rest.
     """
     run = smoothed.track.run
+    if not anyway:
+        _refuse_unsteady(smoothed)
     if not np.abs(run.tau_cmd).max() > 1e-6:
         raise InputError(f"run '{run.name}': its commands are zero throughout, which tells nothing")
     w = integrals(smoothed)
     if not w.middle.size:
         raise InputError(f"run '{run.name}': too much is missing while the thrusters are at work")
     return w
+
+
+def _refuse_unsteady(s: Smoothed) -> None:
+    """Refuse samples that are too rare for the windows, or too often far from all others.
+
+    Raises:
+        InputError: they are.
+    """
+    where, period = f"run '{s.track.run.name}'", s.track.period
+    if period > WIDTH / (FEWEST - 0.5):  # up to rounding
+        raise InputError(
+            f"{where}: a measurement every {period:.3g} s is too rare where forces are averaged over "
+            f"{WIDTH:g} s; log one every {WIDTH / FEWEST:g} s or more often; {GO_ON}"
+        )
+    fresh, spikes = int(s.track.valid.sum()), int(s.spikes.sum())
+    if spikes > MOST_SPIKES * fresh:
+        raise InputError(
+            f"{where}: {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more than five standard "
+            "deviations from where all others say the ship is: something is wrong with the pose or its "
+            f"time; leave the cells of false samples empty; {GO_ON}"
+        )

@@ -28,14 +28,18 @@ AXES = ("X", "Y", "N")
 
 
 def load(
-    paths: str | Path | Sequence[str | Path], anyway: bool = False, advance: Advance = silent
+    paths: str | Path | Sequence[str | Path],
+    anyway: bool = False,
+    advance: Advance = silent,
+    model: Model | None = None,
 ) -> list[Integrals]:
     """Read and smooth measured runs, as they lie in files.
 
     Args:
         paths: files (CSV, Parquet, MATLAB) or folders of logs, one or several.
-        anyway: whether units that no ship's motion can be in are believed.
+        anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
         advance: receives the name of each step when it begins.
+        model: the initial one, by which that is judged; the nominal one by default.
 
     Returns:
         The runs, for :func:`diagnose`, :func:`diagnosis.evaluate` and :class:`diagnosis.Windows`.
@@ -43,7 +47,7 @@ def load(
     Raises:
         InputError: a run cannot be used, or is given twice.
     """
-    return gather([paths] if isinstance(paths, (str, Path)) else paths, advance, anyway)
+    return gather([paths] if isinstance(paths, (str, Path)) else paths, advance, anyway, model)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -33,7 +33,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
-    from .assessment.plausibility import refuse_implausible
     from .gathering import gather
     from .identification import shares
     from .model import Model, read_model, write_model
@@ -46,9 +45,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         shares(craft, options.prior)
         by = method(options.method)
         paths = [*options.train, *options.test]
-        runs = gather(paths, advance, options.anyway)
-        if not options.anyway:
-            refuse_implausible(runs, paths, model)
+        runs = gather(paths, advance, options.anyway, model)
         train = len(options.train)
         diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
         refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND

@@ -68,9 +68,9 @@ MISTAKES = [
     ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[4]])
 )
 def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_path):
-    w = integrals(smoothed(edited(**edits)))
+    w = integrals(smoothed(replace(edited(**edits), file=tmp_path / "a.csv")))
     with pytest.raises(InputError) as error:
-        refuse_implausible([w], [tmp_path / "a.csv"], Model())
+        refuse_implausible([w], Model())
     text = str(error.value)
     assert mistake in text
     assert f"put {json.dumps({'columns': line})} into" in text

@@ -17,10 +17,8 @@ offset of the heading does not do as well. A mistake in the pose needs commands 
 alone is explained by another ship's hull as well.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +27,13 @@ from scipy.stats import chi2
 from cosim import InputError
 
 from ..data import Run, line_beside
+from ..data.beside import Change
 from ..data.columns import POSE, TAU
-from ..model import Integrals, Model, omega
+from ..data.unit_check import GO_ON
+from ..model import Integrals, Model
+from .command_check import beyond_thrusters, contradicted_commands
+from .gains import Gains, gains
+from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
 
 # Of c: a mass or a thruster that is wrong by ten is still a matter of the diagnosis. Derived: half of
 # the way, in logarithms, to the nearest wrong unit, centimetres.
@@ -53,74 +56,85 @@ LEAST_SHARE = 1e-4  # of the commands, below which nothing is told apart (chosen
 SILENT = 1e-6  # of the largest sum of squares; commands of an axis that are less are none
 
 
-class Reading(NamedTuple):
-    """Another way to read a file.
-
-    Attributes:
-        mistake: what is wrong if it is right, as a clause.
-        motion: (3, 3), from the pose as it was read to the pose as it was meant.
-        commands: (3,), the same of the commanded force, factors.
-        changes: signal -> the signal whose column it should have, its sign, and the factor of its unit.
-    """
-
-    mistake: str
-    motion: np.ndarray
-    commands: np.ndarray
-    changes: Mapping[str, tuple[str, float, float]]
-
-
-def _of_pose(mistake: str, sign: Sequence[float], unit: Sequence[float] = (1.0, 1.0, 1.0)) -> Reading:
-    changes = {
-        signal: (signal, s, u) for signal, s, u in zip(POSE, sign, unit, strict=True) if s * u != 1.0
-    }
-    return Reading(mistake, np.diag(np.multiply(sign, unit)), np.ones(3), changes)
-
-
-def _of_commands(mistake: str, signals: Sequence[str], sign: Sequence[float]) -> Reading:
-    return Reading(mistake, np.eye(3), np.array(sign), {s: (s, -1.0, 1.0) for s in signals})
-
-
-SWAPPED = Reading(
-    "x and y are swapped",
-    np.eye(3)[[1, 0, 2]],
-    np.ones(3),
-    {"x": ("y", 1.0, 1.0), "y": ("x", 1.0, 1.0)},
-)
-READINGS = (
-    _of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0)),
-    _of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0)),
-    _of_pose("x points south (north is positive here)", (-1.0, 1.0, 1.0)),
-    SWAPPED,
-    _of_pose("its heading is in degrees", (1.0, 1.0, 1.0), (1.0, 1.0, np.pi / 180.0)),
-    _of_pose("its position is in mm", (1.0, 1.0, 1.0), (1e-3, 1e-3, 1.0)),
-    _of_pose("its position is in cm", (1.0, 1.0, 1.0), (1e-2, 1e-2, 1.0)),
-)
-
-
-def refuse_implausible(runs: Sequence[Integrals], paths: Sequence[Path], model: Model) -> None:
+def refuse_implausible(runs: Sequence[Integrals], model: Model) -> None:
     """Refuse runs whose files were read otherwise than meant.
 
     Args:
-        runs: see :func:`diagnosis.gather`.
-        paths: of their files.
+        runs: windows of the runs.
         model: the initial one.
 
     Raises:
         InputError: with the likeliest mistake, and the line for the file beside the measurement.
     """
-    for w, path in zip(runs, paths, strict=True):
-        where, last = f"run '{w.run.name}'", "--anyway goes on all the same"
-        twice = same_columns(w.run)
-        if twice:
-            told = line_beside(path, {twice[1]: (twice[1], 1.0, 1.0)}, "the name of its column")
-            raise InputError(f"{where}: {twice[0]} and {twice[1]} are the same numbers{told}; {last}")
-        found = likeliest_mistake(w, model)
+    for w in runs:
+        found = _refusal(w, model)
         if found:
-            told = line_beside(path, found.reading.changes)
-            raise InputError(
-                f"{where}: it seems that {found.reading.mistake}: then {found.after:.0%} of its "
-                f"commands show in its motion, as it was read {found.before:.0%}{told}; {last}"
-            )
+            seen, changes, name = found
+            told = line_beside(w.run.file, changes, name)
+            raise InputError(f"run '{w.run.name}': {seen}{told}; {GO_ON}")
+
+
+def _refusal(w: Integrals, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
+    """What is wrong with a run, how its columns should be read, and the name that one should have."""
+    twice = same_columns(w.run)
+    if twice:
+        seen = f"{twice[0]} and {twice[1]} are the same numbers"
+        return seen, {twice[1]: Change(twice[1])}, "the name of its column"
+    silent = contradicted_commands(w, model)
+    if silent:
+        return silent, {}, None
+    found = likeliest_mistake(w, model)
+    if found:
+        seen = (
+            f"it seems that {found.reading.mistake}: then {found.after:.0%} of its "
+            f"commands show in its motion, as it was read {found.before:.0%}"
+        )
+        return seen, found.reading.changes, None
+    beyond, given = beyond_thrusters(w.run, model), gains(w, model)
+    if beyond is None and given.sound:
+        return None
+    seen = beyond or _of_gains(given)
+    reading = likeliest_unit(w, model, given) if beyond is None or not given.sound else None
+    return (
+        (f"{seen}; it seems that {reading.mistake}", reading.changes, None)
+        if reading
+        else (seen, {}, None)
+    )
+
+
+def _of_gains(given: Gains) -> str:
+    """A clause with the gains that no ship has."""
+    shown = (f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong))
+    return f"its accelerations follow {', '.join(shown)}"
+
+
+def likeliest_unit(w: Integrals, model: Model, given: Gains) -> Reading | None:
+    """The reading in which the commands give the accelerations that they should, if there is any.
+
+    Args:
+        w: windows of the run.
+        model: its inertia, hull and thrusters.
+        given: its gains as it was read.
+    """
+    named = _of_least_error(w, model, units(w.run, model))
+    return named or (given.mean and _of_least_error(w, model, other_factors(w.run, given.mean))) or None
+
+
+def _of_least_error(w: Integrals, model: Model, readings: Iterable[Reading]) -> Reading | None:
+    """Of the readings with plausible commands that in which the model's error is the least part of them.
+
+    The median of the axes counts: what is hidden in the ship is mostly on one.
+    """
+    found = []
+    for reading in readings:
+        meant = reread(w, reading)
+        with np.errstate(all="ignore"):
+            if not gains(meant, model).close or beyond_thrusters(meant.run, model):
+                continue
+            T = meant.held @ meant.run.tau_cmd
+            off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
+        found.append((float(np.nan_to_num(np.nanmedian(off), nan=np.inf)), reading))
+    return min(found, key=lambda each: each[0])[1] if found else None
 
 
 def same_columns(run: Run) -> tuple[str, str] | None:
@@ -162,62 +176,37 @@ def likeliest_mistake(w: Integrals, model: Model) -> Mistake | None:
     heard = size > SILENT * size.max()
     if not heard.any():
         return None
-    as_read = _needed(w, model, np.eye(3))
+    as_read = _varying(w, model, AS_READ)
 
-    def shares(reading_of_commands: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return np.maximum(_unexplained(reading_of_commands, z)[heard] / size[heard], LEAST_SHARE)
+    def shares(z: np.ndarray, T: np.ndarray = commands) -> np.ndarray:
+        return np.maximum((_unexplained(T, z) / (T**2).sum(axis=0))[heard], LEAST_SHARE)
 
-    now = shares(commands, as_read)
+    now = shares(as_read)
     if now.max() < MISSING:
         return None
-    found, readings = [], [*READINGS, *_flipped_commands(w.run)]
+    found, readings = [], [*directions(w.run)]
     least = chi2.isf(CHANCE / len(readings), 1) / (w.middle.size / OVERLAP)
     for reading in readings:
-        still = np.array_equal(reading.motion, np.eye(3))
-        z = as_read if still else _needed(w, model, reading.motion)
-        then = shares(reading.commands * commands, z)
+        z = as_read if reading.still else _varying(w, model, reading)
+        then = shares(z, commands @ reading.commands.T)
         better = float(np.log(now / then).sum())
         sound = (then <= now + WORSE).all() and then.max() < EXPLAINED
-        if better > max(np.log(FACTOR), least) and sound and (still or heard.all()):
+        alone = reading.still and np.array_equal(np.abs(reading.commands), np.eye(3))
+        if better > max(np.log(FACTOR), least) and sound and (alone or heard.all()):
             found.append((better, reading, then))
     if not found:
         return None
     better, reading, then = max(found, key=lambda each: each[0])
-    turned = (shares(commands, _needed(w, model, np.eye(3), turn)) for turn in TURNS)
+    turned = (shares(_varying(w, model, Reading("", turn=turn))) for turn in TURNS)
     lawful = max(float(np.log(now / each).sum()) for each in turned)
     if better < np.log(FACTOR) + max(lawful, 0.0):
         return None
     return Mistake(reading, 1.0 - float(now.mean()), 1.0 - float(then.mean()))
 
 
-def _flipped_commands(run: Run) -> Iterator[Reading]:
-    """Readings in which commands have the other sign."""
-    if run.u is None and run.five is None:
-        yield _of_commands("its commands have the wrong sign", TAU, (-1.0, -1.0, -1.0))
-        for k, name in enumerate(TAU):
-            yield _of_commands(f"{name} has the wrong sign", (name,), 1.0 - 2.0 * np.eye(3)[k])
-        return
-    signals = [f"u{k}" for k in range(1, 6)] if run.five is not None else ["u_vsp_x", "u_vsp_y", "u_bow"]
-    yield _of_commands("its commands have the wrong sign", signals, (-1.0, -1.0, -1.0))
-
-
-def _needed(w: Integrals, model: Model, motion: np.ndarray, turn: float = 0.0) -> np.ndarray:
-    """Force (K, 3) that the motion of a run needs [N, N, N m], less its mean.
-
-    Args:
-        w: windows of the run.
-        model: its inertia and hull.
-        motion: (3, 3), what the pose is multiplied with.
-        turn: what is added to the heading [rad].
-    """
-    s = w.smoothed
-    idle = replace(s.track.run, tau_cmd=0.0 * s.track.run.tau_cmd, u=None, five=None, power=None)
-    track = replace(s.track, run=idle)
-    meant = replace(
-        s, track=track, eta=s.eta @ motion.T + [0.0, 0.0, turn], eta_dot=s.eta_dot @ motion.T
-    )
-    with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
-        z = np.nan_to_num(omega(replace(w, smoothed=meant, memory={}), model), posinf=0.0, neginf=0.0)
+def _varying(w: Integrals, model: Model, reading: Reading) -> np.ndarray:
+    """Force (K, 3) that the motion of a run needs by a reading [N, N, N m], less its mean."""
+    z = needed(reread(w, reading), model)
     return z - z.mean(axis=0)
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -20,24 +20,38 @@ DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 PREAMBLE = 200  # lines among which that of the names is looked for; chosen
 
 
-def line_beside(
-    path: Path, changes: Mapping[str, tuple[str, float, float]], name: str | None = None
-) -> str:
+class Change(NamedTuple):
+    """What a signal should be read as.
+
+    Attributes:
+        source: the signal whose column it should have.
+        sign: of its axis.
+        factor: of its unit.
+        offset: what is added then [SI].
+    """
+
+    source: str
+    sign: float = 1.0
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | None = None) -> str:
     """What to put into the file beside a measurement so that columns are read otherwise.
 
     Args:
-        path: of the measurement.
-        changes: signal -> the signal whose column it should have, its sign, and the factor of its unit.
+        path: of the measurement; None if it is in no file.
+        changes: signal -> what it should be read as.
         name: of the column; None: as it is.
 
     Returns:
         The end of a sentence; empty where there is no such file, as beside a log.
     """
-    if path.is_dir() or path.suffix not in (".csv", ".parquet"):
+    if path is None or path.is_dir() or path.suffix not in (".csv", ".parquet") or not changes:
         return ""
     layout = read_layout(path) or Layout()
     columns = {}
-    for signal, (source, sign, factor) in changes.items():
+    for signal, (source, sign, factor, offset) in changes.items():
         column = layout.column(source)
         units = UNITS[QUANTITY[signal]]
         wanted = factor * units.get(column.unit or "", 1.0)
@@ -45,6 +59,10 @@ def line_beside(
         flip = column.flip != (sign < 0.0)
         other = {"name": name or column.name, "unit": unit, "factor": column.factor, "flip": flip}
         other["offset"] = sign * column.offset
+        if unit is None:
+            other |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
+        if offset:
+            other["offset"] += float(f"{offset / units.get(unit or '', 1.0):.4g}")
         columns[signal] = Column.model_validate(other).model_dump(exclude_defaults=True)
         if columns[signal].get("unit") in SI:
             del columns[signal]["unit"]

@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from cosim import InputError
-from cosim.errors import nearest
+from cosim.errors import most_alike, nearest
 
 MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
@@ -172,6 +172,8 @@ def read_layout(path: Path) -> Layout | None:
 def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
     """The signals of a run that a file has: time, pose, and one form of the commands or more.
 
+    A force on an axis that is never commanded needs no column, unless one has nearly its name.
+
     Args:
         layout: which column is which signal.
         names: columns of the file.
@@ -194,9 +196,12 @@ def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
         groups.append(POWER)
     named = [signal for signal in layout.columns if layout is not LOG]
     wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named])
-    for signal in wanted:
+    others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
+    for signal in list(wanted):
         name = layout.column(signal).name
-        if name not in names:
+        if name not in names and signal in TAU and signal not in named and not most_alike(name, others):
+            del wanted[signal]
+        elif name not in names:
             meant = f" (for {signal})" if name != signal else ""
             raise InputError(f"{where} has no column '{name}'{meant}{nearest(name, names)}")
     return list(wanted)

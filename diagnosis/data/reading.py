@@ -6,7 +6,7 @@ files that NTNU publishes of CyberShip Enterprise 1.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +45,8 @@ class Run:
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
         called: signal -> its column in the file, of those with another name; None if there is none.
+        file: that it was read from; None if it was not.
+        absent: commands that have no column, and are taken as zero.
     """
 
     name: str
@@ -57,13 +59,13 @@ class Run:
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
     called: Mapping[str, str] | None = None
+    file: Path | None = None
+    absent: tuple[str, ...] = ()
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
-        parts = (self.u, self.five, self.power, self.held)
-        u, five, power, held = (None if part is None else part[keep] for part in parts)
-        always = self.time[keep], self.pose[keep], self.tau_cmd[keep]
-        return Run(self.name, *always, u, five, power, self.notes, held, self.called)
+        columns = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{n: c[keep] for n, c in columns.items() if isinstance(c, np.ndarray)})
 
 
 def propellers(five: np.ndarray) -> np.ndarray:
@@ -100,11 +102,14 @@ def read(path: str | Path) -> Run:
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     name = path.absolute().parent.name if path.name in LOGS else path.stem
     columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path)
-    return replace(_run(name, columns, f"'{path}'"), called=called or None)
+    return replace(_run(name, columns, f"'{path}'"), called=called or None, file=path)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
     """A run of its signals, commands without a gap."""
+
+    absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
+    columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
 
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
@@ -129,9 +134,10 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
             x, y, bow = u.T
             tau = np.column_stack(thrust(x, y, bow, Allocation()))
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
+    notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
     pose = np.column_stack([columns[s] for s in POSE])
     held = np.any(missing, axis=0) if lost else None
-    return Run(name, columns["time"], pose, tau, u, five, power, notes, held)
+    return Run(name, columns["time"], pose, tau, u, five, power, notes, held, absent=absent)
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:

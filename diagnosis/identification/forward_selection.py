@@ -100,7 +100,10 @@ def search(
     before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
     while len(places) < MOST_EFFECTS:
         advance(f"effect {len(places) + 1}: the best candidates refined")
-        t, ranking, best = reweighted(t, at, ranking)
+        weighed = reweighted(t, at, ranking)
+        if weighed is None:
+            break
+        t, ranking, best = weighed
         total = float(np.sum((lacking * t.weight) ** 2))
         first = best.scored[0]
         without = best.winner.without(best.starts[first.candidate].values)
@@ -154,11 +157,12 @@ def searched_again(
             beside = at.without(found[k].names)
             beside = refit(t, beside, nuisance(t, beside, t.error(beside))).estimate
             ranking = rank(t, beside, {p.id for p in others})
-            again, _, best = reweighted(t, beside, ranking)
-            chosen = better(found[k].id, best, at.start.ship)
-            if chosen is None:
+            weighed = reweighted(t, beside, ranking)
+            chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
+            if weighed is None or chosen is None:
                 continue
-            t, changed = again, True
+            t, _, best = weighed
+            changed = True
             found[k] = place(best, rng, chosen)
             at = best.of(chosen)
         if not changed:

@@ -164,7 +164,9 @@ def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
     return Shortlist([e.id for e in effects], starts, refined, table, scored)
 
 
-def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[TrainingSet, Ranking, Shortlist]:
+def reweighted(
+    t: TrainingSet, at: Estimate, ranking: Ranking
+) -> tuple[TrainingSet, Ranking, Shortlist] | None:
     """A shortlist in which an error counts by what even the best candidate leaves over.
 
     Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
@@ -172,7 +174,7 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
     it is correlated over more windows than overlap, fewer count as independent, by the same factor on
     all axes (the geometric mean of theirs): that an axis lacks something that lasts is no reason to
     believe the others more. On no axis does it count more than the error before, which a wrong winner
-    may have made larger.
+    may have made larger. None: weighed so, no candidate has a signal, and nothing can be told.
 
     Args:
         t, at, ranking: all candidates beside a model.
@@ -180,6 +182,8 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
     least = ranking.table.sigma
     t = replace(t, sigma=least)
     most = np.sqrt(np.mean(ranking.base**2, axis=0))
+    if not ranking.order:
+        return None
     found = shortlist(t, at, ranking)
     for _ in range(REWEIGHTINGS):
         left = found.refined[found.scored[0].candidate].left
@@ -191,6 +195,8 @@ def reweighted(t: TrainingSet, at: Estimate, ranking: Ranking) -> tuple[Training
             break
         t = replace(t, sigma=sigma)
         ranking = weighted(t, sigma, ranking.base, ranking.nuisance, ranking.candidates)
+        if not ranking.order:
+            return None
         found = shortlist(t, at, ranking)
     return t, ranking, found
 

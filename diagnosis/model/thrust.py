@@ -45,6 +45,13 @@ def places(run: Run) -> tuple[float, ...]:
     return ASIDE if run.five is not None else (0.0,)
 
 
+def full_thrust(model: Model) -> np.ndarray:
+    """(3,), force and moment [N, N, N m] that the model's thrusters give at the most on each axis."""
+    F_vsp, F_bow, l_vsp, l_bow, p_x, _ = model.drive.params.allocation
+    levers = abs(l_vsp + p_x), abs(l_bow + p_x)
+    return np.array([F_vsp, F_vsp + F_bow, levers[0] * F_vsp + levers[1] * F_bow])
+
+
 def placed(drive: chain.Prepared, aside: Any, power: chain.Power | None) -> chain.Prepared:
     """Thrusters that sit ``aside`` [m] to starboard of where they are, at a power of the run."""
     p = drive.params

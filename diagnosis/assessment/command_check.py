@@ -1,0 +1,99 @@
+"""Whether the commands of a run can be its own, by what the thrusters give and what the ship does."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Run
+from ..data.columns import TAU
+from ..model import Integrals, Model, integrals
+from ..model.thrust import full_thrust
+from .readings import inertial, needed
+
+# Times the full thrust, beyond which a command is no force of these thrusters. Chosen: a model may count
+# one thruster of two, a request may be logged before it is clipped; the nearest wrong unit is a hundred.
+MOST_THRUST = 3.0
+NEGLIGIBLE = 0.05  # of the impulse of an axis, or of its windows: so much may be false (chosen)
+LEAST = 0.1  # of a constant force; a motion that needs less does not contradict it (chosen)
+SILENT = 1e-6  # of the largest command; less is none, and varies no more than rounding
+# Of the force that the motion needs elsewhere, or would need if inertia and hull did not balance each
+# other: so much without any command is a force that was not logged. Chosen.
+MOVES_ON = 0.5
+LONG = 20  # windows without any command, 10 s: the ship has forgotten the thrust before
+
+
+def beyond_thrusters(run: Run, model: Model) -> str | None:
+    """A clause about commands that the thrusters cannot give, where these matter.
+
+    Args:
+        run: with its commands.
+        model: its thrusters.
+    """
+    if run.u is not None or run.five is not None:
+        return None  # shares of the full thrust, see :func:`diagnosis.read`
+    full, size = full_thrust(model), np.abs(run.tau_cmd)
+    beyond = size > MOST_THRUST * full
+    share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
+    if share.max() <= NEGLIGIBLE:
+        return None
+    k = int(np.argmax((size / full).max(axis=0) * (share > NEGLIGIBLE)))
+    rows, unit = int(beyond[:, k].sum()), "N.m" if k == 2 else "N"
+    seen = (
+        f"{TAU[k]} reaches {size[:, k].max():.4g} {unit} and is more than {MOST_THRUST:g} times the "
+        f"{full[k]:.4g} {unit} that the thrusters give in {rows} of {len(size)} rows"
+    )
+    if 2 * rows > len(size):
+        return seen
+    return f"{seen}: leave the cells of false commands empty, and log commands after they are clipped"
+
+
+def contradicted_commands(w: Integrals, model: Model) -> str | None:
+    """A clause about commands that are constant, or absent, while the motion shows that others acted.
+
+    Args:
+        w: windows of the run.
+        model: its inertia and hull.
+    """
+    tau, run = w.run.tau_cmd, w.run
+    largest = np.abs(tau).max()
+    varies = np.ptp(tau, axis=0) > SILENT * largest
+    if not varies.any():
+        return "none of its commands ever varies, which tells nothing of what the ship does with them"
+    z = needed(w, model)
+    size = np.sqrt((z**2).mean(axis=0))
+    for k in np.flatnonzero(~varies):
+        name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
+        opposed = (z[:, k] * given > 0.0).mean() < NEGLIGIBLE and size[k] > LEAST * abs(given)
+        if opposed and abs(given) > SILENT * largest:
+            return (
+                f"{name} is {given:.3g} {unit} in all rows, and the motion needs {z[:, k].mean():.3g} "
+                f"{unit} all the time: another column is meant, or it was not logged"
+            )
+        inertia = inertial(w, model)[:, k]
+        parts = np.abs(inertia) + np.abs(z[:, k] - inertia)
+        if name in run.absent and size[k] > MOVES_ON * np.sqrt((parts**2).mean()):
+            return (
+                f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
+                "if nothing was commanded there, give it a column of zeros"
+            )
+    return _moves_on(w, model, size)
+
+
+def _moves_on(w: Integrals, model: Model, size: np.ndarray) -> str | None:
+    """A clause about a ship that goes on as before while all of its commands are zero."""
+    s, tau = w.smoothed, w.run.tau_cmd
+    if not (np.abs(tau).max(axis=1) == 0.0).any():
+        return None
+    always = replace(w.run, tau_cmd=np.ones_like(tau), u=None, five=None)
+    every = integrals(replace(s, track=replace(s.track, run=always)))
+    idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
+    if idle.sum() < LONG:
+        return None
+    still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
+    if (still < MOVES_ON * size).any():
+        return None
+    return (
+        f"all commands are zero for {0.5 * idle.sum():.0f} s, and the motion needs "
+        f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: "
+        "leave the cells of commands that were not logged empty"
+    )

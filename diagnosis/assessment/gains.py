@@ -1,0 +1,105 @@
+"""How much acceleration the commands of a run give, by which units and clocks tell themselves.
+
+On each axis the inertial force of the motion, a = M nu_dot + C nu in weak form, is regressed on the
+commanded forces T, beside all that else may act on a hull: the model's damping and others of other sizes
+(u, v, r, |nu| nu, u r, u v), a force of the surroundings and one that is constant,
+
+    a_j = k_j T_j + sum_i g_i T_i + sum_i b_i x_i + remainder.
+
+k is one for the model's inertia and thrusters in the right units, whatever the drag or the current. A
+length in another unit multiplies it by that unit on the axes of force, a force divides it, and a clock
+that runs s times too fast divides it by s^2 on all axes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Integrals, Model
+from ..model.correlation import correlated_windows
+from .readings import inertial, needed
+
+# Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the
+# foot, the smallest of the units: sqrt(2 * 3.28). So much less on all axes at once is a clock or a unit.
+MOST = 2.5
+# Of k, on one axis: a thruster that gives a tenth, or none, is a matter of the diagnosis. Derived: half
+# of the way, in logarithms, to the nearest wrong unit of a force or moment, a hundredth.
+LEAST = 0.1
+# Share of what is left of a by all else that T explains: with less it is not T that moves the ship.
+EXPLAINED = 0.5
+SURE = 3.0  # standard errors
+SILENT = 1e-6  # of the largest commanded force; less is no command, and varies no more than rounding
+NEGLIGIBLE = 1e-10  # relative size of a singular value
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """k of each axis; NaN where nothing varies.
+
+    Attributes:
+        value, error: (3,), k and its standard error.
+        told: (3,), whether the commands of that axis explain most of its inertial force.
+    """
+
+    value: np.ndarray
+    error: np.ndarray
+    told: np.ndarray
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """(3,), axes whose k no ship has whose model is within a factor of MOST."""
+        low, high = self.value - SURE * self.error, self.value + SURE * self.error
+        weak = (self.told & (high < 1.0 / MOST))[np.isfinite(self.value)]
+        return self.told & ((low > MOST) | (high < LEAST) | weak.all())
+
+    @property
+    def mean(self) -> float | None:
+        """Geometric mean of the wrong axes, each as well as it is known; None if none is."""
+        known = self.wrong & (self.value > 0.0)
+        if not known.any():
+            return None
+        weights = (self.value[known] / self.error[known]) ** 2
+        return float(np.exp(np.average(np.log(self.value[known]), weights=weights)))
+
+    @property
+    def sound(self) -> bool:
+        """Whether no axis is wrong."""
+        return not self.wrong.any()
+
+    @property
+    def close(self) -> bool:
+        """Whether all that are told are within a factor of MOST of one."""
+        near = (self.value * MOST > 1.0) & (self.value < MOST)
+        return bool(self.told.any() and near[self.told].all())
+
+
+def gains(w: Integrals, model: Model) -> Gains:
+    """The acceleration that the commands of a run give, as shares of what they should give.
+
+    Args:
+        w: windows of the run.
+        model: its inertia and damping.
+    """
+    a, z, T = inertial(w, model), needed(w, model), w.held @ w.run.tau_cmd
+    moves = T.std(axis=0) > SILENT * np.abs(T).max()
+    psi = w.smoothed.eta[:, 2]
+    u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
+    north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
+    earth = ([north, east], [-east, north], [])
+    value, error, left = np.full(3, np.nan), np.full(3, np.nan), np.zeros_like(a)
+    told = np.zeros(3, bool)
+    for j in np.flatnonzero(moves):
+        others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
+        states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth[j]]
+        x = np.column_stack(
+            [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
+        )
+        size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
+        inverse = np.linalg.pinv(x / size, rcond=NEGLIGIBLE)
+        beta = inverse @ a[:, j]
+        left[:, j] = a[:, j] - x / size @ beta
+        free = max(len(a) - len(beta), 1)
+        variance = left[:, j] @ left[:, j] / free * (inverse[0] @ inverse[0])
+        value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
+        told[j] = beta[0] ** 2 > EXPLAINED * (beta[0] ** 2 + free * variance)
+    return Gains(value, error * np.sqrt(correlated_windows([w], left)), told)

@@ -1,0 +1,157 @@
+"""Other ways to read a measurement: axes that point elsewhere, other units, clocks, columns."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..data import Run
+from ..data.beside import Change
+from ..data.columns import FIVE, POSE, TAU, THREE, UNITS
+from ..model import Integrals, Model, omega
+from ..model.thrust import full_thrust
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Another way to read a file.
+
+    Attributes:
+        mistake: what is wrong if it is right, as a clause.
+        changes: signal -> what its column should be read as.
+        motion: (3, 3), from the pose as it was read to the pose as it was meant.
+        commands: (3, 3), the same of the commanded force.
+        turn: what is added to the heading [rad].
+        pace: of the clock, seconds meant for a second read.
+    """
+
+    mistake: str
+    changes: Mapping[str, Change] = field(default_factory=dict)
+    motion: np.ndarray = field(default_factory=lambda: np.eye(3))
+    commands: np.ndarray = field(default_factory=lambda: np.eye(3))
+    turn: float = 0.0
+    pace: float = 1.0
+
+    @property
+    def still(self) -> bool:
+        """Whether the motion is as it was read."""
+        return np.array_equal(self.motion, np.eye(3)) and self.turn == 0.0 and self.pace == 1.0
+
+
+AS_READ = Reading("nothing")
+
+
+def of_pose(mistake: str, factors: Sequence[float]) -> Reading:
+    """A pose with factors (3,) on its channels."""
+    changes = {s: Change(s, np.sign(f), abs(f)) for s, f in zip(POSE, factors, strict=True) if f != 1.0}
+    return Reading(mistake, changes, motion=np.diag(factors))
+
+
+def of_commands(mistake: str, factors: Sequence[float]) -> Reading:
+    """A commanded force with factors (3,)."""
+    changes = {s: Change(s, np.sign(f), abs(f)) for s, f in zip(TAU, factors, strict=True) if f != 1.0}
+    return Reading(mistake, changes, commands=np.diag(factors))
+
+
+def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
+    """Two columns of the pose or of the commands in each other's place."""
+    order = np.eye(3)
+    order[[i, k]] = order[[k, i]]
+    pair = signals[i], signals[k]
+    changes = {a: Change(b) for a, b in (pair, pair[::-1])}
+    which = {"motion": order} if signals is POSE else {"commands": order}
+    return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, **which)
+
+
+def directions(run: Run) -> Iterator[Reading]:
+    """Readings in which axes point elsewhere, columns are swapped, or the heading is in degrees."""
+    yield of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0))
+    yield of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0))
+    yield of_pose("x points south (north is positive here)", (-1.0, 1.0, 1.0))
+    yield of_pose(
+        "y points west and its heading is mirrored, as in axes east and north", (1.0, -1.0, -1.0)
+    )
+    yield swapped(POSE, 0, 1)
+    yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
+    wrong = "its commands have the wrong sign"
+    if run.u is None and run.five is None:
+        yield of_commands(wrong, (-1.0, -1.0, -1.0))
+        for k, name in enumerate(TAU):
+            yield of_commands(f"{name} has the wrong sign", 1.0 - 2.0 * np.eye(3)[k])
+        yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
+    else:
+        signals = FIVE if run.five is not None else THREE
+        yield Reading(wrong, {s: Change(s, -1.0) for s in signals}, commands=-np.eye(3))
+
+
+def units(run: Run, model: Model) -> Iterator[Reading]:
+    """Readings in which the pose or the commands are in other units.
+
+    Args:
+        run: whose commands are tau.
+        model: whose thrusters' full force is a percentage's whole.
+    """
+    for unit, size in UNITS["length"].items():
+        yield of_pose(f"its position is in {unit}", (size, size, 1.0))
+        yield of_pose(f"x is in {unit}", (size, 1.0, 1.0))
+        yield of_pose(f"y is in {unit}", (1.0, size, 1.0))
+    half = Change("psi", offset=np.pi)
+    yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
+    if run.u is not None or run.five is not None:
+        return
+    forces, moments = UNITS["force"], UNITS["moment"]
+    yield of_commands("its commands are in percent of the full thrust", 0.01 * full_thrust(model))
+    yield from (of_commands(f"tau_N is in {u}", (1.0, 1.0, moments[u])) for u in moments if u != "N.m")
+    for unit, moment in (("mN", "N.mm"), ("kN", "kN.m")):
+        f = forces[unit]
+        yield of_commands(f"its commands are in {unit} and {moment}", (f, f, f))
+        yield of_commands(f"tau_X and tau_Y are in {unit}", (f, f, 1.0))
+        yield of_commands(f"tau_X is in {unit}", (f, 1.0, 1.0))
+        yield of_commands(f"tau_Y is in {unit}", (1.0, f, 1.0))
+
+
+def other_factors(run: Run, k: float) -> Iterator[Reading]:
+    """Readings in a unit that has no name here, or of a clock that runs at another pace.
+
+    Args:
+        run: its commands.
+        k: how many times what the commands should give the ship accelerates.
+    """
+    yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
+    if run.u is None and run.five is None:
+        yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
+    clock = {"time": Change("time", factor=k**0.5)}
+    yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
+
+
+def reread(w: Integrals, reading: Reading) -> Integrals:
+    """The windows of a run by another reading, its commands as forces."""
+    s, run = w.smoothed, w.run
+    given = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T, u=None, five=None, power=None)
+    meant = replace(
+        s,
+        track=replace(s.track, run=given),
+        eta=s.eta @ reading.motion.T + [0.0, 0.0, reading.turn],
+        eta_dot=s.eta_dot @ reading.motion.T / reading.pace,
+    )
+    return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory={})
+
+
+def needed(w: Integrals, model: Model) -> np.ndarray:
+    """Force (K, 3) that the motion of a run needs [N, N, N m].
+
+    Args:
+        w: windows of the run.
+        model: its inertia and hull.
+    """
+    idle = replace(w.run, tau_cmd=0.0 * w.run.tau_cmd, u=None, five=None, power=None)
+    s = replace(w.smoothed, track=replace(w.smoothed.track, run=idle))
+    with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
+        return np.nan_to_num(omega(replace(w, smoothed=s, memory={}), model), posinf=0.0, neginf=0.0)
+
+
+def inertial(w: Integrals, model: Model) -> np.ndarray:
+    """The part (K, 3) of it that is not damping: M nu_dot + C nu [N, N, N m]."""
+    of_hull, coefficients = model.ship.parameters["vessel"], model.ship.coefficients
+    none = {name: 0.0 for name in of_hull if coefficients.get(name)}
+    return needed(w, replace(model, vessel=dict(model.vessel) | none))
