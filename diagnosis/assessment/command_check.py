@@ -16,8 +16,10 @@ MOST_THRUST = 3.0
 NEGLIGIBLE = 0.05  # of the impulse of an axis, or of its windows: so much may be false (chosen)
 LEAST = 0.1  # of a constant force; a motion that needs less does not contradict it (chosen)
 SILENT = 1e-6  # of the largest command; less is none, and varies no more than rounding
-# Of the force that the motion needs elsewhere, or would need if inertia and hull did not balance each
-# other: so much without any command is a force that was not logged. Chosen.
+# Of what inertia and hull need: without a command they balance each other, up to what coefficients that
+# are known to 10 % leave. Chosen: twice that.
+UNBALANCED = 0.2
+# Of the force that the motion needs elsewhere: so much without any command was not logged. Chosen.
 MOVES_ON = 0.5
 LONG = 20  # windows without any command, 10 s: the ship has forgotten the thrust before
 
@@ -70,8 +72,8 @@ def contradicted_commands(w: Integrals, model: Model) -> str | None:
                 f"{unit} all the time: another column is meant, or it was not logged"
             )
         inertia = inertial(w, model)[:, k]
-        parts = np.abs(inertia) + np.abs(z[:, k] - inertia)
-        if name in run.absent and size[k] > MOVES_ON * np.sqrt((parts**2).mean()):
+        parts = inertia**2 + (z[:, k] - inertia) ** 2
+        if name in run.absent and size[k] > UNBALANCED * np.sqrt(parts.mean()):
             return (
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"

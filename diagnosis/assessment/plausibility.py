@@ -116,11 +116,15 @@ def likeliest_unit(w: Integrals, model: Model, given: Gains) -> Reading | None:
         model: its inertia, hull and thrusters.
         given: its gains as it was read.
     """
-    named = _of_least_error(w, model, units(w.run, model))
-    return named or (given.mean and _of_least_error(w, model, other_factors(w.run, given.mean))) or None
+    named = _of_least_error(w, model, given, units(w.run, model))
+    if named is not None or given.mean is None:
+        return named
+    return _of_least_error(w, model, given, other_factors(w.run, given.mean))
 
 
-def _of_least_error(w: Integrals, model: Model, readings: Iterable[Reading]) -> Reading | None:
+def _of_least_error(
+    w: Integrals, model: Model, given: Gains, readings: Iterable[Reading]
+) -> Reading | None:
     """Of the readings with plausible commands that in which the model's error is the least part of them.
 
     The median of the axes counts: what is hidden in the ship is mostly on one.
@@ -129,7 +133,9 @@ def _of_least_error(w: Integrals, model: Model, readings: Iterable[Reading]) -> 
     for reading in readings:
         meant = reread(w, reading)
         with np.errstate(all="ignore"):
-            if not gains(meant, model).close or beyond_thrusters(meant.run, model):
+            then = gains(meant, model)
+            told = (then.told | ~given.told).all()
+            if not (told and then.close) or beyond_thrusters(meant.run, model):
                 continue
             T = meant.held @ meant.run.tau_cmd
             off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)

@@ -5,6 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fmus.declare import variables
+from fmus.hull import Damping
+
 from ..data import Run
 from ..data.beside import Change
 from ..data.columns import FIVE, POSE, TAU, THREE, UNITS
@@ -59,8 +62,8 @@ def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     order[[i, k]] = order[[k, i]]
     pair = signals[i], signals[k]
     changes = {a: Change(b) for a, b in (pair, pair[::-1])}
-    which = {"motion": order} if signals is POSE else {"commands": order}
-    return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, **which)
+    motion, commands = (order, np.eye(3)) if signals is POSE else (np.eye(3), order)
+    return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, motion, commands)
 
 
 def directions(run: Run) -> Iterator[Reading]:
@@ -77,7 +80,7 @@ def directions(run: Run) -> Iterator[Reading]:
     if run.u is None and run.five is None:
         yield of_commands(wrong, (-1.0, -1.0, -1.0))
         for k, name in enumerate(TAU):
-            yield of_commands(f"{name} has the wrong sign", 1.0 - 2.0 * np.eye(3)[k])
+            yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
         yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
     else:
         signals = FIVE if run.five is not None else THREE
@@ -100,7 +103,9 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
     if run.u is not None or run.five is not None:
         return
     forces, moments = UNITS["force"], UNITS["moment"]
-    yield of_commands("its commands are in percent of the full thrust", 0.01 * full_thrust(model))
+    yield of_commands(
+        "its commands are in percent of the full thrust", (0.01 * full_thrust(model)).tolist()
+    )
     yield from (of_commands(f"tau_N is in {u}", (1.0, 1.0, moments[u])) for u in moments if u != "N.m")
     for unit, moment in (("mN", "N.mm"), ("kN", "kN.m")):
         f = forces[unit]
@@ -152,6 +157,5 @@ def needed(w: Integrals, model: Model) -> np.ndarray:
 
 def inertial(w: Integrals, model: Model) -> np.ndarray:
     """The part (K, 3) of it that is not damping: M nu_dot + C nu [N, N, N m]."""
-    of_hull, coefficients = model.ship.parameters["vessel"], model.ship.coefficients
-    none = {name: 0.0 for name in of_hull if coefficients.get(name)}
+    none = {v.name: 0.0 for v in variables(Damping)}
     return needed(w, replace(model, vessel=dict(model.vessel) | none))

@@ -26,7 +26,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from cosim import InputError
-from cosim.errors import most_alike, nearest
+from cosim.errors import nearest
 
 MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
@@ -199,9 +199,14 @@ def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):
         name = layout.column(signal).name
-        if name not in names and signal in TAU and signal not in named and not most_alike(name, others):
+        if name not in names and signal in TAU and signal not in named and not _named_so(signal, others):
             del wanted[signal]
         elif name not in names:
             meant = f" (for {signal})" if name != signal else ""
             raise InputError(f"{where} has no column '{name}'{meant}{nearest(name, names)}")
     return list(wanted)
+
+
+def _named_so(signal: str, names: Sequence[str]) -> bool:
+    """Whether some name holds a signal's, but for case and lines between words."""
+    return any(signal.casefold().replace("_", "") in n.casefold().replace("_", "") for n in names)

@@ -102,6 +102,7 @@ def search(
         advance(f"effect {len(places) + 1}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
+            t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
             break
         t, ranking, best = weighed
         total = float(np.sum((lacking * t.weight) ** 2))
