@@ -17,6 +17,7 @@ import numpy as np
 
 from ..model import Integrals, Model
 from ..model.correlation import correlated_windows
+from ..model.weak_form import OVERLAP
 from .readings import inertial, needed
 
 # Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the
@@ -94,6 +95,8 @@ def gains(w: Integrals, model: Model) -> Gains:
         x = np.column_stack(
             [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
         )
+        if len(a) < OVERLAP * x.shape[1] or not np.isfinite(x).all():
+            continue  # of fewer independent windows than unknowns nothing is told
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = np.linalg.pinv(x / size, rcond=NEGLIGIBLE)
         beta = inverse @ a[:, j]

@@ -67,7 +67,8 @@ def refuse_implausible(runs: Sequence[Integrals], model: Model) -> None:
         InputError: with the likeliest mistake, and the line for the file beside the measurement.
     """
     for w in runs:
-        found = _refusal(w, model)
+        with np.errstate(all="ignore"):  # in a wrong unit sums of squares may be beyond all numbers
+            found = _refusal(w, model)
         if found:
             seen, changes, name = found
             told = line_beside(w.run.file, changes, name)
@@ -132,14 +133,13 @@ def _of_least_error(
     found = []
     for reading in readings:
         meant = reread(w, reading)
-        with np.errstate(all="ignore"):
-            then = gains(meant, model)
-            told = (then.told | ~given.told).all()
-            if not (told and then.close) or beyond_thrusters(meant.run, model):
-                continue
-            T = meant.held @ meant.run.tau_cmd
-            off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
-        found.append((float(np.nan_to_num(np.nanmedian(off), nan=np.inf)), reading))
+        then = gains(meant, model)
+        told = (then.told | ~given.told).all()
+        if not (told and then.close) or beyond_thrusters(meant.run, model):
+            continue
+        T = meant.held @ meant.run.tau_cmd
+        off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
+        found.append((float(np.median(np.nan_to_num(off, nan=np.inf))), reading))
     return min(found, key=lambda each: each[0])[1] if found else None
 
 
