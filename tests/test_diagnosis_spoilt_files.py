@@ -101,7 +101,7 @@ def test_line_that_is_told_mends_the_file(tmp_path):
     ("table", "message"),
     [
         (lambda t: t.iloc[::15], "a measurement every 0.75 s is too rare"),
-        (lambda t: struck("x", 0.2, 1.0)(t, np.random.default_rng(0)), "where all others say"),
+        (lambda t: struck("x", 0.15, 1.0)(t, np.random.default_rng(0)), "where all others say"),
     ],
 )
 def test_pose_that_gives_no_velocity_is_refused(table, message, tmp_path):

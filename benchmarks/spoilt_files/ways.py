@@ -42,7 +42,7 @@ def edit(columns: Sequence[str], change: Callable[[pd.DataFrame], pd.DataFrame])
 
     def spoil(table: pd.DataFrame, _: np.random.Generator) -> pd.DataFrame:
         table = table.copy()
-        table[list(columns)] = change(table[list(columns)]).to_numpy()
+        table[list(columns)] = change(table.loc[:, list(columns)]).to_numpy()
         return table
 
     return spoil
@@ -53,7 +53,7 @@ def scaled(columns: Sequence[str], factor: float) -> Spoil:
 
 
 def exchanged(a: str, b: str) -> Spoil:
-    return edit([a, b], lambda part: part[[b, a]])
+    return edit([a, b], lambda part: part.loc[:, [b, a]])
 
 
 def constant(columns: Sequence[str], values: Sequence[float], since: float = 0.0) -> Spoil:
@@ -73,7 +73,7 @@ def rows(choose: Callable[[int], np.ndarray]) -> Spoil:
 
 
 def while_time(seconds: float) -> Spoil:
-    return lambda table, _: table[table["time"] - table["time"].iloc[0] < seconds]
+    return lambda table, _: table.loc[table["time"] - table["time"].iloc[0] < seconds]
 
 
 def held(columns: Sequence[str], kept: Callable[[np.ndarray], np.ndarray]) -> Spoil:
@@ -186,7 +186,7 @@ for name, unit in {
 add("x_mm", scaled(["x"], 1e3))
 add("feet_x", scaled(["x"], 1.0 / 0.3048))
 add("degrees", scaled(["psi"], 180.0 / np.pi))
-add("degrees_360", edit(["psi"], lambda psi: np.degrees(psi) % 360.0))
+add("degrees_360", edit(["psi"], lambda psi: psi * (180.0 / np.pi) % 360.0))
 add("wrap_2pi", edit(["psi"], lambda psi: psi % (2.0 * np.pi)))
 
 for name, columns in {
