@@ -16,11 +16,7 @@ from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
 from cosim.process import end_with_parent, without_program
 
 from .assessment.plausibility import refuse_implausible
-from .assessment.plausibility import refuse_implausible
 from .data import Run, Track, clean, read, thinned
-from .data.unit_check import GO_ON
-from .model import Integrals, Model, integrals
-from .model.weak_form import WIDTH
 from .data.unit_check import GO_ON
 from .model import Integrals, Model, integrals
 from .model.weak_form import WIDTH
