@@ -22,10 +22,10 @@ from .readings import inertial, needed
 
 # Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the
 # foot, the smallest of the units: sqrt(2 * 3.28). So much less on all axes at once is a clock or a unit.
-MOST = 2.5
+MOST_GAIN = 2.5
 # Of k, on one axis: a thruster that gives a tenth, or none, is a matter of the diagnosis. Derived: half
 # of the way, in logarithms, to the nearest wrong unit of a force or moment, a hundredth.
-LEAST = 0.1
+LEAST_GAIN = 0.1
 # Share of what is left of a by all else that T explains: with less it is not T that moves the ship.
 EXPLAINED = 0.5
 SURE = 3.0  # standard errors
@@ -48,10 +48,10 @@ class Gains:
 
     @property
     def wrong(self) -> np.ndarray:
-        """(3,), axes whose k no ship has whose model is within a factor of MOST."""
+        """(3,), axes whose k no ship has whose model is within a factor of MOST_GAIN."""
         low, high = self.value - SURE * self.error, self.value + SURE * self.error
-        weak = (self.told & (high < 1.0 / MOST))[np.isfinite(self.value)]
-        return self.told & ((low > MOST) | (high < LEAST) | weak.all())
+        weak = (self.told & (high < 1.0 / MOST_GAIN))[np.isfinite(self.value)]
+        return self.told & ((low > MOST_GAIN) | (high < LEAST_GAIN) | weak.all())
 
     @property
     def mean(self) -> float | None:
@@ -69,8 +69,8 @@ class Gains:
 
     @property
     def close(self) -> bool:
-        """Whether all that are told are within a factor of MOST of one."""
-        near = (self.value * MOST > 1.0) & (self.value < MOST)
+        """Whether all that are told are within a factor of MOST_GAIN of one."""
+        near = (self.value * MOST_GAIN > 1.0) & (self.value < MOST_GAIN)
         return bool(self.told.any() and near[self.told].all())
 
 
