@@ -207,6 +207,8 @@ class TestPasses:
         one, two = by_run(both)
         assert [s.names for s in (one, two)] == [["made"], ["other"]]
         assert (one.time == a.time).all()
+        b.run[:] = "made"
+        assert [s.time.size for s in by_run(joined([a, b]))] == [700, 700], "of one name, as logs/0 are"
         found = cp.identify([one, two])
         assert found.passed == pytest.approx([1.0, 1.0], abs=0.01)
 
