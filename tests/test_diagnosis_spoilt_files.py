@@ -64,7 +64,6 @@ TOLD = [
     ("tau_N_Nmm", column(tau_N={"unit": "N.mm"})),
     ("tau_percent", "times the 1.165 N that the thrusters give"),
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
-    ("time_tenth", '{"time": {"name": "time", "factor": '),
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "none of its commands ever varies"),
     ("outliers_tau", "leave the cells of false commands empty"),
