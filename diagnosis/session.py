@@ -27,6 +27,7 @@ from .prediction_error.predicted_bands import prediction_bands
 from .prediction_error.refit import to_predictions
 from .prediction_error.unrecorded import Unrecorded
 from .progress import Advance, silent
+from .unseen import harm
 from .withdrawal import Unseen, Withdrawn, withdraw
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
@@ -198,7 +199,10 @@ def diagnose(
     advance("fit to predictions")
     something = bool(learned.effects) or refitted
     fit = to_predictions(learned, train, NominalPrior.of(start, prior), something)
-    learned = fit.findings
+    if held_out and harm(*unseen.losses(fit.findings.model, start)):
+        # The fit by the model error was held against these runs already.
+        fit = fit.about(learned)
+    learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)
     comparison = replace(

@@ -105,6 +105,39 @@ def test_a_shape_parameter_is_tried_by_value_and_stays_in_its_range(craft):
     assert [s.given["drag_exponent"] for s in shapes] == [-1.0, 0.0, 1.0], "additions to the model's 2"
 
 
+CIRCLE = """
+from typing import Annotated
+
+from fmus.declare import Range
+from fmus.effects import effect
+from fmus.ops import where
+
+
+@effect("circle", "force", "X", formula="X = k within a circle", linear=False)
+def circle(
+    ship,
+    circle_force: Annotated[float, "N", "force"] = 0.0,
+    circle_radius: Annotated[float, "m", "radius", Range(0.1, 5.0)] = 0.5,
+):
+    """A force within a circle."""
+    north, east = ship.x - 3.5, ship.y - 8.5
+    inside = north * north + east * east < circle_radius * circle_radius
+    return where(inside, circle_force, 0.0), 0.0, 0.0
+"""
+
+
+@pytest.mark.slow
+def test_interval_of_a_radius_holds_the_truth_and_is_no_curvature(craft):
+    """The slope by a radius is made of the few samples between two circles."""
+    mine = craft(CIRCLE)
+    w = windows(240.0, ship={"circle_force": -0.3, "circle_radius": 1.9}, craft=mine)
+    first = learn(w, mine).effects[0]
+    assert first.id == "circle"
+    low, high = first.ci95["circle_radius"]
+    assert low < 1.4 < high, "additions to the 0.5 m that it starts from"
+    assert high - low < 0.1
+
+
 @pytest.mark.slow
 def test_nonlinear_effect_that_saturates_is_found_without_values_to_try(craft):
     mine = craft(BELL)

@@ -53,7 +53,7 @@ def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str
     """
     rough = [n for n in p.names if is_rough(t, at, n)]
     if len(rough) != 1:
-        return at, dict.fromkeys(rough, (np.nan, np.nan))
+        return at.holding(rough), dict.fromkeys(rough, (np.nan, np.nan))
     (name,) = rough
     trial = _profile(t, at, p, name)
     present = at.start.value(name) + at.values[name]
@@ -65,10 +65,10 @@ def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str
     value = best.estimate.values[name]
     low, high = (_end(trial, best.cost, at.start.value(name) + value, sign) for sign in (-1.0, 1.0))
     start = at.start.value(name)
-    own = [n for n in p.names if n in at.fitted]
-    kept = [at.fitted.index(n) for n in own]
-    precision = block_diag(best.estimate.precision, at.precision[kept][:, kept])
-    return replace(best.estimate, precision=np.asarray(precision)), {name: (low - start, high - start)}
+    own = [at.fitted.index(n) for n in p.names if n in at.fitted and n != name]
+    precision = np.asarray(block_diag(best.estimate.precision, at.precision[own][:, own]))
+    last = replace(best.estimate, precision=precision, held=at.held | {name})
+    return last, {name: (low - start, high - start)}
 
 
 def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:

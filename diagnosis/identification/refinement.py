@@ -69,12 +69,14 @@ class Estimate:
         offset: nominal coefficients, each in prior standard deviations from its prior mean.
         values: parameters of the effects that were found, as additions.
         precision: prior precision of those of them that are fitted.
+        held: values that stay as they are, as their effect is not smooth in them.
     """
 
     start: Model
     offset: np.ndarray
     values: Mapping[str, float] = field(default_factory=dict)
     precision: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    held: frozenset[str] = frozenset()
 
     @classmethod
     def at(cls, start: Model, prior: NominalPrior) -> "Estimate":
@@ -88,13 +90,19 @@ class Estimate:
     @property
     def fitted(self) -> list[str]:
         """Those values that are fitted by slopes."""
-        return [n for n in self.values if timed(self.start.ship, n) is None]
+        ship = self.start.ship
+        return [n for n in self.values if n not in self.held and timed(ship, n) is None]
 
     def without(self, names: Collection[str]) -> "Estimate":
         """The estimate without the values of some effects."""
         kept = [k for k, n in enumerate(self.fitted) if n not in names]
         values = {n: v for n, v in self.values.items() if n not in names}
         return replace(self, values=values, precision=self.precision[kept][:, kept])
+
+    def holding(self, names: Collection[str]) -> "Estimate":
+        """The estimate with further values that stay as they are."""
+        kept = [k for k, n in enumerate(self.fitted) if n not in names]
+        return replace(self, precision=self.precision[kept][:, kept], held=self.held | set(names))
 
     def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "Estimate":
         """The estimate with additions, effects' parameters within their range."""

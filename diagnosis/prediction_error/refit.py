@@ -33,6 +33,11 @@ class Outcome:
     posterior: Posterior
     unrecorded: Unrecorded
 
+    def about(self, found: Findings) -> "Outcome":
+        """Other findings with the covariance of this fit, by the same parameters."""
+        values = [found.model.value(n.partition(".")[2]) for n in self.posterior.names]
+        return replace(self, findings=found, posterior=replace(self.posterior, mean=np.array(values)))
+
 
 def to_predictions(
     found: Findings, runs: Sequence[Integrals], prior: NominalPrior, fits: bool
