@@ -105,7 +105,7 @@ def test_a_shape_parameter_is_tried_by_value_and_stays_in_its_range(craft):
     assert [s.given["drag_exponent"] for s in shapes] == [-1.0, 0.0, 1.0], "additions to the model's 2"
 
 
-CIRCLE = """
+CIRCLE = '''
 from typing import Annotated
 
 from fmus.declare import Range
@@ -123,7 +123,7 @@ def circle(
     north, east = ship.x - 3.5, ship.y - 8.5
     inside = north * north + east * east < circle_radius * circle_radius
     return where(inside, circle_force, 0.0), 0.0, 0.0
-"""
+'''
 
 
 @pytest.mark.slow
