@@ -14,6 +14,7 @@ import pytest
 
 import cosim
 import diagnosis.assessment
+import diagnosis.decision
 import diagnosis.identification
 import diagnosis.model
 import diagnosis.smoothing
@@ -68,6 +69,7 @@ def constants():
 
 def modules_with_constants():
     """The modules of the diagnosis in which the constants of the table may stand."""
+    yield diagnosis.decision
     parts = (diagnosis.smoothing, diagnosis.model, diagnosis.assessment, diagnosis.identification)
     for part in parts:
         for found in pkgutil.iter_modules(part.__path__, f"{part.__name__}."):

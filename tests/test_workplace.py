@@ -307,7 +307,7 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
         return SimpleNamespace(effects=ids, model=model(left[gone]), moved={})
 
     found = SimpleNamespace(
-        effects=[SimpleNamespace(id="a"), SimpleNamespace(id="b")],
+        effects=[SimpleNamespace(id="a", of_runs=[]), SimpleNamespace(id="b", of_runs=[])],
         model=model(0.1), sigma=np.ones(3), keep=keep,
     )  # fmt: skip
     runs = [SimpleNamespace(held_out=False, integrals=None)]

@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim import InputError, atomic_write
 from diagnosis import (
+    Comparison,
     Integrals,
     Model,
     clean,
@@ -18,10 +21,7 @@ from diagnosis import (
     method,
     smooth,
 )
-from diagnosis.decision import believed
-from diagnosis.identification.acceptance import worse
 from diagnosis.progress import silent
-from diagnosis.session import Comparison
 
 from .cells import Key
 from .problems import Problem, kept, slug
@@ -54,7 +54,8 @@ def answer(problem: Problem, peers: bool) -> Answer:
         return {"note": str(error)}
     seconds = time.process_time() - begun
     found = {name: value for name, value in content.items() if name not in LEFT_OUT}
-    told = [f.evidence for f in diagnosis.learned.effects if believed(f)]
+    pairs = zip(diagnosis.learned.effects, diagnosis.believed, strict=True)
+    told = [f.evidence for f, is_finding in pairs if is_finding]
     found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
     found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
     found["worse"] = [name for name, is_worse in predictions(diagnosis.comparison).items() if is_worse]
@@ -68,8 +69,8 @@ def predictions(comparison: Comparison) -> dict[str, bool]:
     before, after = comparison.evaluations[-1].before.errors, comparison.evaluations[-1].after.errors
     if before is None or after is None:
         return {}
-    names = ("position", "heading")
-    return {n: worse(getattr(after, n) ** 2, getattr(before, n) ** 2) for n in names}
+    changes = {n: getattr(after, n) ** 2 - getattr(before, n) ** 2 for n in ("position", "heading")}
+    return {n: bool(d.sum() > 2.0 * np.sqrt(d.size) * d.std()) for n, d in changes.items()}
 
 
 def truth(problem: Problem, held_out: Integrals) -> float | None:

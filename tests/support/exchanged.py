@@ -29,7 +29,7 @@ def need(case):
 def write(content, path, how, drop=False):
     system = prepare(load_scenario(content))
     try:
-        return how(system, path, drop)
+        return how(system, path, drop, overwrite=True)
     finally:
         system.close()
 
