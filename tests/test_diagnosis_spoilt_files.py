@@ -248,3 +248,11 @@ def test_refusal_is_told_without_the_folder():
     told = outcome("const_tau", good(), ["X_u"], 0)
     assert (told.kind, told.wrong) == ("refused", False)
     assert "tmp" not in told.text
+
+
+def test_models_that_differ_in_the_measurement_alone_are_predicted_together():
+    """As of a heading that is off: only that channel of the pose differs between the models."""
+    w = diagnosis.Windows([windows().smoothed])
+    alone = [w.residuals(Model(vessel={"heading_offset": offset})) for offset in (0.0, 0.1)]
+    together = w.residuals(Model(vessel={"heading_offset": np.array([[0.0], [0.1]])}))
+    np.testing.assert_allclose(together, np.stack(alone), atol=1e-9)

@@ -121,7 +121,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
     found = np.empty((starts.steps + 1, 3, *shape))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
         for k, s in enumerate(propagate(starts, model, thrust)):
-            found[k] = vessel.measured(s, body)
+            found[k] = np.stack(np.broadcast_arrays(*vessel.measured(s, body)))
     return found
 
 
