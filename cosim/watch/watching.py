@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ONE_REQUEST = 0.1
 # Wall time after an interrupt until a process that has not ended in order is killed [s]; chosen: enough
 # for a step and the end of a run, and with what remains to be done a command ends within 2 s.
-GRACE = 1.0
+GRACE = 1.5
 # Wall time between two looks at a process that is to be ended, while interrupts wait in it [s].
 LOOK = 0.1
 # Signals that would end the watching process and mean nothing to it: an FMU may send them to its parent.
