@@ -66,6 +66,7 @@ TOLD = [
     ("time_double", '{"time": {"name": "time", "factor": 0.'),
     ("psi_180", column(psi={"offset": 3.142})),
     ("const_tau", "none of its commands ever varies"),
+    ("const_x", "x is the same number in all rows"),
     ("outliers_tau", "leave the cells of false commands empty"),
     ("commands_zero_half", "all commands are zero for 2"),
 ]

@@ -81,6 +81,10 @@ def _refusal(w: Integrals, model: Model) -> tuple[str, Mapping[str, Change], str
     if twice:
         seen = f"{twice[0]} and {twice[1]} are the same numbers"
         return seen, {twice[1]: Change(twice[1])}, "the name of its column"
+    still = still_column(w.run)
+    if still:
+        seen = f"{still} is the same number in all rows, while the rest of the pose changes"
+        return seen, {still: Change(still)}, "the name of its column"
     silent = contradicted_commands(w, model)
     if silent:
         return silent, {}, None
@@ -154,6 +158,15 @@ def same_columns(run: Run) -> tuple[str, str] | None:
         if np.array_equal(signals[a], signals[b], equal_nan=True) and np.nanstd(signals[a]) > 0.0:
             return a, b
     return None
+
+
+def still_column(run: Run) -> str | None:
+    """The coordinate that is constant to the bit in a run whose other one and heading change, if one is.
+
+    A heading may be, where a run without noise is straight.
+    """
+    changes = np.nanmax(run.pose, axis=0) > np.nanmin(run.pose, axis=0)
+    return POSE[int(np.argmin(changes))] if changes[2] and changes[:2].sum() == 1 else None
 
 
 class Mistake(NamedTuple):
