@@ -20,7 +20,14 @@ from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
 from diagnosis.prediction_error.shooting import Linear, Shooting
 from diagnosis.prediction_error.unrecorded import unrecorded
 
-STEPS = {"N_r": 1e-3, "plant_F_vsp": 1e-3, "delta_X_u": 1e-3, "lag": 1e-2}
+STEPS = {
+    "N_r": 1e-3,
+    "plant_F_vsp": 1e-3,
+    "delta_X_u": 1e-3,
+    "lag": 1e-2,
+    "heading_offset": 1e-3,
+    "marker_offset_dx": 1e-3,
+}
 DRAG = -2.0  # N s/m, hidden
 
 

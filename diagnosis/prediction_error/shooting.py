@@ -127,11 +127,12 @@ class Shooting:
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
         same = [n for n, m in changed.items() if Response.key(m) == key]
         size = max(1, ROOM // max(self.run.size, 1))
-        states = self._states(_together(model, {n: steps[n] for n in same[:size]}), model)
-        poses = _poses(states[1:], model)
+        first = _together(model, {n: steps[n] for n in same[:size]})
+        states = self._states(first, model)
+        poses = _poses(states[1:], first)
         base, found = poses[0], dict(zip(same, poses[1:], strict=False))
-        for first in range(size, len(same), size):
-            some = {n: steps[n] for n in same[first : first + size]}
+        for k in range(size, len(same), size):
+            some = {n: steps[n] for n in same[k : k + size]}
             further = _together(model, some)
             found |= dict(zip(some, _poses(self._states(further, model)[1:], further)[1:], strict=True))
         found |= {n: _poses(self._states(m)[1:], m)[0] for n, m in changed.items() if n not in found}
