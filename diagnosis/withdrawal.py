@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .identification.acceptance import worse
-from .identification.findings import Findings
+from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
 from .model import Integrals, Model
 from .unseen import Losses, Part, harm, losses
@@ -70,7 +70,8 @@ def withdraw(
     """Take back what makes unseen data worse.
 
     Waves and failures are not judged: no model has waves, and the times of a failure are those of the
-    run in which it was found.
+    run in which it was found. Where nothing else is left, the nominal coefficients that were fitted
+    beside them are.
 
     Args:
         found: the findings on the training runs.
@@ -83,7 +84,7 @@ def withdraw(
     """
     search = {f.id: start.ship.effects[f.id].search for f in found.effects}
     judged = [i for i, s in search.items() if s.by == "regression" and not s.times]
-    if not judged or not unseen.judges(found):
+    if not found.effects or not unseen.judges(found):
         return found, []
     gone: list[Withdrawn] = []
     rests = {i: without(found, [i], start) for i in judged}
@@ -101,6 +102,8 @@ def withdraw(
             break
         gone.append(Withdrawn(i, WHOLE_SET.format(harm=harmed.format(where=unseen.where))))
         kept = without(found, [w.id for w in gone], start)
+    if len(gone) == len(judged) and kept.effects and harm(*unseen.losses(kept, start)):
+        kept = added(kept, kept.effects, start)
     return kept, gone
 
 
@@ -111,10 +114,13 @@ def _model(found: Findings, start: Model) -> Model:
 def without(found: Findings, ids: Sequence[str], start: Model) -> Findings:
     """The findings without some effects; by subtraction where the method cannot fit the rest anew."""
     rest = [f for f in found.effects if f.id not in ids]
-    if found.keep is not None:
-        return found.keep([f.id for f in rest])
-    model, effects = start, []
-    for f in rest:
+    return added(found, rest, start) if found.keep is None else found.keep([f.id for f in rest])
+
+
+def added(found: Findings, effects: Sequence[Finding], start: Model) -> Findings:
+    """The findings with some effects as they are, on the nominal coefficients of the first model."""
+    model, on_top = start, []
+    for f in effects:
         model = model.plus(f.values)
-        effects.append(replace(f, model=model))
-    return replace(found, effects=effects, model=model)
+        on_top.append(replace(f, model=model))
+    return replace(found, effects=on_top, model=model, suspects=[], moved={})

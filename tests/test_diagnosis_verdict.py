@@ -264,6 +264,20 @@ def test_effect_that_spoils_predictions_alone_is_withdrawn_and_one_that_mends_th
     assert "predictions of held-out runs are worse" in gone[0].reason
 
 
+def test_coefficients_beside_a_failure_of_one_run_are_held_against_unseen_runs():
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    start, times = Model(), {"bow_outage_start_1@run0": 10.0, "bow_outage_end_1@run0": 12.0}
+    outage = Finding("bow_outage", times, {}, 0.9, [], 0.5, 0.5)
+    for drag, stays in ((-3.0, True), (3.0, False)):
+        model = start.plus({**times, "delta_X_u": drag})
+        found = Findings([replace(outage, model=model)], model=model, sigma=np.full(3, 0.01))
+        unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+        kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+        assert [f.id for f in kept.effects] == ["bow_outage"]
+        assert gone == []
+        assert kept.model.values == (model if stays else start.plus(times)).values
+
+
 def left_on(**significant):
     """A remainder that is significant on some axes."""
     axes = {a: AxisRemainder(1.0, 0.1, 0.5, 1.0, 0.5, 0.1, significant.get(a, False)) for a in "XYN"}
