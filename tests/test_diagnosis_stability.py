@@ -11,7 +11,14 @@ from support.cases import slow
 
 from cosim import InputError
 from diagnosis.assessment import stability
-from diagnosis.assessment.closed_loop import BOUND, REFERENCES, largest_distance
+from diagnosis.assessment.closed_loop import (
+    BOUND,
+    REFERENCES,
+    STEP,
+    closed_loop,
+    distances,
+    largest_distance,
+)
 from diagnosis.assessment.stability import (
     OPERATING,
     OperatingRegion,
@@ -175,6 +182,26 @@ def test_the_thrusters_count_in_the_loop():
     assert largest_distance(short, Model(measurement={"clock_offset": 0.5})) != largest_distance(
         short, NOMINAL
     )
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        NOMINAL,
+        Model({"V_n": 0.01, "wave_force": 0.1, "curve_X_u_11": 0.1}, {}, {"clock_offset": 0.2}),
+        Model({"heading_offset": 0.1}, {"lag": 0.1, "delay": 0.1, "bow_failure_time": 2.0}),
+    ],
+)
+def test_recorded_loop_gives_the_same_bits(model):
+    reference = REFERENCES[1]._replace(seconds=6.0)
+    now, step = closed_loop(reference, model)
+    h, expected = 0.0, []
+    for _ in range(round(reference.seconds / STEP)):
+        now, distance = step(now, h)
+        expected.append(distance)
+        h = STEP
+    assert list(distances(reference, model)) == expected
+    assert max(expected) > 0.01
 
 
 def test_a_region_of_data_holds_nearly_all_of_them():

@@ -16,8 +16,23 @@ from fmus.declare import Component, flatten, packer, variables, vector
 from fmus.fmi.trace import TraceError
 from fmus.native.c_text import number
 from fmus.native.program import program
+from fmus.native.python_text import function
 from fmus.native.tape import Branch, Call, Kernels, Tape
-from fmus.ops import cos, exp, floor, kernel, sin, when, where
+from fmus.ops import (
+    atan2,
+    clip,
+    cos,
+    exp,
+    floor,
+    fmax,
+    fmin,
+    kernel,
+    not_,
+    sin,
+    sqrt,
+    when,
+    where,
+)
 from fmus.signals import Force, Nothing
 
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
@@ -147,6 +162,27 @@ def test_branch_and_kernel_are_recorded_as_such():
     assert chosen[1] is b
     assert len(tape.kernels.recordings) == 1
     assert heavy(3.0, 2.0) == (7.0, True)
+
+
+@pytest.mark.parametrize("x", [-2.0, -0.0, 0.5, 3.0, math.inf, math.nan])
+def test_flat_python_gives_the_same_bits(x):
+    """Branches, kernels, all operations, and numbers that are no numbers."""
+
+    @kernel
+    def heavy(x, y):
+        return floor(x) + 1.0 / y, x > y
+
+    def mixed(a, b):
+        whole, more = heavy(a, b)
+        either = where((a <= b) | not_(whole == 3.0), -abs(a), math.inf)
+        chosen = when(more & (a != 3.0), lambda: (whole, exp(a)), lambda: (fmin(a, b), sqrt(a)))
+        return *chosen, either, fmax(a, -0.0), cos(b), atan2(b, a), clip(a, -1.0, b), math.nan
+
+    tape = Tape(Kernels())
+    recording = tape.recording([*mixed(tape.variable("a"), tape.variable("b"))])
+    flat = function(recording, tape.kernels, "a", "b")
+    for y in (0.5, -3.0):
+        assert same_bits(flat(x, y), [*map(float, mixed(x, y))])
 
 
 def test_same_operation_on_the_same_numbers_is_recorded_once_where_it_is_in_force():

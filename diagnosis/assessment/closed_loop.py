@@ -4,27 +4,24 @@ Vessel and thrusters have the parameters of a model; observer, controller and pa
 ``scenarios/ellipse.json`` and ``scenarios/eight.json``, without noise and freezes.
 """
 
-from collections import deque
-from collections.abc import Iterator, Mapping
-from math import hypot, inf
-from typing import Any, Generic, NamedTuple, TypeVar
+from collections.abc import Callable, Iterator, Mapping
+from math import inf
+from typing import Any, NamedTuple
 
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs as ControllerInputs
-from fmus.declare import Component
+from fmus.declare import Component, flatten, rebuild
 from fmus.guidance import eight, ellipse
+from fmus.native.python_text import function
+from fmus.native.tape import Kernels, Tape
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs as ObserverInputs
-from fmus.signals import Estimate, Force, Nothing, Target, Velocity
+from fmus.ops import Number, sqrt
+from fmus.signals import Estimate, Force, Measurement, Nothing, Target, Velocity
 from fmus.thrusters.chain import Inputs as ThrusterInputs
-from fmus.thrusters.chain import Outputs as ThrusterOutputs
-from fmus.vessel.vessel import Outputs as VesselOutputs
 
 from ..model import Model
 from ..model.ship_model import parameters
-
-InputsT = TypeVar("InputsT")
-OutputsT = TypeVar("OutputsT")
 
 STEP = 0.04  # s; chosen, distances agree with those at 0.01 s to about a millimetre
 # m. Chosen: some four ship lengths, most of the basin's width; a good loop stays within a tenth of it.
@@ -54,61 +51,92 @@ REFERENCES = (
 )
 
 
-class SteppedComponent(Generic[InputsT, OutputsT]):
-    """A component with its present state.
+class Loop(NamedTuple):
+    """A closed loop at an instant: the states of its components, and what they give to each other.
 
-    Args:
-        component: its functions and parameters.
-        inputs: initial inputs.
-        values: parameters that do not have their start value.
+    Attributes:
+        states: of vessel, path, observer, controller and thrusters.
+        velocity: of the ship.
+        target, estimate: what path and observer give.
+        poses: measured, on their way to the observer, the oldest first.
     """
 
-    state: Any  # of the component's own class, which only its functions know
+    states: tuple[Any, ...]
+    velocity: Velocity
+    target: Target
+    estimate: Estimate
+    poses: tuple[Measurement, ...]
 
-    def __init__(self, component: Component, inputs: InputsT, values: Mapping[str, float]) -> None:
-        chosen = parameters(component, values)
-        self._component = component
-        self._prepared = component.prepared(chosen)
-        self.state = component.init(inputs, chosen)
 
-    def step(self, inputs: InputsT, h: float) -> OutputsT:
-        """Outputs after a step of h [s]; h = 0 gives those of the present state."""
-        self.state, outputs = self._component.advance(self.state, inputs, self._prepared, h)
-        return outputs
+def closed_loop(
+    reference: Reference, model: Model
+) -> tuple[Loop, Callable[[Loop, float], tuple[Loop, Number]]]:
+    """A closed loop at its start, and the function that advances it by STEP.
+
+    That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
+    between the ship and its target as well.
+    """
+    ship = _Part(model.ship.vessel, {**model.vessel, **reference.start})
+    path, observer = _Part(reference.guidance, {}), _Part(mdf.COMPONENT, OBSERVER_WEIGHTS)
+    controller, drive = _Part(adaptive.COMPONENT, {}), _Part(model.ship.thrusters, model.thrusters)
+    s, vessel = ship.begin(Force())
+    g, target = path.begin(Nothing())
+    measured = ObserverInputs(vessel.measured, Force())
+    o, estimate = observer.begin(measured)
+    c, _ = controller.begin(ControllerInputs(estimate, target))
+    t, _ = drive.begin(ThrusterInputs())
+    late = max(1, 1 + round(model.clock / STEP))
+    first = Loop(
+        (s, g, o, c, t), Velocity(*vessel.velocity), target, estimate, (vessel.measured,) * late
+    )
+
+    def step(now: Loop, h: float) -> tuple[Loop, Number]:
+        s, g, o, c, t = now.states
+        c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
+        t, thrust = drive.advance(t, ThrusterInputs(demand.tau, now.velocity), h)
+        s, vessel = ship.advance(s, Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N), STEP)
+        g, target = path.advance(g, Nothing(), STEP)
+        x, y = vessel.pose.x - target.x_t, vessel.pose.y - target.y_t
+        poses = (*now.poses[1:], vessel.measured)
+        commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
+        o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), STEP)
+        velocity = Velocity(*vessel.velocity)
+        return Loop((s, g, o, c, t), velocity, target, estimate, poses), sqrt(x * x + y * y)
+
+    return first, step
+
+
+class _Part:
+    """A component with a set of parameters."""
+
+    def __init__(self, component: Component, values: Mapping[str, float]) -> None:
+        self._params = parameters(component, values)
+        self._component, self._prepared = component, component.prepared(self._params)
+
+    def begin(self, inputs: Any) -> tuple[Any, Any]:
+        """State and outputs at first."""
+        return self.advance(self._component.init(inputs, self._params), inputs, 0.0)
+
+    def advance(self, state: Any, inputs: Any, h: float) -> tuple[Any, Any]:
+        """State and outputs a step of h [s] later; h = 0 gives the outputs of the present state."""
+        return self._component.advance(state, inputs, self._prepared, h)
 
 
 def distances(reference: Reference, model: Model) -> Iterator[float]:
-    """Distance [m] between the ship and its target after each step."""
-    ship: SteppedComponent[Force, VesselOutputs] = SteppedComponent(
-        model.ship.vessel, Force(), {**model.vessel, **reference.start}
-    )
-    vessel = ship.step(Force(), 0.0)
-    guidance: SteppedComponent[Nothing, Target] = SteppedComponent(reference.guidance, Nothing(), {})
-    target = guidance.step(Nothing(), 0.0)
-    clock_steps = max(1, 1 + round(model.clock / STEP))
-    poses = deque([vessel.measured] * clock_steps, clock_steps)
-    measured = ObserverInputs(vessel.measured, Force())
-    observer: SteppedComponent[ObserverInputs, Estimate] = SteppedComponent(
-        mdf.COMPONENT, measured, OBSERVER_WEIGHTS
-    )
-    estimate = observer.step(measured, 0.0)
-    controller: SteppedComponent[ControllerInputs, Any] = SteppedComponent(
-        adaptive.COMPONENT, ControllerInputs(estimate, target), {}
-    )
-    thrusters: SteppedComponent[ThrusterInputs, ThrusterOutputs] = SteppedComponent(
-        model.ship.thrusters, ThrusterInputs(), model.thrusters
-    )
-    h = 0.0
-    for _ in range(round(reference.seconds / STEP)):
-        demand = controller.step(ControllerInputs(estimate, target), h)
-        thrust = thrusters.step(ThrusterInputs(demand.tau, Velocity(*vessel.velocity)), h)
-        h = STEP
-        vessel = ship.step(Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N), h)
-        target = guidance.step(Nothing(), h)
-        yield hypot(vessel.pose.x - target.x_t, vessel.pose.y - target.y_t)
-        poses.append(vessel.measured)
-        commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
-        estimate = observer.step(ObserverInputs(poses[0], commanded), h)
+    """Distance [m] between the ship and its target after each step.
+
+    The loop is recorded once for the model's parameters, and runs without what does not act in it.
+    """
+    first, step = closed_loop(reference, model)
+    now, distance = step(first, 0.0)
+    yield distance
+    tape, values = Tape(Kernels()), flatten(now)
+    names = [f"s{k}" for k in range(len(values))]
+    after, further = step(rebuild(now, [tape.variable(name) for name in names]), STEP)
+    advance = function(tape.recording([*flatten(after), further]), tape.kernels, *names)
+    for _ in range(round(reference.seconds / STEP) - 1):
+        *values, distance = advance(*values)
+        yield distance
 
 
 def largest_distance(reference: Reference, model: Model) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 
 from .tape import Block, Branch, Call, Recording, Value
 
-_INFIX = {
+INFIX = {
     "add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
     "eq": "==", "ne": "!=", "and": "&&", "or": "||",
 }  # fmt: skip
@@ -83,11 +83,11 @@ class Writer:
             targets: (array, the results that it gets), together all results.
         """
         unused = ", ".join(f"(void){name}" for name in re.findall(r"(\w+)[,)]", head))
-        body = _Body(self._kernels).text(recording, targets)
+        body = Body(self._kernels).text(recording, targets)
         return f"{head}\n{{\n    {unused};{body[1:]}"
 
 
-class _Body:
+class Body:
     """The body of one function: names of its values, and lines."""
 
     def __init__(self, kernels: Mapping[int, str]) -> None:
@@ -97,13 +97,17 @@ class _Body:
         self.lines: list[str] = []
 
     def text(self, recording: Recording, targets: Iterable[tuple[str, Sequence[Any]]]) -> str:
+        self.write_all(recording)
+        for array, results in targets:
+            self.lines += [f"    {array}[{k}] = {self.of(x)};" for k, x in enumerate(results)]
+        return "\n".join(["{", *self.lines, "    return 0;", "}", ""])
+
+    def write_all(self, recording: Recording) -> None:
+        """Lines of all that is needed of a recording."""
         self.need(recording.results)
         for statement in reversed(recording.body):
             self._mark(statement)
         self._write(recording.body, 1)
-        for array, results in targets:
-            self.lines += [f"    {array}[{k}] = {self.of(x)};" for k, x in enumerate(results)]
-        return "\n".join(["{", *self.lines, "    return 0;", "}", ""])
 
     def need(self, values: Iterable[Any]) -> None:
         self.needed.update(id(x) for x in values if isinstance(x, Value))
@@ -155,8 +159,8 @@ class _Body:
         args = [self.of(a) for a in x.args]
         if _may_fail(x):
             yield f"if ({args[1]} == 0.0) return 1;"
-        if x.operation in _INFIX:
-            value = f"{args[0]} {_INFIX[x.operation]} {args[1]}"
+        if x.operation in INFIX:
+            value = f"{args[0]} {INFIX[x.operation]} {args[1]}"
         else:
             value = _FORMS[x.operation].format(*args)
         yield f"const {_type(x)} {self._named(x)} = {value};"
