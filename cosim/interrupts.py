@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 
 from .process.run_state import HELD, REQUESTS, STATE
@@ -120,6 +121,8 @@ def raise_on_interrupt() -> None:
 def _raise() -> None:
     global _interrupted
     _interrupted = True
+    if STATE.watched and (log := sys.modules.get("logging")):
+        log.disable()  # libraries would tell how their threads and connections end
     raise KeyboardInterrupt
 
 

@@ -17,6 +17,8 @@ from .errors import InputError, SimulationError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
 from .master.simulation import simulate
+from .process.run_state import STATE
+from .process.spawned import mute_started_processes
 from .results.performance import table
 from .scenario.load import load_scenario, with_settings
 from .scenario.schema import Scenario
@@ -78,6 +80,8 @@ def _ensemble(
     from .campaign.shown_progress import shown_progress
 
     folder = Path(options.out or Path("results", f"{scenario.name}_ensemble"))
+    if STATE.watched:
+        mute_started_processes()
     try:
         with shown_progress(console, options.quiet) as progress:
             made = run_ensemble(

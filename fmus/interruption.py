@@ -1,16 +1,24 @@
 """Ctrl-C, requests to terminate and the usage line, for the commands of this package."""
 
+from __future__ import annotations
+
 import os
 import signal
 import sys
-from collections.abc import Callable
-from typing import NoReturn
+
+TYPE_CHECKING = False  # typing itself takes a while to import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import NoReturn
 
 BAD_INPUT, INTERRUPTED = 2, 130  # exit codes; 128 + SIGINT, as shells have it
+# Wall time that an interrupted command has to end what it began [s]; then it ends at once. Chosen: with
+# that, and the end of the process, it has ended within 2 s, also where Python has lost the interrupt.
+GRACE = 1.5
 SIGNALS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 
 
-def _on_interrupt(action: Callable[..., object]) -> None:
+def _on_interrupt(action: Callable[..., object] | signal.Handlers) -> None:
     for number in SIGNALS:
         if signal.getsignal(number) != signal.SIG_IGN:  # as for nohup
             signal.signal(number, action)
@@ -28,8 +36,10 @@ def _leave(*_: object) -> NoReturn:
 
 def _raise(*_: object) -> NoReturn:
     """Once only: a second Ctrl-C must not keep the first from ending what was begun."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+    _on_interrupt(signal.SIG_IGN)
+    if hasattr(signal, "setitimer"):  # Windows has none
+        signal.signal(signal.SIGALRM, _leave)
+        signal.setitimer(signal.ITIMER_REAL, GRACE)
     raise KeyboardInterrupt
 
 
@@ -40,12 +50,16 @@ def program(module: str) -> str:
 
 def run_interruptible(main: Callable[[], int]) -> NoReturn:
     """Run a command and exit with its code, or with that of an interrupt."""
-    _on_interrupt(_raise)
     try:
-        code = main()
+        _on_interrupt(_raise)
+        try:
+            code = main()
+        finally:
+            _on_interrupt(signal.SIG_IGN)
+            if hasattr(signal, "setitimer"):
+                signal.setitimer(signal.ITIMER_REAL, 0.0)
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        code = INTERRUPTED
+        _leave()  # past what libraries do at exit, which may wait
     except OSError as error:
         sys.stderr.write(f"error: {error}\n")
         code = BAD_INPUT

@@ -261,6 +261,34 @@ def test_one_interrupt_ends_a_command_that_waits_for_another_process(ellipse, tm
 
 
 @linux_only
+@pytest.mark.slow
+def test_an_interrupt_of_an_fmu_that_hangs_before_the_first_row_leaves_the_earlier_run(
+    plain_fmu, tmp_path
+):
+    hang = (
+        "if __import__('os').environ.get('HANGS'):\n    print('here', flush=True)\n"
+        "    __import__('signal').pthread_sigmask(0, {2})\n    __import__('ctypes').PyDLL(None).sleep(1000)"
+    )
+    fmu, out = plain_fmu("Deaf", f"{OUTPUT}{hang}\n"), tmp_path / "new" / "out"
+    scenario = {"name": "s", "step": 0.1, "stop": 1.0, "fmus": {"deaf": {"path": str(fmu)}}}
+    (tmp_path / "s.json").write_text(json.dumps(scenario))
+    arguments = "cosim.run", tmp_path / "s.json", "--out", out, "--no-plots", "--quiet"
+
+    def interrupted():
+        process = started(*arguments, HANGS="yes")
+        assert process.stdout.readline() == "here\n"
+        process.send_signal(signal.SIGINT)
+        assert ended(process) == (130, ["interrupted"])
+
+    interrupted()
+    assert not out.parent.exists()
+    assert ended(started(*arguments))[0] == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    interrupted()
+    assert before == {path.name: path.read_bytes() for path in out.iterdir()}
+
+
+@linux_only
 def test_an_interrupt_of_the_installed_program_is_one_line_from_its_first_line_on():
     text = (ROOT / "pyproject.toml").read_text()
     module, function = re.search(r'^cybership = "(.*):(.*)"$', text, re.MULTILINE).groups()

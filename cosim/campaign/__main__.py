@@ -20,6 +20,8 @@ from rich.table import Table
 from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
+from ..process.run_state import STATE
+from ..process.spawned import mute_started_processes
 from ..results.performance import METRICS
 from .conduct import demand_packages, result_folder, run_campaign
 from .shown_progress import shown_progress
@@ -42,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     out = result_folder(options.campaign, options.out)
+    if options.workers != 0 and STATE.watched:
+        mute_started_processes()
     try:
         _check(options)
         with shown_progress(console, options.quiet) as progress:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from distributed import Worker, WorkerPlugin, get_worker
 
 from ..errors import InputError, SimulationError
+from ..process.spawned import end_with_parent
 from .job import Row, Task, own_version
 from .travelling_files import put
 from .workplace import Workplace
@@ -64,6 +66,8 @@ def run_on_worker(request: Request) -> list[Row]:
     """A task on a worker."""
     if request.version != (own := own_version()):
         raise InputError(f"a worker has cybership {own}, and here it is {request.version}")
+    if (nanny := parent_process()) and nanny.pid:
+        end_with_parent(nanny.pid)  # which Dask sees to only where no FMU hangs
     folder = _folder(get_worker())
     with _making:
         work = _workplaces.setdefault(folder, Workplace(folder))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import statistics
@@ -20,6 +21,7 @@ from distributed import (
     KilledWorker,
     LocalCluster,
 )
+from distributed.deploy.spec import close_clusters
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
@@ -82,6 +84,8 @@ class DaskWorkers:
         self._program = ExitStack()
         for logger in ("distributed", "distributed.client"):  # the latter has a level of its own
             logging.getLogger(logger).setLevel(logging.CRITICAL)
+        # That of one which was interrupted while it started raises; multiprocessing ends its workers.
+        atexit.unregister(close_clusters)
         try:
             if address is None:
                 self._program.enter_context(without_program())  # also for workers that start again

@@ -29,6 +29,17 @@ def end_with_parent(parent: int) -> None:
             os._exit(1)
 
 
+def mute_started_processes() -> None:
+    """From now on what processes started by this one write to standard error is not shown.
+
+    Workers that end while they start, or before the one that has started them, would add tracebacks to
+    the line that says why a command ends.
+    """
+    shown = os.dup(2)  # not inherited
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    sys.stderr = open(shown, "w", 1, sys.stderr.encoding, sys.stderr.errors)  # noqa: SIM115
+
+
 @contextmanager
 def without_program() -> Iterator[None]:
     """Processes that multiprocessing spawns inside do not import the program that spawns them.

@@ -86,6 +86,10 @@ def _complete(folder: Path, status: str, message: str) -> tuple[int, str]:
     """Put log.csv and log.json right; returns the number of rows, and what happened."""
     told: dict[str, Any] = {"rows": 0, "message": message, "status": status}
     if not STATE.numbers[LOGGING]:
+        if (
+            status == "interrupted"
+        ):  # before its first row: an earlier run stays, as where it ends in order
+            return 0, message
         clear_results(folder)
         write_json(folder / SIDECAR, {**json.loads(STATE.read(DESCRIPTION)), **told})
         return 0, message

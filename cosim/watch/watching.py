@@ -96,7 +96,8 @@ class _Watch:
         if not STATE.numbers[ENDED]:
             from .post_mortem import report  # only now: it takes a while to import
 
-            time.sleep(ONE_REQUEST)  # a signal to all processes of the command ends the other one first
+            if not STATE.numbers[REQUESTS]:
+                time.sleep(ONE_REQUEST)  # a signal to all of the command ends the other process first
             code = report(os.waitstatus_to_exitcode(status), STATE.numbers[REQUESTS] > 0)
         os._exit(code)
 
@@ -115,24 +116,8 @@ class _Watch:
         if STATE.numbers[HELD]:
             signal.setitimer(signal.ITIMER_REAL, LOOK)
         else:
-            self._send(signal.SIGSTOP)  # it starts no more processes
-            for pid in _descendants(
-                self._child
-            ):  # one that loses its parent while it starts would say so
-                with suppress(OSError):
-                    os.kill(pid, signal.SIGKILL)
             self._send(signal.SIGKILL)
 
     def _send(self, number: int) -> None:
         with suppress(ProcessLookupError):
             os.kill(self._child, number)
-
-
-def _descendants(pid: int) -> list[int]:
-    """The processes that a process has started, and theirs (on Linux)."""
-    found: list[int] = []
-    with suppress(OSError):
-        for task in os.listdir(f"/proc/{pid}/task"):
-            with open(f"/proc/{pid}/task/{task}/children") as file:
-                found += map(int, file.read().split())
-    return found + [each for child in found for each in _descendants(child)]

@@ -50,11 +50,8 @@ def build(
             may write to, or files in ``out`` that would be replaced.
         DeclarationError: a parameter set that does not fit.
     """
-    if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:
-            raise BuildError(f"'{out}' is a file, not a folder") from None
+    if out is not None and out.exists() and not out.is_dir():
+        raise BuildError(f"'{out}' is a file, not a folder")
     built = [_cached(name, effects, starts, native, note) for name in _every(names, starts)]
     if starts is not None:
         _tell_unused(starts, [fmu.stem for fmu in built], note)
@@ -67,6 +64,7 @@ def build(
             or path.read_bytes() != (next(f for f in built if f.name == path.name)).read_bytes()
         ):
             raise BuildError(f"'{path}' is there already, and is another file; --overwrite replaces it")
+    out.mkdir(parents=True, exist_ok=True)
     return [place(fmu, out / fmu.name) for fmu in built]
 
 
@@ -82,13 +80,18 @@ def export(
     Returns:
         The files written.
     """
-    from ..native.export_source import export_source
+    from ..native.export_source import exported_source
 
     found = [load(*which(name), effects)[1] for name in _every(names, starts)]
     if starts is not None:
         found = [starts.baked(component) for component in found]
         _tell_unused(starts, [component.name for component in found], note)
-    return export_source(found, folder)
+    files = exported_source(found)
+    with tempfile.TemporaryDirectory(prefix="source_") as work:
+        for name, text in files.items():
+            Path(work, name).write_text(text, encoding="utf-8")
+        folder.mkdir(parents=True, exist_ok=True)
+        return [place(Path(work, name), folder / name) for name in files]
 
 
 def _every(names: Sequence[str], starts: Starts | None) -> Sequence[str]:

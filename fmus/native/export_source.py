@@ -35,24 +35,17 @@ int main(void) {{
 """
 
 
-def export_source(components: Iterable[Component], folder: Path) -> list[Path]:
-    """Write the source of some components and a README into a folder, which is made.
-
-    Returns:
-        The files.
+def exported_source(components: Iterable[Component]) -> dict[str, str]:
+    """The source of some components and a README, text by name of the file.
 
     Raises:
         TraceError: a component does what C cannot.
-        OSError: the folder cannot be written to.
     """
     recorded = [program(component) for component in components]
     files = {"README.md": _readme(recorded)}
     for each in recorded:
         files |= model_source(each)
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return [folder / name for name in files]
+    return files
 
 
 def _readme(recorded: list[Program]) -> str:

@@ -1,0 +1,110 @@
+"""Builds and checks of FMUs that are interrupted: one line, no file half written, at whatever time."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from support.project import ROOT
+
+from fmus.build import building
+
+posix = pytest.mark.skipif(os.name != "posix", reason="no signals to send")
+
+BEGIN = """
+import signal, threading, time
+from contextlib import suppress
+from fmus.interruption import run_interruptible
+"""
+LOST = """
+def main():
+    with suppress(KeyboardInterrupt):  # as where Python runs a callback of C
+        signal.raise_signal(signal.SIGINT)
+    time.sleep(60)
+"""
+THREAD = """
+def main():
+    threading.Thread(target=time.sleep, args=(60,)).start()
+    signal.raise_signal(signal.SIGTERM)
+"""
+AGAIN = """
+def main():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.raise_signal(signal.SIGINT)
+"""
+
+
+@posix
+@pytest.mark.parametrize("work", [pytest.param(LOST, marks=pytest.mark.slow), THREAD, AGAIN])
+def test_an_interrupt_ends_a_command_whatever_it_does(work):
+    done = subprocess.run(
+        [sys.executable, "-c", f"{BEGIN}{work}\nrun_interruptible(main)"],
+        capture_output=True, text=True, cwd=ROOT, check=False, timeout=30,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+def test_a_build_that_is_interrupted_makes_no_folder(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(building, "_cached", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        building.build(["vessel"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_source_that_cannot_be_written_is_not_there_in_part(tmp_path, monkeypatch):
+    written, write = [], building.Path.write_text
+
+    def full(path, text, **options):
+        if len(written) > 1:
+            write(path, text[: len(text) // 2], **options)
+            raise OSError(28, "No space left on device")
+        written.append(path)
+        return write(path, text, **options)
+
+    monkeypatch.setattr(building.Path, "write_text", full)
+    with pytest.raises(OSError, match="No space left"):
+        building.export(["guidance_setpoint"], tmp_path / "source")
+    assert len(written) == 2
+    assert not (tmp_path / "source").exists()
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["fmus.build", "guidance_setpoint", "guidance_ellipse", "--out"],
+        ["fmus.build", "--native", "guidance_setpoint", "--source"],
+        ["fmus.check", "guidance_setpoint"],
+    ],
+    ids=" ".join,
+)
+def test_builds_and_checks_end_in_one_line_at_any_time(command, tmp_path):
+    rng, ended = random.Random(1), set()
+    for k in range(8):
+        out, cache = tmp_path / f"out{k}", tmp_path / f"cache{k}"
+        process = subprocess.Popen(
+            [sys.executable, "-m", *command, *([str(out)] if command[-1].startswith("--") else [])],
+            cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            env={**os.environ, "CYBERSHIP_CACHE": str(cache)},
+        )  # fmt: skip
+        time.sleep(rng.uniform(0.3, 1.5))
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=60)
+        ended.add(process.returncode)
+        if process.returncode == 130:
+            assert stderr == "interrupted\n"
+        else:
+            assert (process.returncode, stderr) == (0, ""), "it came too late"
+        assert not list(tmp_path.rglob("*.part"))
+        for fmu in tmp_path.rglob("*.fmu"):
+            assert building.is_whole(fmu) or fmu.parent == out
+    assert 130 in ended
