@@ -1,11 +1,12 @@
 """The fit to predictions: its windows, the unrecorded force, the posterior, and the bands."""
 
 import json
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 import pytest
-from support.measured import sail, smoothed
+from support.measured import commands, sail, smoothed
 
 from diagnosis.assessment.windows import LENGTH, Windows
 from diagnosis.identification.prior import NominalPrior
@@ -29,6 +30,12 @@ STEPS = {
     "marker_offset_dx": 1e-3,
 }
 DRAG = -2.0  # N s/m, hidden
+DRAGGED = Model({"delta_X_u": DRAG})
+
+
+def pushed(t, axis, size):
+    """The commands, with more on an axis for two seconds."""
+    return commands(t) + np.where((t >= 30.0) & (t < 32.0), size, 0.0)[:, None] * np.eye(3)[axis]
 
 
 @cache
@@ -40,6 +47,11 @@ def windows():
 def hidden():
     """A run of a ship with more drag than the model has."""
     return integrals(smoothed(sail(ship={"delta_X_u": DRAG})[0]))
+
+
+@cache
+def as_modelled():
+    return integrals(smoothed(sail()[0]))
 
 
 @cache
@@ -161,9 +173,30 @@ def test_bands_hold_what_they_say_and_widen_with_a_push():
     assert prediction_bands(run, None, model, posterior, fit.push) is None
 
 
-def test_fits_that_agree_tell_of_nothing_and_those_that_differ_tell_when():
-    w, some = hidden(), Push(np.full(3, 0.1), np.ones(3))
-    assert unrecorded([w], Model(), some, {}).sentence == ""
-    told = unrecorded([w], Model(), some, {"N_r": (-0.1, -0.6)})
-    assert "N_r" in told.sentence
-    assert all(0.0 <= s.start <= s.end <= w.run.time[-1] for s in told.stretches)
+def test_fits_that_differ_are_told():
+    w, some = hidden(), Push(np.array([0.1, 0.0, 0.1]), np.ones(3))
+    agree = unrecorded([w], DRAGGED, some, {}).sentence
+    assert "0.1 N in surge over 1 s, 0.1 N m in yaw" in agree
+    assert "sway" not in agree
+    differ = unrecorded([w], DRAGGED, some, {"N_r": (-0.1, -0.6)}).sentence
+    assert "more than their intervals in N_r" in differ
+    assert "more than their intervals" not in agree
+
+
+@pytest.mark.parametrize(("axis", "size"), [(2, 0.3), (0, -1.0)])
+def test_push_at_a_time_is_told_with_time_axis_and_size(axis, size):
+    run = sail(given=partial(pushed, axis=axis, size=size))[0]
+    w = integrals(smoothed(replace(run, tau_cmd=commands(run.time))))
+    (found,) = unrecorded([w], Model(), NO_PUSH, {}).stretches
+    assert (found.run, found.axis) == (w.run.name, "XYN"[axis])
+    assert (found.start, found.end) == pytest.approx((30.0, 32.0), abs=0.5)
+    assert found.size * (found.end - found.start) == pytest.approx(2.0 * size, rel=0.2)
+
+
+def test_run_without_a_push_tells_of_none():
+    found = [
+        unrecorded([as_modelled()], Model(), NO_PUSH, {}),
+        unrecorded([hidden()], DRAGGED, NO_PUSH, {}),
+    ]
+    assert not any(f.stretches for f in found)
+    assert "No unrecorded force" in found[0].sentence

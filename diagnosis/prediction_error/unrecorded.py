@@ -1,29 +1,37 @@
-"""The force that nobody recorded: how large, how long it lasts, and when it acts most."""
+"""The force that nobody recorded: how large, how long it lasts, and pushes at a time.
 
-from collections.abc import Mapping, Sequence
+A push at a time is a stretch in which the force that is left is beyond what chance gives anywhere in
+the runs, were it as large there as it usually is. Its beginning, end and size are those of the constant
+force that explains most of what is left around. It is told, and never a part of a model.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
 from ..model import Integrals, Model, omega
-from ..model.weak_form import WIDTH
+from ..model.uncertainty import NOISE_TOLERANCE, omega_std
+from ..model.weak_form import EVERY, WIDTH, kernel_integral
 from .push import Push
 
-LARGE = 3.0  # robust standard deviations of what is left, beyond which a stretch is told; chosen
-MOST = 5  # stretches that are told, the clearest; chosen
+CHANCE = 0.01  # that a run without a push tells of one; that of the remainder
 MAD = 1.4826  # standard deviations of a normal distribution in a median absolute deviation
-AXES = ("X", "Y", "N")
+MOST = 5  # pushes that are told, the clearest; chosen
+LONGEST = 10.0  # s; what lasts longer is no push but a remainder; chosen
+AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
 
 
 class Stretch(NamedTuple):
-    """A stretch of a run in which the unrecorded force is large on an axis.
+    """A push at a time.
 
     Attributes:
         run: name.
         axis: X, Y or N.
         start, end: [s].
-        size: largest model error there [N or N m].
+        size: force, were it constant [N or N m].
     """
 
     run: str
@@ -41,7 +49,7 @@ class Unrecorded:
         push: its size and correlation time on each axis.
         differing: values of which the two fits differ by more than their intervals -> the value by the
             model error, and by predictions.
-        stretches: when it acts most, where the fits differ; the clearest first.
+        stretches: pushes at a time, the clearest first.
     """
 
     push: Push
@@ -50,16 +58,29 @@ class Unrecorded:
 
     @property
     def sentence(self) -> str:
-        """What is to be said of it; empty where the fits agree."""
-        if not self.differing:
-            return ""
-        names = ", ".join(self.differing)
-        when = "; ".join(f"{s.run} {s.start:.0f} to {s.end:.0f} s ({s.axis})" for s in self.stretches)
-        return (
-            "Something that is not recorded acts on the ship: the fit to the model error and the fit to "
-            f"predictions differ by more than their intervals in {names}. "
-            + (f"It is largest in {when}." if when else "It acts all the time.")
-        )
+        """What is to be said of it."""
+        size = zip(NAMES, self.push.size, UNITS, self.push.time, strict=True)
+        told = [f"{x:.2g} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0]
+        text = "No unrecorded force shows. "
+        if told:
+            text = f"An unrecorded force is left, its size and how long it lasts: {', '.join(told)}. "
+            text += "Intervals and bands allow for it. "
+        if self.differing:
+            text += (
+                "It is no chance: the fit to the model error and the fit to predictions differ by more "
+                f"than their intervals in {', '.join(self.differing)}. "
+            )
+        return (text + self.pushes).strip()
+
+    @property
+    def pushes(self) -> str:
+        """The pushes at a time; empty where there are none."""
+        each = [
+            f"{s.run} {s.start:.1f} to {s.end:.1f} s, {s.size:+.2g} {UNITS[AXES.index(s.axis)]} in "
+            f"{NAMES[AXES.index(s.axis)]}"
+            for s in self.stretches
+        ]
+        return f"Something pushed the ship at times: {'; '.join(each)}." if each else ""
 
 
 def unrecorded(
@@ -68,7 +89,7 @@ def unrecorded(
     push: Push,
     differing: Mapping[str, tuple[float, float]],
 ) -> Unrecorded:
-    """What acts unrecorded, and where two fits differ, when.
+    """What acts unrecorded.
 
     Args:
         runs: that were fitted to.
@@ -76,16 +97,44 @@ def unrecorded(
         push: that it leaves.
         differing: see :class:`Unrecorded`.
     """
+    left = [omega(w, model) for w in runs]
+    noise = [NOISE_TOLERANCE * omega_std(w, model) for w in runs]
+    # As far as the noise of the measurement allows, the same in all runs.
+    usual = MAD * np.median(np.abs(np.concatenate(left)), axis=0)
+    beyond = float(norm.isf(0.5 * CHANCE / max(3 * sum(w.middle.size for w in runs), 1)))
     found = []
-    for w in runs if differing else ():
-        left = omega(w, model)
-        for k, axis in enumerate(AXES):
-            size = np.abs(left[:, k])
-            usual = MAD * float(np.median(size)) or np.inf
-            rows = np.flatnonzero(size > LARGE * usual)
-            for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > WIDTH) + 1):
-                if part.size:
-                    times = w.middle[part]
-                    found.append((size[part].max() / usual, w.run.name, axis, times, size[part].max()))
+    for w, error, std in zip(runs, left, noise, strict=True):
+        for k in range(3):
+            found += _pushes(w, k, error[:, k], np.maximum(std[:, k], usual[k]), beyond)
     clearest = sorted(found, key=lambda f: -f[0])[:MOST]
-    return Unrecorded(push, differing, [Stretch(n, a, t[0], t[-1], s) for _, n, a, t, s in clearest])
+    return Unrecorded(push, differing, [stretch for _, stretch in clearest])
+
+
+def _pushes(
+    w: Integrals, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
+) -> Iterator[tuple[float, Stretch]]:
+    """Pushes of a run on an axis, each with how many standard deviations are left at its clearest."""
+    z = error / std
+    rows = np.flatnonzero(np.abs(z) > beyond)
+    for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > WIDTH) + 1):
+        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST:
+            near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + WIDTH
+            start, end, size = box(w.middle[near], error[near])
+            yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
+
+
+def box(middle: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
+    """Start, end [s] and size of the constant force whose means over windows are next to an error.
+
+    Args:
+        middle: (k,), of windows [s].
+        error: (k,), in these [N or N m].
+    """
+    times = np.arange(middle[0] - 0.5 * WIDTH, middle[-1] + 0.5 * WIDTH, 0.5 * EVERY)
+    passed = kernel_integral(np.clip((times[:, None] - middle) / (0.5 * WIDTH), -1.0, 1.0))
+    first, last = np.triu_indices(times.size, 1)
+    means = passed[last] - passed[first]
+    power = np.einsum("ij,ij->i", means, means)
+    along = means @ error
+    best = int(np.argmax(along**2 / np.maximum(power, 1e-9)))
+    return float(times[first[best]]), float(times[last[best]]), float(along[best] / power[best])

@@ -45,6 +45,8 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
             for s in r.suspect_coefficients
         ]
         yield from _lines("Suspect coefficients", suspects)
+    together = [f"Known only together: {', '.join(group)}." for group in r.correlation.together]
+    yield from _lines("How sure the values are", [r.unrecorded.sentence, *together])
     if r.effects or r.possibilities:
         first, *others = r.ranking[:MAX_CANDIDATES]
         behind = [f"{c.id} +{_number(c.behind)} (± {_number(c.behind_std, 2)})" for c in others]
