@@ -1,10 +1,12 @@
 """What every command does around its own work: exit codes, signals, broken pipes."""
 
+import argparse
 import os
 import re
 import sys
 from collections import namedtuple
 from collections.abc import Callable
+from pathlib import Path
 from typing import NoReturn
 
 from rich.console import Console
@@ -18,6 +20,7 @@ __all__ = [
     "INTERRUPTED",
     "Output",
     "complain",
+    "folder_name",
     "missing_extra",
     "printable",
     "program",
@@ -68,6 +71,13 @@ def complain(message: object, kind: str = "error: ") -> None:
 def program(module: str) -> str:
     """The name of a command in its usage line: ``cybership NAME`` if that began it."""
     return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
+
+
+def folder_name(text: str) -> Path:
+    """Type of an option that names a folder: nothing is no name of the working directory."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("needs the name of a folder")
+    return Path(text)
 
 
 def missing_extra(error: ModuleNotFoundError) -> str | None:

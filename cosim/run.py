@@ -12,7 +12,17 @@ from pathlib import Path
 
 from rich.console import Console
 
-from .command import BAD_INPUT, FAILED, INTERRUPTED, Output, complain, printable, program, run_command
+from .command import (
+    BAD_INPUT,
+    FAILED,
+    INTERRUPTED,
+    Output,
+    complain,
+    folder_name,
+    printable,
+    program,
+    run_command,
+)
 from .errors import InputError, SimulationError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
@@ -191,12 +201,6 @@ def _members(text: str) -> int:
     return int(text)
 
 
-def _folder(text: str) -> str:
-    if not text.strip():
-        raise argparse.ArgumentTypeError("needs the name of a folder")
-    return text
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=program("cosim.run"),
@@ -231,7 +235,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out",
-        type=_folder,
+        type=folder_name,
         metavar="DIR",
         help="result folder (results/<name>; where another run is there, results/<name>_2, ...)",
     )

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import cosim
-from cosim.command import BAD_INPUT, complain, program, run_command
+from cosim.command import BAD_INPUT, complain, folder_name, program, run_command
 from cosim.results import draw
 
 NEEDED = ("scipy", "jinja2", "pandas")
@@ -28,7 +28,7 @@ SECONDS = 150.0  # of each run; chosen: more than a round of the ellipse, and th
 def main(arguments: list[str] | None = None) -> int:
     """Run it; returns the exit code."""
     parser = argparse.ArgumentParser(prog=program("cybership.demo"), description=__doc__)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="result folder (results/demo)")
+    parser.add_argument("--out", type=folder_name, metavar="DIR", help="result folder (results/demo)")
     options = parser.parse_args(arguments)
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rich.console import Console, RenderableType
 
 from cosim import InputError
-from cosim.command import BAD_INPUT, Output, complain, program
+from cosim.command import BAD_INPUT, Output, complain, folder_name, program
 from cosim.interrupts import Held
 from fmus.declare import DeclarationError
 from fmus.effects import STANDARD
@@ -145,18 +145,12 @@ def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
     """
     made.add_argument(
         "--out",
-        type=_folder,
+        type=folder_name,
         metavar="DIR",
         help=f"result folder ({usual}; where the result of other inputs is, {usual}_2, ...)",
     )
     made.add_argument("--overwrite", action="store_true", help=f"use {usual}, whatever is there")
     made.set_defaults(usual=usual)
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError("needs the name of a folder")
-    return Path(text)
 
 
 def inputs_of(options: argparse.Namespace) -> dict[str, str]:

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import cosim
-from cosim.command import BAD_INPUT, FAILED, run_command
+from cosim.command import BAD_INPUT, FAILED, folder_name, run_command
 
 
 def _count(text: str) -> int:
@@ -40,7 +40,9 @@ def study_parser(
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     out = Path("results") / f"study_{name}"
-    parser.add_argument("--out", type=Path, metavar="DIR", default=out, help=f"report folder ({out})")
+    parser.add_argument(
+        "--out", type=folder_name, metavar="DIR", default=out, help=f"report folder ({out})"
+    )
     if seeds is not None:
         parser.add_argument(
             "--seeds", type=_count, metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"

@@ -410,6 +410,34 @@ def test_built_fmus_replace_no_other_file(fmus, tmp_path):
     assert (tmp_path / "vessel.fmu").read_bytes() == fmus["vessel"].read_bytes()
 
 
+def test_source_replaces_no_other_file(tmp_path):
+    (tmp_path / "README.md").write_text("mine")
+    arguments = "--native", "guidance_setpoint", "--source", tmp_path
+    done = command(build_main, *arguments)
+    assert (done.returncode, (tmp_path / "README.md").read_text()) == (2, "mine")
+    assert "is there already, and is another file; --overwrite replaces it" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
+    for more in (["--overwrite"], []):
+        assert command(build_main, *arguments, *more).returncode == 0
+
+
+@pytest.mark.parametrize("empty", ["", " "])
+def test_nothing_is_no_name_of_a_folder(runs, tmp_path, monkeypatch, empty):
+    path = runs([1.0])
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.chdir(tmp_path)
+    for main, *arguments in (
+        (campaign_main, path, "--workers", 0, "--out", empty),
+        (build_main, "guidance_setpoint", "--out", empty),
+        (build_main, "--native", "guidance_setpoint", "--source", empty),
+    ):
+        done = command(main, *arguments)
+        assert (done.returncode, "needs the name of a folder" in done.stderr) == (2, True)
+    with pytest.raises(cosim.InputError, match="name of a folder"):
+        cosim.run_campaign(path, empty, workers=0)
+    assert sorted(tmp_path.iterdir()) == before
+
+
 def test_exports_replace_no_file(chain, tmp_path):
     (tmp_path / "s.json").write_text(json.dumps(chain))
     (tmp_path / "s.ssp").write_text("mine")

@@ -13,7 +13,17 @@ from pathlib import Path
 import numpy as np
 import pandas
 
-from .endings import EXCEPTIONS, HANGING, HARMLESS, PATIENCE, ROOT, environment, finish, mortal_fmu
+from .endings import (
+    EXCEPTIONS,
+    HANGING,
+    HARMLESS,
+    PATIENCE,
+    ROOT,
+    begin,
+    environment,
+    finish,
+    mortal_fmu,
+)
 from .judgement import agreement_faults, line_faults
 from .mortal import WAYS
 
@@ -32,19 +42,6 @@ def campaign_file(work: Path, native: bool, stop: float = 3.0) -> Path:
     return path
 
 
-def begin(command: str, *arguments: object, **variables: str) -> subprocess.Popen[str]:
-    """A command in the background."""
-    return subprocess.Popen(
-        [sys.executable, "-m", command, *map(str, arguments)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        cwd=ROOT,
-        env=environment(**variables),
-    )
-
-
 def interrupted_campaigns(count: int, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
     """Interrupt campaigns in this process and in others, or kill what works, at random times."""
     rng, wrong = random.Random(seed), []
@@ -52,7 +49,7 @@ def interrupted_campaigns(count: int, seed: int, work: Path, advance: Callable[[
         out, workers, native = work / f"campaign{k}", rng.choice((0, 2)), rng.random() < 0.7
         path, loop = campaign_file(work, native), rng.choice(({}, {"CYBERSHIP_LOOP": "plain"}))
         process = begin("cosim.campaign", path, "--workers", workers, "--out", out, **loop)
-        time.sleep(rng.uniform(0.5, 8.0))
+        time.sleep(rng.uniform(0.0, 8.0))
         process.send_signal(rng.choice((signal.SIGINT, signal.SIGTERM)))
         asked = time.monotonic()
         stderr = finish(process)

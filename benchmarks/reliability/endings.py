@@ -28,10 +28,10 @@ def environment(**variables: str) -> dict[str, str]:
     return {**os.environ, **variables}
 
 
-def start(path: Path, out: Path, *more: str, **variables: str) -> subprocess.Popen[str]:
-    """A run in the background, once its handlers are there."""
+def begin(command: str, *arguments: object, **variables: str) -> subprocess.Popen[str]:
+    """A command in the background, once its handlers are there."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "cosim.run", str(path), "--out", str(out), "--no-plots", *more],
+        [sys.executable, "-m", command, *map(str, arguments)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -43,6 +43,11 @@ def start(path: Path, out: Path, *more: str, **variables: str) -> subprocess.Pop
     while time.monotonic() < until and process.poll() is None and not catches(process.pid):
         time.sleep(0.001)
     return process
+
+
+def start(path: Path, out: Path, **variables: str) -> subprocess.Popen[str]:
+    """A run in the background, once its handlers are there."""
+    return begin("cosim.run", path, "--out", out, "--no-plots", **variables)
 
 
 def catches(pid: int) -> bool:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from ..command import BAD_INPUT, FAILED, Output, complain, printable, program, run_command
+from ..command import BAD_INPUT, FAILED, Output, complain, folder_name, printable, program, run_command
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from ..process.run_state import STATE
@@ -185,7 +185,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "campaign", metavar="CAMPAIGN", type=Path, help="JSON file, see docs/campaign.md"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="result folder (results/<file name>)")
+    parser.add_argument(
+        "--out", type=folder_name, metavar="DIR", help="result folder (results/<file name>)"
+    )
     parser.add_argument(
         "--workers",
         type=_count,

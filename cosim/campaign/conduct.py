@@ -133,7 +133,13 @@ def demand_packages() -> None:
 
 
 def result_folder(campaign: str | Path | dict[str, Any], out: str | Path | None) -> Path:
-    """Where the results go if ``out`` does not say: ``results/<name of the file>``."""
+    """Where the results go if ``out`` does not say: ``results/<name of the file>``.
+
+    Raises:
+        InputError: ``out`` is empty.
+    """
+    if out is not None and not str(out).strip():
+        raise InputError("out is the name of a folder, and is empty")
     name = "campaign" if isinstance(campaign, dict) else Path(campaign).stem.removesuffix(".campaign")
     return Path(out) if out is not None else Path("results") / name
 

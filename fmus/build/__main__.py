@@ -41,9 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="FMU name or component file (all)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="copy the FMUs here (user's cache)")
+    parser.add_argument("--out", type=_folder, metavar="DIR", help="copy the FMUs here (user's cache)")
     parser.add_argument(
-        "--overwrite", action="store_true", help="with --out: replace other files of these names"
+        "--overwrite",
+        action="store_true",
+        help="with --out or --source: replace other files of these names",
     )
     parser.add_argument(
         "--list", action="store_true", help="list the FMUs, or the variables of those named"
@@ -78,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="with --native: linux64, win64, darwin64 (this computer); python: all others run in Python",
     )
     parser.add_argument(
-        "--source", type=Path, metavar="DIR", help="with --native: write plain C there, build no FMU"
+        "--source", type=_folder, metavar="DIR", help="with --native: write plain C there, build no FMU"
     )
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):
@@ -94,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
             if options.source is not None:
-                made = export(options.names, options.source, starts, _note, effects)
+                made = export(options.names, options.source, starts, _note, effects, options.overwrite)
             else:
                 native = native_targets(options.target) if options.native else None
                 made = build(
@@ -109,6 +111,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 2
     return 0
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("needs the name of a folder")
+    return Path(text)
 
 
 def _verify(names: Sequence[str]) -> None:

@@ -57,15 +57,7 @@ def build(
         _tell_unused(starts, [fmu.stem for fmu in built], note)
     if out is None:
         return built
-    there = [out / fmu.name for fmu in built if (out / fmu.name).exists()]
-    for path in there if not overwrite else ():
-        if (
-            path.is_dir()
-            or path.read_bytes() != (next(f for f in built if f.name == path.name)).read_bytes()
-        ):
-            raise BuildError(f"'{path}' is there already, and is another file; --overwrite replaces it")
-    out.mkdir(parents=True, exist_ok=True)
-    return [place(fmu, out / fmu.name) for fmu in built]
+    return _placed(built, out, overwrite)
 
 
 def export(
@@ -74,6 +66,7 @@ def export(
     starts: Starts | None = None,
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
+    overwrite: bool = False,
 ) -> list[Path]:
     """Components as plain C; arguments and errors are those of :func:`build`.
 
@@ -90,8 +83,21 @@ def export(
     with tempfile.TemporaryDirectory(prefix="source_") as work:
         for name, text in files.items():
             Path(work, name).write_text(text, encoding="utf-8")
-        folder.mkdir(parents=True, exist_ok=True)
-        return [place(Path(work, name), folder / name) for name in files]
+        return _placed([Path(work, name) for name in files], folder, overwrite)
+
+
+def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
+    """Copies of files in a folder, which is made.
+
+    Raises:
+        BuildError: another file would be replaced, and ``overwrite`` does not allow it.
+    """
+    for file in made if not overwrite else ():
+        there = folder / file.name
+        if there.is_dir() or (there.exists() and there.read_bytes() != file.read_bytes()):
+            raise BuildError(f"'{there}' is there already, and is another file; --overwrite replaces it")
+    folder.mkdir(parents=True, exist_ok=True)
+    return [place(file, folder / file.name) for file in made]
 
 
 def _every(names: Sequence[str], starts: Starts | None) -> Sequence[str]:
