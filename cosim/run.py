@@ -23,6 +23,7 @@ from .command import (
     program,
     run_command,
 )
+from .compiled.library import NATIVE, kind_of
 from .errors import InputError, SimulationError
 from .interrupts import on_interrupt, restore
 from .master.ending import Result
@@ -132,6 +133,7 @@ def _scenario(options: argparse.Namespace) -> Scenario:
     settings = [parse_assignment(text) for text in options.set]
     settings += [] if options.log is None else [("log.signals", options.log)]
     settings += [("log.format", "parquet")] if options.parquet else []
+    settings += [] if options.native is None else [("native", options.native)]
     return with_settings(scenario, settings, Path.cwd(), "--set") if settings else scenario
 
 
@@ -175,6 +177,8 @@ def _report(result: Result, quiet: bool) -> None:
         )
     if result.status == "done":
         output.print(printable(f"{result.rows} rows in {result.folder}"), soft_wrap=True)
+    if kind := kind_of(result.native):
+        output.print(kind, soft_wrap=True)
 
 
 def _positive(text: str) -> float:
@@ -280,6 +284,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--quiet", action="store_true", help="only errors")
     parser.add_argument("--verbose", action="store_true", help="also which step loop ran, and why")
+    parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
     parser.add_argument("--no-plots", action="store_true", help="draw no pictures")
     parser.add_argument(
         "--only-own",

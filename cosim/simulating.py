@@ -51,7 +51,7 @@ class Options(TypedDict, total=False):
     show: Callable[[str], None]
     progress: Callable[[float], None]
     pool: InstancePool | None
-    native: bool | None
+    native: bool | str | None
     overwrite: bool
 
 

@@ -13,13 +13,8 @@ from scipy import stats
 import cosim
 from cosim.dispatch import FinishedRun, analyse_runs
 from cosim.errors import nearest
-from fmus.build import BuildError, native_targets
 
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
-
-# Simulated time from which on FMUs are compiled [s]: their compilation takes as long, up to a minute for
-# all controllers, as this time takes with Python FMUs.
-PAYS = 2000.0
 
 Content = dict[str, Any]
 K = TypeVar("K", bound=Hashable)
@@ -118,9 +113,8 @@ def run_each(
     """Run every variant with seeds of its own; arguments as of :func:`run_all`."""
     jobs = [(name, seed) for name in variants for seed in seeds[name]]
     contents = [{**variants[name], "seed": seed} for name, seed in jobs]
-    native = _native(contents)
     made = analyse_runs(
-        [{"native": native, **content} for content in contents],
+        contents,
         analyse,
         [folder / str(name) / str(seed) if folder else None for name, seed in jobs],
         processes,
@@ -130,17 +124,6 @@ def run_each(
     for (name, _), value in zip(jobs, made, strict=True):
         found[name].append(value)
     return found
-
-
-def _native(contents: Sequence[Content]) -> bool:
-    """Whether FMUs are compiled: where it pays, and this computer can. The results are the same."""
-    if sum(content["stop"] for content in contents) < PAYS:
-        return False
-    try:
-        native_targets()
-    except BuildError:
-        return False
-    return True
 
 
 class Interval(NamedTuple):

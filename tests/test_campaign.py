@@ -153,24 +153,25 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
     assert told["versions"]["cybership"]
 
 
-def test_compiled_fmus_that_are_reset_give_the_same(base, native):
-    path = campaign(
-        base,
-        {
-            "compiled": {"set": "native", "values": [True, False]},
-            "seed": {"set": "seed", "values": [0, 1]},
-        },
-    )
-    made = cosim.run_campaign(path, base / "out", workers=0, keep_logs=True)
-    assert list(made["status"]) == ["done"] * 4
-    assert made["hash"].is_unique
-    rest = made.drop(columns=["compiled", "hash", "wall_s"])
-    assert rest[:2].equals(rest[2:].reset_index(drop=True))
-    folders = [base / "out" / "logs" / h[:16] for h in made["hash"]]
-    told = [json.loads((folder / "log.json").read_text()) for folder in folders]
-    assert [t["fmus"]["vessel"]["native"] for t in told] == [True, True, False, False]
-    logs = [(folder / "log.csv").read_bytes() for folder in folders]
-    assert logs[:2] == logs[2:]
+def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native):
+    """By the same hashes, so that a campaign goes on with FMUs of the other kind."""
+    path = campaign(base, {"seed": {"set": "seed", "values": [0, 1]}})
+    tables, logs = {}, {}
+    for kind in (True, False):
+        out, notes = base / f"native_{kind}", []
+        made = cosim.run_campaign(
+            path, out, workers=0, keep_logs=True, show=notes.append, native=kind
+        )
+        assert list(made["status"]) == ["done"] * 2
+        assert any("--no-native" in note for note in notes) == kind
+        folders = [out / "logs" / h[:16] for h in made["hash"]]
+        told = [json.loads((folder / "log.json").read_text()) for folder in folders]
+        assert [t["fmus"]["vessel"]["native"] for t in told] == [kind] * 2
+        logs[kind] = [(folder / "log.csv").read_bytes() for folder in folders]
+        tables[kind] = made.drop(columns="wall_s")
+    assert tables[True].equals(tables[False])
+    assert logs[True] == logs[False]
+    made, logs = tables[True], logs[True]
     content = json.loads((base / "base.json").read_text()) | {"native": True, "seed": 1}
     fresh = cosim.simulate(cosim.load_scenario(content), base / "fresh")
     assert fresh.metrics == {name: made[name][1] for name in fresh.metrics}

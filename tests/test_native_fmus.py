@@ -92,7 +92,7 @@ def content(stop):
 @pytest.mark.parametrize("stop", [20.0, pytest.param(198.0, marks=pytest.mark.slow)])
 def test_same_log_from_native_and_from_python_fmus(stop, native, tmp_path):
     scenario = content(stop)
-    (tmp_path / "python.json").write_text(json.dumps(scenario))
+    (tmp_path / "python.json").write_text(json.dumps(scenario | {"native": False}))
     (tmp_path / "native.json").write_text(json.dumps(scenario | {"native": True}))
     logs = []
     for kind in ("python", "native"):

@@ -62,7 +62,7 @@ def compare(plan: Plan, work: Path, case: str) -> dict[str, float]:
 
 def time_commands(work: Path, repeat: int, native: bool) -> dict[str, list[float]]:
     """Whole runs from the command line, from the start of the process to its end [s]."""
-    content = json.loads(SCENARIO.read_text()) | {"native": native or None}
+    content = json.loads(SCENARIO.read_text()) | {"native": native}
     times: dict[str, list[float]] = {}
     for _ in range(repeat):
         for stop in (content["stop"], 100.0):

@@ -24,14 +24,15 @@ Plan = dict[str, Any]
 
 def make_plan(work: Path, steps: int, native: bool) -> Plan:
     """Everything that the processes need to know, so that no tool has to find it out in its own time."""
-    system = prepare(cosim.load_scenario(json.loads(SCENARIO.read_text()) | {"native": native or None}))
+    system = prepare(cosim.load_scenario(json.loads(SCENARIO.read_text()) | {"native": native}))
     fmus = {name: work / "resources" / f"{name}.fmu" for name in system.models}
     (work / "resources").mkdir()
     for name, path in fmus.items():
         shutil.copyfile(system.models[name].path, path)
     outputs = [n for n, s in system.signals.items() if s.variable.causality == "output"]
     content = system.scenario.model_dump(mode="json", by_alias=True)
-    content |= {"stop": steps * system.scenario.step, "metrics": {}}
+    # The FMUs are files from here on; the step loop is the usual one.
+    content |= {"stop": steps * system.scenario.step, "metrics": {}, "native": "auto"}
     for name, path in fmus.items():
         content["fmus"][name]["path"] = str(path)
     plan = {

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..command import BAD_INPUT, FAILED, Output, complain, folder_name, printable, program, run_command
+from ..compiled.library import NATIVE
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from ..process.run_state import STATE
@@ -59,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 lambda text: None if options.quiet else console.print(printable(text), markup=False),
                 progress,
                 options.overwrite,
+                native=options.native,
             )
         failed = made.query("status == 'failed'")
         for message, count in Counter(failed["message"]).most_common(MESSAGES):
@@ -202,6 +204,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="also where runs of another campaign would vanish from DIR/runs.parquet",
     )
+    parser.add_argument("--native", action=argparse.BooleanOptionalAction, help=NATIVE)
     parser.add_argument("--keep-logs", action="store_true", help="keep the log of each run, in DIR/logs")
     parser.add_argument(
         "--stop-when",

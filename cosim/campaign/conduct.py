@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
-from ..compiled.library import prepare_library
+from ..compiled.library import kind_of, prepare_library
 from ..dispatch.job import Job, Row
 from ..dispatch.measured_run import Measured
 from ..dispatch.places import Place, check_address, check_workers, place_for
@@ -28,6 +28,7 @@ from ..files import update_json, write_roomy_json
 from ..interrupts import Held
 from ..process.run_state import CAMPAIGN, STATE
 from ..process.scratch import sweep
+from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from .campaign_file import LoadedCampaign
 from .case_scenarios import CaseScenarios
@@ -59,6 +60,7 @@ def run_campaign(
     progress: Progress = lambda ended, failed, of: None,
     overwrite: bool = False,
     base: Scenario | None = None,
+    native: bool | str | None = None,
 ) -> pandas.DataFrame:
     """Run a scenario many times, and give one row for each run.
 
@@ -76,6 +78,7 @@ def run_campaign(
         progress: receives how many runs have ended, how many of them failed, and how many there are.
         overwrite: whether runs may vanish from the table of the folder, those of another campaign.
         base: the scenario, in place of the one that the campaign names.
+        native: whether to compile, in place of what the scenario says, see :func:`cosim.simulate`.
 
     Returns:
         The table: axes, metrics, ``status``, ``message``, ``wall_s`` [s], ``hash``. It is in
@@ -90,6 +93,8 @@ def run_campaign(
     check_workers(workers)
     check_address(scheduler)
     loaded = LoadedCampaign(campaign, base)
+    if native is not None:
+        loaded.base = with_settings(loaded.base, [("native", native)], Path.cwd())
     folder = Path(os.path.abspath(result_folder(campaign, out)))
     if not isinstance(campaign, dict) and Path(campaign).resolve() == (folder / SUMMARY).resolve():
         raise InputError(f"'{campaign}' would be overwritten by the results; give another --out")
@@ -101,6 +106,8 @@ def run_campaign(
         rule = None if stop_when is None else StopRule(stop_when, every, loaded.campaign.seed)
         for note in scenarios.check(every):
             show(f"note: {note}")
+        for native in {files.fmus[name].is_native for name in files.identities}:
+            show(f"note: {kind_of(native)}")
         # Workers would wait for each other, deaf to interrupts.
         if note := prepare_library(loaded.base.native):
             show(f"note: {note}")

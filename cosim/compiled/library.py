@@ -22,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import fmpy
 from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
@@ -32,6 +33,7 @@ SOURCES = ("loop.c", "rows.c", "powers.py")
 # No product and sum in one rounding, no operation left out: the bits are to be those of Python.
 OPTIONS = ("-std=c99", "-O3", "-w", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 SYSTEM = ("gcc", "cc", "clang")
+PLATFORMS = ("linux64", "win64", "darwin64")  # of FMI 2.0, for which FMUs can be compiled
 # Longest wait for another process that compiles, and for a compiler [s]; chosen: zig compiles what every
 # program needs when it is used first, which takes minutes.
 PATIENCE = 600.0
@@ -40,6 +42,19 @@ PATIENCE = 600.0
 def asks_for_plain_loop() -> bool:
     """Whether the user wants nothing compiled, for comparison."""
     return os.environ.get("CYBERSHIP_LOOP") == "plain"
+
+
+NATIVE = (
+    "compile the project's own FMUs and the step loop, or neither: the numbers are the same (where the "
+    "system has a C compiler)"
+)
+
+
+def kind_of(native: bool | None) -> str:
+    """Which of the project's own FMUs ran, and how to change that; empty where none did."""
+    if native is None:
+        return ""
+    return "native FMUs (--no-native: Python ones)" if native else "FMUs in Python (--native: compiled)"
 
 
 class NoLibraryError(Exception):
@@ -62,16 +77,32 @@ def library(with_zig: bool = False) -> ctypes.CDLL:
     return found.library
 
 
-def prepare_library(native: bool | None) -> str:
+def prepare_library(native: bool | str) -> str:
     """Make the library now, if a run will want it: that may take a while, and an interrupt may end it.
 
     Args:
-        native: of the scenario: False wants none, True lets zig compile.
+        native: of a scenario: False wants none, True lets zig compile.
 
     Returns:
         What the user should know; usually empty.
     """
-    return "" if native is False or asks_for_plain_loop() else _found(bool(native)).note
+    return "" if native is False or asks_for_plain_loop() else _found(native is True).note
+
+
+def compiles(native: bool | str) -> bool:
+    """Whether the project's own FMUs are compiled.
+
+    Args:
+        native: of a scenario; ``"auto"`` where a compiler of the system has made the library.
+    """
+    return _compiles_itself() if native == "auto" else bool(native)
+
+
+@cache
+def _compiles_itself() -> bool:
+    """Asked once in a process, so that its runs have FMUs of one kind."""
+    there = fmpy.platform in PLATFORMS and any(map(shutil.which, SYSTEM))
+    return there and _found(False).library is not None
 
 
 class Found(NamedTuple):

@@ -2,9 +2,10 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.metadata import version
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..scenario.schema import Scenario
@@ -12,7 +13,7 @@ from ..system.instance_pool import InstancePool
 from .travelling_files import Files
 
 # Keys of a scenario that change no number of a run.
-WITHOUT_EFFECT = ("name", "description", "log")
+WITHOUT_EFFECT = ("name", "description", "log", "native")
 
 
 class Row(NamedTuple):
@@ -52,16 +53,27 @@ class Job:
         content: of its scenario, with the FMUs and tables named by the hashes of their contents.
         files: those names.
         task: makes the run.
+        identities: what stands in the hash for those files whose content may differ with equal numbers.
 
     Attributes:
         hash: of all that its numbers follow from; equal runs have equal ones.
     """
 
-    def __init__(self, content: dict[str, Any], files: Iterable[str], task: Task) -> None:
+    def __init__(
+        self,
+        content: dict[str, Any],
+        files: Iterable[str],
+        task: Task,
+        identities: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.content = content
         self.files = tuple(files)
         self.task = task
         counted = {key: value for key, value in content.items() if key not in WITHOUT_EFFECT}
+        counted["fmus"] = {
+            name: entry | {"path": identities.get(entry["path"], entry["path"])}
+            for name, entry in content["fmus"].items()
+        }
         text = json.dumps([counted, own_version()], sort_keys=True)
         self.hash = hashlib.sha256(text.encode()).hexdigest()
 
@@ -81,4 +93,4 @@ def job_of(scenario: Scenario, files: Files, task: Task) -> Job:
         if entry.get("table") is not None:
             entry["table"] = files.table(scenario.folder, entry["table"])
             names.append(entry["table"])
-    return Job(content, dict.fromkeys(names), task)
+    return Job(content, dict.fromkeys(names), task, files.identities)

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePath
 
+from ..compiled.library import compiles
 from ..errors import InputError
 from ..files import atomic_write
 from ..fmu.fmu_model import Model
@@ -20,6 +21,8 @@ class Files:
             built itself, whose instances hold all that they know.
         origins: SHA-256 -> how the scenario names it.
         fmus: name by content -> what has been read of the FMU.
+        identities: name by content -> guid, of the FMUs that the project has built itself: of the same
+            source in Python and compiled.
     """
 
     def __init__(self) -> None:
@@ -27,6 +30,7 @@ class Files:
         self.resettable: set[str] = set()
         self.origins: dict[str, str] = {}
         self.fmus: dict[str, Model] = {}
+        self.identities: dict[str, str] = {}
         # By path and whether the project's own FMUs are compiled.
         self._models: dict[tuple[str, bool], Model] = {}
         self._tables: dict[Path, str] = {}
@@ -42,7 +46,7 @@ class Files:
         """
         notes: list[str] = []
         for native in (False, True):
-            alike = [s for s in scenarios if bool(s.native) == native]
+            alike = [s for s in scenarios if compiles(s.native) == native]
             entries = {e.path: e for s in alike for e in s.fmus.values()}
             new = {path: e for path, e in entries.items() if (path, native) not in self._models}
             if new:
@@ -58,14 +62,17 @@ class Files:
         self.origins[model.sha256] = path
         if PurePath(path).name == path and model.path.parent != folder:
             self.resettable.add(model.sha256)
+            self.identities[name] = f"{model.name} {model.description.guid}"
 
     def models(self, scenario: Scenario) -> dict[str, Model]:
         """The FMU of each instance; :meth:`read` has read them."""
-        return {name: self._models[e.path, bool(scenario.native)] for name, e in scenario.fmus.items()}
+        return {
+            name: self._models[e.path, compiles(scenario.native)] for name, e in scenario.fmus.items()
+        }
 
     def fmu(self, scenario: Scenario, instance: str) -> str:
         """The name by content of the FMU of an instance; :meth:`read` has read it."""
-        return f"{self._models[scenario.fmus[instance].path, bool(scenario.native)].sha256}.fmu"
+        return f"{self._models[scenario.fmus[instance].path, compiles(scenario.native)].sha256}.fmu"
 
     def table(self, folder: Path, path: str) -> str:
         """The name by content of a table.

@@ -14,7 +14,7 @@ from rich.console import Console
 from ..command import BAD_INPUT, complain, printable, program, run_command
 from ..errors import InputError
 from ..formats.ssv import read_parameters
-from ..scenario.load import load_scenario
+from ..scenario.load import load_scenario, with_settings
 from ..system.preparation import prepare
 from ..system.system import System
 from .writing import export_fmu, export_osp, export_ssp
@@ -26,7 +26,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
         overrides = [(path, read_parameters(path)) for path in options.parameters]
-        system = prepare(load_scenario(options.scenario), overrides)
+        scenario = load_scenario(options.scenario)
+        if scenario.native == "auto":  # FMUs in Python run on every computer, compiled ones on this one
+            scenario = with_settings(scenario, [("native", False)], Path.cwd())
+        system = prepare(scenario, overrides)
         try:
             with console.status("exporting"):
                 notes = _export(system, options)

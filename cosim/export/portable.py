@@ -3,7 +3,7 @@
 import re
 import shutil
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import Path
 
 from ..errors import InputError
 from ..files import file_stems
@@ -165,15 +165,14 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
     """
     parts: list[Part] = []
     notes: list[str] = []
+    own = system.own
     for name, stem in zip(system.models, file_stems(list(system.models)), strict=True):
         model = system.models[name]
         values = tuple(pair for pair in system.parameters[name] if not _is_start(*pair))
-        entry, beside = system.scenario.fmus[name], system.scenario.folder
-        # The project's own FMUs have a bare name, and are in the builder's folder.
-        baked = PurePath(entry.path).name == entry.path and model.path != beside / entry.path
+        baked = name in own
         part = Part(name, model, f"{stem}.fmu", values, baked)
         if values and baked:
-            _bake(part, folder, ("--native",) if system.scenario.native else ())
+            _bake(part, folder, ("--native",) if system.scenario.native is True else ())
         else:
             shutil.copyfile(model.path, folder / part.file)
         if values and not baked:

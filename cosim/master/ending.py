@@ -38,6 +38,7 @@ class Result:
         pace: with ``realtime``: lateness and missed deadlines.
         loop: which step loop ran, ``compiled`` or ``plain``; empty if none did.
         loop_reason: why it was the plain one.
+        native: whether the project's own FMUs were compiled; None where there are none.
     """
 
     status: str
@@ -49,6 +50,7 @@ class Result:
     pace: dict[str, float] = field(default_factory=dict)
     loop: str = ""
     loop_reason: str = ""
+    native: bool | None = None
 
     @cached_property
     def log(self) -> pandas.DataFrame:

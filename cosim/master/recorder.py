@@ -70,7 +70,7 @@ class Recorder:
     def _log_writer(self, path: Path, system: System) -> LogWriter:
         native = system.scenario.native
         compiled = native is not False and not asks_for_plain_loop()
-        return LogWriter(path, self.columns, compiled=compiled, with_zig=bool(native))
+        return LogWriter(path, self.columns, compiled=compiled, with_zig=native is True)
 
     @staticmethod
     def _slots(table: ValueTable, names: Sequence[str]) -> np.ndarray:

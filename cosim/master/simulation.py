@@ -45,7 +45,7 @@ def simulate(
     show: Callable[[str], None] = lambda _: None,
     progress: Callable[[float], None] = lambda _: None,
     pool: InstancePool | None = None,
-    native: bool | None = None,
+    native: bool | str | None = None,
     believe: Sequence[str | Path] = (),
     overwrite: bool = False,
 ) -> Result:
@@ -62,7 +62,7 @@ def simulate(
         progress: receives the simulated time [s] several times a second.
         pool: FMUs that serve several runs, for a scenario whose paths are all files.
         native: in place of the scenario's: True compiles the project's own FMUs and the step loop, False
-            nothing; None leaves it to the scenario, which by default compiles the loop.
+            nothing, "auto" where the system has a C compiler; None leaves it to the scenario.
         believe: SSP parameter sets that controllers and observers believe of the plant.
         overwrite: whether the default folder is ``results/<name>``, whatever is there, and whether files
             of no run may be replaced.
@@ -196,7 +196,7 @@ def _record(
     pictures: bool,
 ) -> tuple[Result, Recorder]:
     """Run to the end; returns how it ended, and the recorder."""
-    result = Result("running", folder, warnings=system.warnings)
+    result = Result("running", folder, warnings=system.warnings, native=system.native)
     try:
         write_roomy_json(folder / logs.SIDECAR, {**sidecar, "status": "running"})
         recorder = Recorder(system, master, folder, pictures=pictures)

@@ -154,10 +154,10 @@ class Scenario(Strict):
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
-    native: bool | None = Field(
-        None,
-        description="true: compile the project's own FMUs, those with a bare name, and the step loop; "
-        "false: neither; without it the loop, where the system has a C compiler",
+    native: bool | Literal["auto"] = Field(
+        "auto",
+        description="auto: compile the project's own FMUs, those with a bare name, and the step loop, "
+        "where the system has a C compiler; true: by zig, too; false: neither; the numbers are the same",
     )
     connections: list[tuple[str, str]] = Field(
         default_factory=list,

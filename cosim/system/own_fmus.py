@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path, PurePath
 
+from ..compiled.library import compiles
 from ..errors import InputError
 from ..fmu.fmu_model import Model
 from ..scenario.schema import Scenario
@@ -23,10 +24,10 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
     # A bare name is the project's own FMU; only one that the project lacks may be a file in the folder.
     beside = sorted(name for name in bare if (scenario.folder / name).is_file())
-    paths = _own_fmus(sorted(bare.difference(beside)), bool(scenario.native), warnings)
+    paths = _own_fmus(sorted(bare.difference(beside)), compiles(scenario.native), warnings)
     for name in beside:
         try:
-            paths |= _own_fmus([name], bool(scenario.native), warnings)
+            paths |= _own_fmus([name], compiles(scenario.native), warnings)
             warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name

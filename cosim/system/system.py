@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import PurePath
 
 from ..conversion import Conversion
 from ..errors import InputError, nearest
@@ -67,6 +68,21 @@ class System:
         """Names of the inputs that get values during the run, from outputs or files."""
         recorded = {n for parts in self.recordings.values() for part in parts for n in part.names}
         return recorded | {c.target.name for c in self.connections}
+
+    @property
+    def own(self) -> list[str]:
+        """Instances of the project's own FMUs: those with a bare name, in the builder's folder."""
+        entries, beside = self.scenario.fmus, self.scenario.folder
+        return [
+            n
+            for n, model in self.models.items()
+            if PurePath(path := entries[n].path).name == path and model.path != beside / path
+        ]
+
+    @property
+    def native(self) -> bool | None:
+        """Whether the project's own FMUs are compiled; None where there are none."""
+        return self.models[self.own[0]].is_native if self.own else None
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

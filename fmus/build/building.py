@@ -13,7 +13,7 @@ from ..effects import STANDARD, EffectSet
 from . import ledger
 from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
-from .packing import changes, pack
+from .packing import changes, hash_of, pack, sources
 from .platforms import Native
 from .start_values_file import Starts
 
@@ -155,20 +155,23 @@ def _cached(
                 if native is None:
                     built = pack(component, module, own_file, Path(work), effects)
                 else:
-                    built = _compiled(component, native, Path(work), python)
+                    code_hash = hash_of(sources(module, own_file, effects), component.starts)
+                    built = _compiled(component, code_hash, native, Path(work), python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
                 store(built, fmu)
     return fmu
 
 
-def _compiled(component: Component, native: Native, work: Path, python: Path | None) -> Path:
+def _compiled(
+    component: Component, code_hash: str, native: Native, work: Path, python: Path | None
+) -> Path:
     from ..fmi.trace import TraceError
     from ..native.compilers import CompilerError
     from ..native.native_fmu import native_fmu
 
     try:
-        return native_fmu(component, native.targets, work, python)
+        return native_fmu(component, code_hash, native.targets, work, python)
     except (CompilerError, TraceError) as error:
         raise BuildError(f"{component.name} cannot be compiled: {error}") from error
 

@@ -100,6 +100,15 @@ def _imports(source: str, package: str) -> tuple[str, ...]:
     return tuple(name for name in names if name == "fmus" or name.startswith("fmus."))
 
 
+def hash_of(files: Mapping[str, str], starts: Mapping[str, float]) -> str:
+    """What identifies a component, in Python and compiled: hash of its source and its start values."""
+    digest = hashlib.sha256()
+    for inside in sorted(files):
+        digest.update(f"{inside}\0{files[inside]}\0".encode())
+    digest.update(changes(starts).encode())
+    return digest.hexdigest()
+
+
 def pack(
     component: Component,
     module: str,
@@ -110,13 +119,8 @@ def pack(
     """Build one FMU in a scratch folder and return its path."""
     from pythonfmu.builder import FmuBuilder
 
-    files = sources(module, own_file, effects)
-    digest = hashlib.sha256()
-    for inside in sorted(files):
-        digest.update(f"{inside}\0{files[inside]}\0".encode())
-    changed = changes(component.starts)
-    digest.update(changed.encode())
-    code_hash = digest.hexdigest()
+    files, changed = sources(module, own_file, effects), changes(component.starts)
+    code_hash = hash_of(files, component.starts)
     package = f"{component.name}_{code_hash[:16]}"
     for inside, text in files.items():
         path = work / package / inside

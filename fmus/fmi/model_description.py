@@ -1,5 +1,6 @@
 """A component's modelDescription.xml, FMI 2.0.4, from its declaration and nothing else."""
 
+import uuid
 from xml.etree.ElementTree import Element, SubElement
 
 from ..base_units import base_exponents
@@ -11,6 +12,11 @@ LOG_CATEGORIES = {
     "logStatusError": "A step failed; the state is the one before it.",
     "logAll": "Everything else.",
 }
+
+
+def guid_of(code_hash: str) -> str:
+    """The guid of a component in Python and compiled, whose numbers are the same."""
+    return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, code_hash)}}}"
 
 
 def model_description(

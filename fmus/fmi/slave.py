@@ -7,7 +7,6 @@ serialising follow from that.
 
 import hashlib
 import json
-import uuid
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any, ClassVar
@@ -62,10 +61,9 @@ class Slave(Fmi2Slave):
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """The model description; only needed while the FMU is built."""
-        from .model_description import model_description
+        from .model_description import guid_of, model_description
 
-        guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, self.code_hash)}}}"
-        return model_description(self.component, guid, self.code_version)
+        return model_description(self.component, guid_of(self.code_hash), self.code_version)
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         if vrs == self._all_inputs and isfinite(sum(values)):

@@ -6,18 +6,16 @@ source gives the same bytes, as far as the compiler does.
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
-import uuid
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 from ..declare import Component
-from ..fmi.model_description import model_description
+from ..fmi.model_description import guid_of, model_description
 from .compilers import TARGETS, compiled
-from .model_source import FACE, fmu_source, model_source
+from .model_source import FACE, fmu_source
 from .program import program
 
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
@@ -26,12 +24,17 @@ FACE_FILE = Path(__file__).with_name(FACE)
 
 
 def native_fmu(
-    component: Component, targets: Sequence[str], work: Path, python: Path | None = None
+    component: Component,
+    code_hash: str,
+    targets: Sequence[str],
+    work: Path,
+    python: Path | None = None,
 ) -> Path:
     """Build one FMU in a scratch folder.
 
     Args:
         component: what it computes.
+        code_hash: identifies it.
         targets: platforms to compile for, of :data:`~fmus.native.compilers.TARGETS`.
         work: the scratch folder.
         python: the same component's Python FMU, whose body then serves all other platforms.
@@ -44,9 +47,7 @@ def native_fmu(
         TraceError: the component does what cannot be compiled.
     """
     recorded = program(component)
-    texts = model_source(recorded)
-    digest = hashlib.sha256(FACE_FILE.read_bytes() + b"\0".join(t.encode() for t in texts.values()))
-    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_OID, digest.hexdigest())}}}"
+    guid = guid_of(code_hash)
     for name, text in fmu_source(recorded, guid).items():
         (work / name).write_text(text, encoding="utf-8")
     version = importlib.metadata.version("cybership")

@@ -38,7 +38,7 @@ class PlainLoopError(Exception):
 
 
 def compiled_run(
-    master: Master, rows: PendingRows, native: bool | None, realtime: bool, patience: float
+    master: Master, rows: PendingRows, native: bool | str, realtime: bool, patience: float
 ) -> Iterator[tuple[float, bool]]:
     """Steps to the end in C, with their rows.
 
@@ -72,7 +72,7 @@ def compiled_run(
                     "(cosim.scenario.operations)"
                 )
     try:
-        functions = library(with_zig=bool(native))
+        functions = library(with_zig=native is True)
     except NoLibraryError as error:
         raise PlainLoopError(str(error)) from None
     if any(functions.layout(k) != ctypes.sizeof(found) for k, found in enumerate(STRUCTURES)):
