@@ -41,8 +41,8 @@ LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one de
 
 SETTLED = 0.95  # share of the noise by which it must still fall for another round; chosen
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
-# Share of the time at work of a thruster in which it fails at the most: what is so most of the time is
-# the rule and no failure, such as a dead band of small commands; chosen.
+# Share of the time at work of a thruster in a run in which it fails at the most: what is so most of the
+# time is the rule and no failure, such as a dead band of small commands; chosen.
 EXCEPTION = 0.5
 RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
@@ -81,7 +81,7 @@ class Problem:
         middles: (K,), cell, and part of it, in which the middle of each window lies.
         along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
         precision, offset: (q, q) and (q,), of the nuisance parameters.
-        work: (m,), share of the time in which the thruster is commanded, in each cell.
+        work: (m,), share of the run's time in which the thruster is commanded, in each cell.
     """
 
     sections: Sequence[Section]
@@ -96,8 +96,11 @@ class Problem:
     work: np.ndarray
 
     def passing(self, spans: Spans) -> bool:
-        """Whether the thruster works for at least half of the time for which it is commanded."""
-        return self.lasting or sum(float(self.work[a:b].sum()) for a, b in spans) <= EXCEPTION
+        """Whether the thruster works in each run for at least half of the time for which it is commanded."""
+        dead: Counter[str] = Counter()
+        for a, b in spans:
+            dead[self.section(a).run] += self.work[a:b].sum()
+        return self.lasting or all(share <= EXCEPTION for share in dead.values())
 
     def without_end(self, spans: Spans) -> bool:
         """Whether there is one interval in each run at the most, and it lasts to the end of the run."""
@@ -344,7 +347,8 @@ def problem(
         dead = model.plus({n: time - model.value(n) for n, time in named.items()})
         lost = thrust_along(w, model) - thrust_along(w, dead)
         place = np.clip(((w.run.time - first) / cell + 1e-6).astype(int), 0, count - 1)
-        work.append(np.bincount(place, np.any(lost != 0.0, axis=1), count))
+        worked = np.bincount(place, np.any(lost != 0.0, axis=1), count)
+        work.append(worked / max(worked.sum(), 1.0))
         where = csr_matrix((np.ones(place.size), (np.arange(place.size), place)), (place.size, count))
         force = [w.held @ diags(-axis) @ where for axis in lost.T]
         by_axis = vstack([sum(f * g for f, g in zip(force, gain, strict=True)) for gain in turned.T])
@@ -358,7 +362,6 @@ def problem(
     if not columns.count_nonzero():
         return None
     Z, precision, offset = along or (np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0))
-    worked = np.concatenate(work)
     return Problem(
         sections,
         not e.search.intervals[0][1],
@@ -369,7 +372,7 @@ def problem(
         Z.reshape(base.size, -1),
         precision,
         offset,
-        worked / worked.sum(),
+        np.concatenate(work),
     )
 
 
