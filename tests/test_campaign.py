@@ -159,9 +159,7 @@ def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native):
     tables, logs = {}, {}
     for kind in (True, False):
         out, notes = base / f"native_{kind}", []
-        made = cosim.run_campaign(
-            path, out, workers=0, keep_logs=True, show=notes.append, native=kind
-        )
+        made = cosim.run_campaign(path, out, workers=0, keep_logs=True, show=notes.append, native=kind)
         assert list(made["status"]) == ["done"] * 2
         assert any("--no-native" in note for note in notes) == kind
         folders = [out / "logs" / h[:16] for h in made["hash"]]

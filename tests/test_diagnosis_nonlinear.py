@@ -105,7 +105,9 @@ def test_what_is_dead_most_of_the_time_is_no_outage():
     model = Model()
     assert not candidate([w], model, model_error([w], model), STANDARD["vsp_outage"]).shapes
     rest = [integrals(smoothed(replace(sail(64.0)[0], name=name))) for name in "bc"]
-    assert not candidate([w, *rest], model, model_error([w, *rest], model), STANDARD["vsp_outage"]).shapes
+    assert not candidate(
+        [w, *rest], model, model_error([w, *rest], model), STANDARD["vsp_outage"]
+    ).shapes
 
 
 def test_dynamic_programming_gives_the_least_sum():
