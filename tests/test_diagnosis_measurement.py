@@ -2,6 +2,7 @@
 
 import json
 import re
+import tracemalloc
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,8 @@ from support.measured import DATA, needs_data
 
 import cosim
 import diagnosis
-from diagnosis.data.columns import FIVE, POWER, TAU, THREE
+from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Layout
+from diagnosis.data.csv_tables import csv_table
 from diagnosis.data.reading import force
 from fmus.thrusters.allocation import Allocation, thrust
 
@@ -361,3 +363,17 @@ def test_measured_runs_are_read():
         assert np.median(np.diff(run.time)) == pytest.approx(0.05)
         most = np.abs(run.tau_cmd[:, 0]).max()
         assert most == pytest.approx(2.33 * run.power[:, 0].max(), rel=0.01), "full ahead, once"
+
+
+def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):
+    path = tmp_path / "wide.csv"
+    path.write_text("time,x,other\n" + "".join(f"{k},{2 * k},{'9' * 1000}\n" for k in range(20_000)))
+    tracemalloc.start()
+    try:
+        table = csv_table(path, Layout(), {"time", "x"})
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert (table["x"] == 2 * table["time"]).all()
+    assert len(table) == 20_000
+    assert most < 0.5 * path.stat().st_size

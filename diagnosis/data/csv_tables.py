@@ -1,7 +1,6 @@
 """CSV files as tables, read as the JSON file beside them says."""
 
 from collections.abc import Collection
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -47,15 +46,15 @@ def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFra
         OSError, ValueError: it cannot be read.
         KeyboardInterrupt: the user has asked for the end.
     """
-    content = BytesIO(path.read_bytes())
     try:
-        return pd.read_csv(
-            content,
-            usecols=lambda name: str(name).strip() in wanted,
-            decimal=layout.decimal,
-            skipinitialspace=True,
-            **_options(layout),
-        ).rename(columns=str.strip)
+        with open(path, "rb") as content:  # a long log does not fit into memory twice
+            return pd.read_csv(
+                content,
+                usecols=lambda name: str(name).strip() in wanted,
+                decimal=layout.decimal,
+                skipinitialspace=True,
+                **_options(layout),
+            ).rename(columns=str.strip)
     except UnicodeDecodeError:
         refuse_encoding(path, layout)
         raise
