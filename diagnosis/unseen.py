@@ -112,6 +112,13 @@ def losses(
     ]
 
 
+def gain(its: Losses, others: Losses) -> float:
+    """By how much another model misses less, on a logarithmic scale, summed over the three."""
+    pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))
+
+
 def harm(its: Losses, others: Losses) -> str:
     """In what a model is worse than another by more than two paired standard errors; empty: in nothing.
 

@@ -4,7 +4,7 @@ They only veto: what is withdrawn is replaced by nothing. How sure an effect is 
 makes predictions better stays in the model.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from .identification.acceptance import worse
 from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
 from .model import Integrals, Model
-from .unseen import Losses, Part, harm, losses
+from .unseen import Losses, Part, gain, harm, losses
 
 ALONE = "with it {harm}"
 WHOLE_SET = "with it and what was found before it {harm} than at first"
@@ -87,16 +87,18 @@ def withdraw(
     if not found.effects or not unseen.judges(found):
         return found, []
     gone: list[Withdrawn] = []
-    rests = {i: without(found, [i], start) for i in judged}
-    full, *beside = unseen.losses(found, *rests.values())
-    for (i, rest), other in zip(rests.items(), beside, strict=True):
-        harmed = harm(full, other)
-        if harmed:
-            gone.append(Withdrawn(i, ALONE.format(harm=harmed.format(where=unseen.where))))
-        elif drives(found.model, _model(rest, start)) and not worse(other.omega, full.omega):
-            gone.append(Withdrawn(i, DRIVES.format(where=unseen.where)))
-    kept = without(found, [w.id for w in gone], start) if gone else found
-    for i in reversed([i for i in judged if all(i != w.id for w in gone)]):
+    kept, left = found, judged
+    while left:
+        rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
+        on = {i for i, rest in rests.items() if drives(kept.model, _model(rest, start))}
+        worst = _worst(kept, rests, unseen, on)
+        if worst is None:
+            break
+        # One at a time: of two that stand in for each other, the other may be needed then.
+        gone.append(worst)
+        kept = rests[worst.id]
+        left = [i for i in left if i != worst.id]
+    for i in reversed(left):
         harmed = harm(*unseen.losses(kept, start))
         if not harmed:
             break
@@ -105,6 +107,30 @@ def withdraw(
     if len(gone) == len(judged) and kept.effects and harm(*unseen.losses(kept, start)):
         kept = added(kept, kept.effects, start)
     return kept, gone
+
+
+def _worst(
+    kept: Findings, rests: Mapping[str, Findings], unseen: Unseen, drive: Collection[str]
+) -> Withdrawn | None:
+    """The effect without which unseen data gain the most, of those that are to go; None: none is.
+
+    Args:
+        kept: the findings.
+        rests: effect -> the findings without it.
+        unseen: the data that decide.
+        drive: effects with which the hull drives the ship on.
+    """
+    full, *beside = unseen.losses(kept, *rests.values())
+    found: list[tuple[float, Withdrawn]] = []
+    for i, other in zip(rests, beside, strict=True):
+        if harmed := harm(full, other):
+            reason = ALONE.format(harm=harmed.format(where=unseen.where))
+        elif i in drive and not worse(other.omega, full.omega):
+            reason = DRIVES.format(where=unseen.where)
+        else:
+            continue
+        found.append((gain(full, other), Withdrawn(i, reason)))
+    return max(found)[1] if found else None
 
 
 def _model(found: Findings, start: Model) -> Model:

@@ -25,7 +25,7 @@ from diagnosis.model.uncertainty import omega_std
 from diagnosis.model.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.unseen import Losses, harm
-from diagnosis.withdrawal import Unseen, withdraw
+from diagnosis.withdrawal import Unseen, withdraw, without
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
@@ -276,6 +276,21 @@ def test_coefficients_beside_a_failure_of_one_run_are_held_against_unseen_runs()
         assert [f.id for f in kept.effects] == ["bow_outage"]
         assert gone == []
         assert kept.model.values == (model if stays else start.plus(times)).values
+
+
+def test_of_two_effects_that_stand_in_for_each_other_one_stays():
+    runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
+    start, both = Model(), {"delta_X_u": -3.0, "delta_X_uuu": -200.0}
+    first, second = finding(start, delta_X_u=-3.0), finding(start, delta_X_uuu=-200.0)
+    model = start.plus(both)
+    found = Findings([first, replace(second, model=model)], model=model, sigma=np.full(3, 0.01))
+    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+    alone = [without(found, [i], start) for i in ("X_u", "X_uuu")]
+    full, *beside = unseen.losses(found, *alone)
+    assert all(harm(full, other) for other in beside), "each is harmful beside the other"
+    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    assert [w.id for w in gone] == ["X_uuu"]
+    assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
 
 
 def left_on(**significant):

@@ -96,7 +96,7 @@ class Problem:
     work: np.ndarray
 
     def passing(self, spans: Spans) -> bool:
-        """Whether the thruster works in each run for at least half of the time for which it is commanded."""
+        """Whether in each run the thruster works for at least half of the time of its commands."""
         dead: Counter[str] = Counter()
         for a, b in spans:
             dead[self.section(a).run] += self.work[a:b].sum()
