@@ -9,6 +9,7 @@ import pytest
 from support.measured import commands, sail, smoothed
 
 from diagnosis.assessment.windows import LENGTH, Windows
+from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, integrals
@@ -18,6 +19,7 @@ from diagnosis.prediction_error.fit import fit_predictions, shootings
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.prediction_error.predicted_bands import prediction_bands
 from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
+from diagnosis.prediction_error.refit import fit_model_error
 from diagnosis.prediction_error.shooting import Linear, Shooting
 from diagnosis.prediction_error.unrecorded import unrecorded
 
@@ -30,12 +32,29 @@ STEPS = {
     "marker_offset_dx": 1e-3,
 }
 DRAG = -2.0  # N s/m, hidden
+LIGHTLY_DAMPED = -0.62  # N m s/rad, hidden
 DRAGGED = Model({"delta_X_u": DRAG})
 
 
 def pushed(t, axis, size):
     """The commands, with more on an axis for two seconds."""
     return commands(t) + np.where((t >= 30.0) & (t < 32.0), size, 0.0)[:, None] * np.eye(3)[axis]
+
+
+def straight_on(t):
+    """tau [N, N, N m] that hardly turns the ship."""
+    return np.column_stack([0.2 + 0.05 * np.sin(0.05 * t), 0.0 * t, 0.0 * t])
+
+
+def jolted(t, seed):
+    """The same, and a moment of 0.08 N m that lasts a second, to either side, every 3 s on average."""
+    rng = np.random.default_rng(seed)
+    tau = straight_on(t)
+    for start, sign in zip(
+        np.cumsum(rng.exponential(3.0, 200)), rng.choice([-1.0, 1.0], 200), strict=True
+    ):
+        tau[(t >= start) & (t < start + 1.0), 2] += 0.08 * sign
+    return tau
 
 
 @cache
@@ -134,6 +153,31 @@ def test_fit_finds_what_was_hidden_within_its_interval():
     before = Windows([hidden().smoothed]).errors(Model()).over_all()[0]
     after = Windows([hidden().smoothed]).errors(fit.estimate.model(prior)).over_all()[0]
     assert after < 0.1 * before
+
+
+@pytest.mark.slow
+def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
+    """0.08 N m for a second, every 3 s on average, nobody's, and hardly a command beside it.
+
+    The rate is correlated with it: the fit to the model error is off by more than its interval, that to
+    predictions is not, and says that something unrecorded acts.
+    """
+    data = []
+    for seed in (1, 2, 3):
+        run = sail(300.0, 0.05, {"N_r": LIGHTLY_DAMPED}, seed=seed, given=partial(jolted, seed=seed))[0]
+        data.append(integrals(smoothed(replace(run, tau_cmd=straight_on(run.time)))))
+    prior = NominalPrior.of(Model(), 0.0)
+    at = Estimate(Model(), np.zeros(prior.size), {"delta_N_r": 0.0}, np.zeros((1, 1)))
+    for _ in range(2):  # the second time with what the first leaves as noise
+        sigma = np.sqrt(np.mean(model_error(data, at.model(prior)) ** 2, axis=0))
+        at, std = fit_model_error(at, sigma, data, prior)
+    fit = fit_predictions(data, shootings(data), at, prior)
+    true = LIGHTLY_DAMPED - Model().value("N_r")
+    assert at.values["delta_N_r"] - true > 3.0 * std["delta_N_r"]
+    found, error = fit.estimate.values["delta_N_r"], np.sqrt(fit.covariance[0, 0])
+    assert abs(found - true) < 1.96 * error
+    assert error < 0.1 * abs(LIGHTLY_DAMPED)
+    assert fit.push.size[2] > 10.0 * fit.push.size[:2].max()
 
 
 def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):

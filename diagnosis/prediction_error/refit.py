@@ -55,7 +55,7 @@ def to_predictions(
     if known or begin is None or searched is None or not windows:
         return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, _push(runs, found), {}))
     begin = replace(begin, offset=rescaled(begin.offset, searched, prior))
-    weak, weak_std = _weak_form(begin, found.sigma, runs, prior)
+    weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
     fitted = fit_predictions(runs, windows, weak, prior)
     posterior, at = Posterior.of(fitted, prior), fitted.estimate
     model, std = at.model(prior), posterior.std
@@ -95,7 +95,7 @@ def rescaled(offset: np.ndarray, old: NominalPrior, new: NominalPrior) -> np.nda
     return np.array([k * a / b if b else 0.0 for k, a, b in pairs])
 
 
-def _weak_form(
+def fit_model_error(
     at: Estimate, sigma: np.ndarray, runs: Sequence[Integrals], prior: NominalPrior
 ) -> tuple[Estimate, dict[str, float]]:
     """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
