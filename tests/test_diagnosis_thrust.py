@@ -72,6 +72,11 @@ def true_nu():
     return sailed()[1]
 
 
+def acting(run, model, nu):
+    """tau_act (n, 3) by series."""
+    return thrust(run, model, Response(run, model).between_samples, nu)
+
+
 def by_steps(run, nu, values):
     """tau_act (n, 3) of the thrusters' FMU, stepped from sample to sample."""
     model = Model(thrusters=values)
@@ -89,7 +94,7 @@ def by_steps(run, nu, values):
 def test_mean_force_over_each_interval_from_series_is_that_of_the_steps(values):
     """Within 1e-9 N; of a lag 6e-6 of what was commanded twelve time constants ago is forgotten."""
     expected = by_steps(base(), true_nu(), values)
-    force = thrust(base(), Response(base(), Model(thrusters=values)), true_nu())
+    force = acting(base(), Model(thrusters=values), true_nu())
     forgotten = 2e-5 if values.get("lag") else 1e-9
     np.testing.assert_allclose(force, expected, atol=forgotten)
     assert np.abs(expected - by_steps(base(), true_nu(), {})).max() > 1e-3, "the value matters"
@@ -110,7 +115,7 @@ def test_two_propellers_with_the_same_commands_are_twice_the_one_that_stands_for
     if len(values) == 21:
         values = {n: 0.01 * k for k, n in enumerate(values)}
     model = Model(thrusters=values)
-    by_one, by_two = (thrust(r, Response(r, model), nu) for r in (one, two))
+    by_one, by_two = (acting(r, model, nu) for r in (one, two))
     np.testing.assert_allclose(by_two, 2.0 * by_one, atol=1e-12)
 
 
@@ -121,7 +126,7 @@ def test_a_propeller_to_port_that_pushes_ahead_turns_the_ship_to_starboard():
         model = Model(thrusters={f"curve_{name}_x_c_{node}": 0.2 for node in range(1, 22)})
         for five in (None, np.zeros((base().time.size, 5))):
             run = replace(base(), five=five)
-            push, none = (thrust(run, Response(run, m), true_nu()) for m in (model, still))
+            push, none = (acting(run, m, true_nu()) for m in (model, still))
             X, Y, N = (push - none).T
             np.testing.assert_allclose(X, 0.2 if five is not None else 0.1)
             np.testing.assert_allclose(Y, 0.0, atol=1e-12)

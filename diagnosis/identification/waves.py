@@ -161,8 +161,8 @@ def model_error(run: Smoothed, model: Model) -> np.ndarray:
     u_dot, v_dot = rotate_to_body(run.eta[:, 2], run.eta_ddot[:, 0], run.eta_ddot[:, 1])
     u, v, r = run.nu.T
     nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, run.eta_ddot[:, 2]])
-    response = Response(run.track.run, model)
-    driven = by_mass(model, thrust(run.track.run, response, np.nan_to_num(run.nu)))
+    between = Response(run.track.run, model).between_samples
+    driven = by_mass(model, thrust(run.track.run, model, between, np.nan_to_num(run.nu)))
     free = acceleration(model, run.time, run.eta, run.nu)
     return (nu_dot - free - driven) @ model.reference_mass.T
 

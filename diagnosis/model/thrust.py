@@ -6,7 +6,6 @@ memory lasts only so long: the grid is cut into parts that are stepped side by s
 before it that still matters. Weak form and predictions use the same result, :class:`Response`.
 """
 
-from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -61,22 +60,23 @@ def placed(drive: chain.Prepared, aside: Any, power: chain.Power | None) -> chai
     return drive._replace(params=p._replace(plant=plant, power=power or p.power))
 
 
-def thrust(run: Run, response: "Response", nu: np.ndarray) -> np.ndarray:
+def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """tau (n, 3) [N, N, N m] that acts from each sample to the next.
 
     Args:
         run: its time and power.
-        response: of the model's thrusters to the run's commands.
+        model: whose thrusters act.
+        between: (2, n, sets, 3), their response to the run's commands, :attr:`Response.between_samples`.
         nu: (n, 3), body-fixed velocity.
     """
     power = None if run.power is None else chain.Power(*run.power.T)
-    given, acting = response.between_samples
+    given, acting = between
     total = np.zeros_like(run.tau_cmd)
     for k, aside in enumerate(places(run)):
         u, v, r = nu.T
         x, y, bow = given[:, k].T
         now = Running(run.time, u, v, r, x, y, bow, aside)
-        drive = placed(response.model.drive, aside, power)
+        drive = placed(model.drive, aside, power)
         total += np.column_stack(np.broadcast_arrays(*chain.act(tuple(acting[:, k].T), now, drive)))
     return total
 
@@ -105,28 +105,19 @@ class Response:
         ]
         self.slow = bool(self._memories) or drive.params.rate.plant_rate > 0.0
 
-    def of(self, model: Model) -> "Response":
-        """The response of another model whose :meth:`key` is the same, computed only once."""
-        if model is self.model:
-            return self
-        other = copy(self)
-        other.model = model
-        return other
-
     @staticmethod
     def key(model: Model) -> tuple[Any, ...]:
         """What the response depends on, to be kept while it stays the same."""
         p = model.drive.params
         return p.dynamics, p.rate, p.allocation, model.clock
 
-    @cached_property
-    def between_samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Means (n, sets, 3) from each sample to the next: commands that arrive, shares that act."""
+    @property
+    def between_samples(self) -> np.ndarray:
+        """Means (2, n, sets, 3) from each sample to the next: commands that arrive, shares that act."""
         if not self.slow and self.model.clock == 0.0:
-            shares = commanded_shares(self.run, self.model)
-            return shares, shares
+            return np.stack([commanded_shares(self.run, self.model)] * 2)
         ends = np.append(self.run.time, self.run.time[-1] + self._period)
-        return self.mean(ends[:-1], ends[1:])
+        return np.stack(self.mean(ends[:-1], ends[1:]))
 
     def mean(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Means over intervals of the run's time: commands that arrive, and shares that act.

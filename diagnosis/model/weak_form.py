@@ -32,6 +32,9 @@ BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
 KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
 ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
+MEMORIES = (
+    4e7  # bytes for commands after a memory: of four minutes those of 60 lags, delays and the like
+)
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -77,7 +80,7 @@ class Integrals:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
-    def recall(self, what: str, key: Any, make: Callable[[], Any]) -> Any:
+    def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
         Of two models that differ in the hull alone the thrust is the same, and so on.
@@ -86,7 +89,7 @@ class Integrals:
         found = kept.pop(key, None)
         if found is None:
             found = make()
-            most = ROOM // found.nbytes if isinstance(found, np.ndarray) else KEPT
+            most = room // found.nbytes if isinstance(found, np.ndarray) else KEPT
             while len(kept) >= max(most, KEPT):
                 del kept[next(iter(kept))]
         kept[key] = found  # the last in order is the latest
@@ -211,9 +214,9 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
     model = model.during(w.run.name)
     if nu is None:
         nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
-    key = Response.key(model)
-    response = w.recall("response", key, lambda: Response(w.run, model, not at_rest(w.smoothed)))
-    return thrust(w.run, response.of(model), nu)
+    key, moving = Response.key(model), not at_rest(w.smoothed)
+    between = w.recall("response", key, lambda: Response(w.run, model, moving).between_samples, MEMORIES)
+    return thrust(w.run, model, between, nu)
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
