@@ -1,6 +1,7 @@
 """The benchmark of hidden effects: what it hides, what the diagnosis gets, what counts as separable."""
 
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from benchmarks.hidden_effects.answers import judge
 from benchmarks.hidden_effects.cells import KINDS, PAIRS, Cell, cells, for_fitting, for_showing, kind_of
 from benchmarks.hidden_effects.confidence_fit import Judged, confidence, fitted
 from benchmarks.hidden_effects.draw import (
+    IN_NOISE,
     LARGEST,
     LOOKED_FOR,
+    NOTHING_HIDDEN,
     OTHER_TIMES,
     OUTAGES,
     SINGLE,
@@ -24,7 +27,7 @@ from benchmarks.hidden_effects.draw import (
     draw,
     share,
 )
-from benchmarks.hidden_effects.fleet import Order, sail_all
+from benchmarks.hidden_effects.fleet import Order, ProcessNoise, sail_all
 from benchmarks.hidden_effects.foreign_physics import FOREIGN_PHYSICS
 from benchmarks.hidden_effects.manoeuvres import Manoeuvre, manoeuvres
 from benchmarks.hidden_effects.problems import Problem, kept, make
@@ -36,7 +39,7 @@ from benchmarks.hidden_effects.simulated_runs import STEP, Hidden, Voyage, build
 from benchmarks.hidden_effects.summary import write
 from benchmarks.hidden_effects.truth import Motion, force, motion, over, windows
 from cosim import InputError
-from diagnosis import Run
+from diagnosis import Model, Run
 from fmus.effects import STANDARD
 from fmus.thrusters.allocation import Allocation, thrust
 
@@ -392,6 +395,28 @@ def test_score_of_right_and_wrong_findings():
     assert found.reached == pytest.approx(0.9)
     outside = row(problem_of("X_u", values={"delta_X_u": -2.0}), answer_of("found", ("X_u", 0.98, c)))
     assert (outside.intervals, outside.covered) == (1, 0)
+
+
+def test_process_noise_has_the_size_and_the_time_that_it_says():
+    noise = ProcessNoise((0.1, 0.2, 0.02), 2.0)
+    series = noise.series(np.random.default_rng(1), 200_000)
+    assert series.std(axis=0) == pytest.approx(noise.size, rel=0.1)
+    later = round(2.0 / STEP)
+    kept = np.mean(series[:-later] * series[later:], axis=0) / series.var(axis=0)
+    assert kept == pytest.approx(np.exp(-1.0), abs=0.1)
+
+
+def test_in_process_noise_every_interval_counts_and_damping_by_its_sum():
+    problem = problem_of("X_u" + IN_NOISE, "wrong", {"delta_X_u": -1.0})
+    problem = replace(problem, vessel={"delta_X_u": -1.0, "X_u": -0.7}, thrusters={})
+    names = ["delta_X_u", "X_u", "m", "loss_yaw"]
+    mean = [-1.5, -0.2, Model().value("m") + 1.0, 0.0]  # the sum is right, each alone is not
+    covariance = np.diag([0.01, 0.01, 1.0, 0.01])
+    answer = answer_of("found", ("X_u", 0.98, {})) | {"posterior": [names, mean, covariance.tolist()]}
+    found = row(problem, answer)
+    assert (found.intervals, found.covered, found.true) == (4, 2, ["1"])
+    assert list(map(float, found.damping)) == pytest.approx([0.0], abs=1e-9)
+    assert row(problem_of(NOTHING_HIDDEN + IN_NOISE), answer).true == ["0"]
 
 
 def test_coefficient_that_is_told_counts_where_it_is_the_same_as_the_effect():

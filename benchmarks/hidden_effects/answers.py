@@ -21,6 +21,7 @@ from diagnosis import (
     method,
     smooth,
 )
+from diagnosis.assessment.bands import LEVELS
 from diagnosis.progress import silent
 
 from .cells import Key
@@ -38,7 +39,8 @@ def answer(problem: Problem, peers: bool) -> Answer:
 
     Returns:
         ``diagnosis.json`` without what no score needs; besides ``evidence``, what the confidence of each
-        finding is made of (None where the method has none), ``seconds`` of processor time from measured
+        finding is made of (None where the method has none), ``posterior``, names, mean and covariance of
+        what was fitted, ``bands``, see :func:`within_bands`, ``seconds`` of processor time from measured
         runs to the answer, ``worse``, which predictions of the run held out became worse, ``truth_mm``,
         the window position error of the true model on that run (None where the diagnosis has none of its
         form), and ``peers``, what others find first.
@@ -56,12 +58,29 @@ def answer(problem: Problem, peers: bool) -> Answer:
     found = {name: value for name, value in content.items() if name not in LEFT_OUT}
     pairs = zip(diagnosis.learned.effects, diagnosis.believed, strict=True)
     told = [f.evidence for f, is_finding in pairs if is_finding]
+    posterior = diagnosis.posterior
+    names = [name.partition(".")[2] for name in posterior.names]
+    found["posterior"] = [names, posterior.mean.tolist(), posterior.covariance.tolist()]
+    found["bands"] = within_bands(diagnosis.comparison)
     found["evidence"] = [None if e is None else list(map(float, e)) for e in told]
     found |= {"seconds": seconds, "truth_mm": truth(problem, last)}
     found["worse"] = [name for name, is_worse in predictions(diagnosis.comparison).items() if is_worse]
     if peers and problem.hidden:
         found["peers"] = {peer: first_effect(peer, train) for peer in PEERS}
     return found
+
+
+def within_bands(comparison: Comparison) -> list[list[float]]:
+    """For the bands of 50 and 90 % the share of each window's samples of the last run within them.
+
+    Positions and headings count alike.
+    """
+    e = comparison.evaluations[-1]
+    if e.bands is None:
+        return []
+    window = e.bands.windows.sample_window
+    inside = [e.bands.inside(e.after.residuals, level).mean(axis=1) for level in LEVELS]
+    return [(np.bincount(window, x) / np.bincount(window)).tolist() for x in inside]
 
 
 def predictions(comparison: Comparison) -> dict[str, bool]:

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from .draw import OUTAGES, SINGLE, UNKNOWN
+from .draw import NOISY, OUTAGES, SINGLE, UNKNOWN
 
 NONE = "none"
 NONES = 5  # cells without an effect, for each noise, kind of coefficients and seed
@@ -34,7 +34,7 @@ PAIRS = (
     ("N_|v|v", "bow_speed_loss"),
     ("X_vr", "curve_vsp_x(c)"),
 )
-KINDS = ("single", "none", "pair", "foreign", "outages")
+KINDS = ("single", "none", "pair", "foreign", "outages", "process noise")
 Key = tuple[str, str, str, int]
 
 
@@ -90,6 +90,7 @@ def cells(
         "pair": list(PAIRS),
         "foreign": [(e,) for e in UNKNOWN],
         "outages": [(e,) for e in OUTAGES],
+        "process noise": [(e,) for e in NOISY],
     }
     for seed, (noise, off), kind in product(seeds, product(noises, wrong), kinds):
         # The manoeuvres are those of the seed; where nothing is hidden, all else is drawn anew.
@@ -104,6 +105,8 @@ def kind_of(name: str) -> str:
         return "none"
     if name in OUTAGES:
         return "outages"
+    if name in NOISY:
+        return "process noise"
     return "pair" if " + " in name else "foreign" if name in UNKNOWN else "single"
 
 
@@ -123,6 +126,6 @@ def for_showing(name: str, seed: int) -> bool:
 
 def _even(name: str) -> bool:
     names = {"single": SINGLE, "pair": [" + ".join(pair) for pair in PAIRS], "foreign": UNKNOWN}
-    names["outages"] = OUTAGES
+    names |= {"outages": OUTAGES, "process noise": NOISY}
     kind = kind_of(name)
     return kind == "none" or names[kind].index(name) % 2 == 0

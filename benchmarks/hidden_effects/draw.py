@@ -14,6 +14,7 @@ from diagnosis.model import of_one_run, of_run
 from fmus.effects import EACH_VSP, STANDARD
 
 from .effect_forms import form
+from .fleet import ProcessNoise
 from .foreign_physics import FOREIGN_PHYSICS
 from .simulated_runs import STOP
 from .truth import NAMES, Motion, Values, force, over, windows
@@ -34,6 +35,11 @@ UNKNOWN = [e.id for e in FOREIGN_PHYSICS]
 # An effect whose times are drawn anew for each run, the held-out one among them.
 OTHER_TIMES = " at other times"
 OUTAGES = [e.id + OTHER_TIMES for e in LOOKED_FOR if len(e.search.intervals) > 1]
+# An effect, or none, beside a force that is nobody's: filtered noise on all axes.
+IN_NOISE = " in process noise"
+NOTHING_HIDDEN = "nothing"
+NOISY = [e + IN_NOISE for e in (NOTHING_HIDDEN, "X_u", "Y_v", "N_r", "N_|r|r", "loss_yaw")]
+NOISE_SHARE, NOISE_TIME = (0.02, 0.1), (1.0, 5.0)  # of the commanded force; s, correlation time
 MOST_PLAY = 0.12  # of the full command: about the largest size, 40 % of the force on an axis
 
 
@@ -56,7 +62,14 @@ class Draw:
         """The ids that are a right answer."""
         if self.effect in OUTAGES:
             return (self.effect.removesuffix(OTHER_TIMES),)
+        if self.effect in NOISY:
+            return tuple(e for e in [self.plain] if e != NOTHING_HIDDEN)
         return () if self.effect in UNKNOWN else FOREIGN.get(self.effect, (self.effect,))
+
+    @property
+    def plain(self) -> str:
+        """The id of what is hidden beside process noise."""
+        return self.effect.removesuffix(IN_NOISE)
 
     def during(self, run: str) -> "Draw":
         """What of it a run has: parameters are named ``parameter@run`` where each run has its own."""
@@ -78,6 +91,11 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
         pilot: runs of a ship without it.
         less: factor on the size drawn.
     """
+    if effect in NOISY:
+        plain = effect.removesuffix(IN_NOISE)
+        if plain == NOTHING_HIDDEN:
+            return Draw(effect, {}, 0.0)
+        return replace(draw(plain, rng, pilot, less), effect=effect)
     if effect == "bow_failure":  # its time is drawn, not its size
         values = {"bow_failure_time": float(rng.uniform(0.25, 0.75)) * STOP}
     elif effect in OUTAGES:  # and so are these
@@ -91,6 +109,13 @@ def draw(effect: str, rng: np.random.Generator, pilot: Sequence[Motion], less: f
         size = less * float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))
         values = scaled(_solve(lambda s: share(pilot, effect, scaled(s)), size))
     return Draw(effect, values, share(pilot, effect, values))
+
+
+def process_noise(rng: np.random.Generator, pilot: Sequence[Motion]) -> ProcessNoise:
+    """A force on each axis, of the same share of the commanded one."""
+    tau = np.sqrt(np.mean([np.mean(m.tau**2, axis=0) for m in pilot], axis=0))
+    size, time = rng.uniform(*NOISE_SHARE) * tau, rng.uniform(*NOISE_TIME)
+    return ProcessNoise(tuple(size.tolist()), float(time))
 
 
 def outage(effect: str, rng: np.random.Generator) -> dict[str, float]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 import cosim
 from diagnosis import Run
@@ -42,14 +43,35 @@ OBSERVER = kalman.COMPONENT
 TOGETHER = 128  # runs at once: more take more memory (2.2 MB each) and hardly less time; chosen
 
 
+@dataclass(frozen=True)
+class ProcessNoise:
+    """A force that is nobody's: on each axis an Ornstein-Uhlenbeck process.
+
+    Attributes:
+        size: standard deviation [N, N, N m].
+        time: correlation time [s].
+    """
+
+    size: tuple[float, float, float]
+    time: float
+
+    def series(self, rng: np.random.Generator, steps: int) -> np.ndarray:
+        """(steps, 3) [N, N, N m], one each STEP."""
+        kept = float(np.exp(-STEP / self.time))
+        white = rng.standard_normal((steps, 3))
+        white[1:] *= np.sqrt(1.0 - kept**2)
+        return np.asarray(lfilter([1.0], [1.0, -kept], white, axis=0)) * self.size
+
+
 @dataclass(frozen=True, eq=False)
 class Order:
-    """One run that is wanted, see :func:`.simulated_runs.sail`."""
+    """One run that is wanted, see :func:`.simulated_runs.sail`; perhaps in process noise."""
 
     manoeuvre: Manoeuvre
     hidden: Hidden
     noise: float
     seed: int
+    push: ProcessNoise | None = None
 
 
 class Part:
@@ -111,6 +133,7 @@ class Fleet:
         given = {
             n: [dict(c["fmus"][n].get("parameters", {})) for c in content] for n in content[0]["fmus"]
         }
+        self._pushes = np.stack([_pushed(o, self.targets.shape[1]) for o in orders], axis=-1)
         ship, machine = ships(effects)[orders[0].hidden.other]
         zero: Any = np.zeros(len(orders))
         self.vessel = Part(ship, given["vessel"], Force(zero, zero, zero))
@@ -152,7 +175,8 @@ class Fleet:
         """From step k - 1 to k."""
         for part in range(self.parts):
             f = self.thrusters.outputs
-            self.vessel.advance(Force(f.tau_act_X, f.tau_act_Y, f.tau_act_N), self.h)
+            X, Y, N = self._pushes[k - 1]
+            self.vessel.advance(Force(f.tau_act_X + X, f.tau_act_Y + Y, f.tau_act_N + N), self.h)
             if part == self.parts - 1:
                 held = Force(f.tau_cmd_X, f.tau_cmd_Y, f.tau_cmd_N)
                 self._measurement = self._measured(round(k * STEP, 12))
@@ -170,6 +194,13 @@ class Fleet:
             for column, values in enumerate(self.row()):
                 log[k, column] = values
         return log
+
+
+def _pushed(order: Order, steps: int) -> np.ndarray:
+    """(steps, 3), force of the process noise of a run [N, N, N m]."""
+    if order.push is None:
+        return np.zeros((steps, 3))
+    return order.push.series(np.random.default_rng([order.seed, steps]), steps)
 
 
 @cache

@@ -7,6 +7,7 @@ import json
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,17 @@ from diagnosis import Run
 from fmus.effects import STANDARD
 
 from .cells import Cell, Key
-from .draw import FOREIGN, OUTAGES, UNKNOWN, Draw, added_force, draw, run_names
+from .draw import (
+    FOREIGN,
+    NOISY,
+    OUTAGES,
+    UNKNOWN,
+    Draw,
+    added_force,
+    draw,
+    process_noise,
+    run_names,
+)
 from .fleet import TOGETHER, Order, sail_all
 from .manoeuvres import manoeuvres
 from .separation import COEFFICIENTS, SEPARABLE, Rivals
@@ -78,9 +89,10 @@ def plant(cell: Cell, hidden: Sequence[Draw]) -> Hidden:
     values = {name: x for d in hidden for name, x in d.values.items()}
     if cell.wrong:
         rng = cell.rng(2)
-        values |= {
-            name: x * float(rng.uniform(1.0 - WRONG, 1.0 + WRONG)) for name, x in COEFFICIENTS.items()
-        }
+        # Whether intervals are what they say shows where what is believed at first is right.
+        noisy = any(d.effect in NOISY for d in hidden)
+        off = rng.standard_normal if noisy else partial(rng.uniform, -1.0, 1.0)
+        values |= {name: x * (1.0 + WRONG * float(off())) for name, x in COEFFICIENTS.items()}
     other = any(d.effect in FOREIGN for d in hidden)
     ship = {n: x for n, x in values.items() if n in NAMES["vessel"] or n == "drag_1_5"}
     machine = {n: x for n, x in values.items() if n in NAMES["thrusters"] or n == "bow_exp"}
@@ -119,7 +131,7 @@ def make(cells: Sequence[Cell], folder: Path) -> Iterator[Key]:
         for tries in range(TRIES + 1):
             drawn = {c: _drawn(c, pilot[c.seed % 100], LESS**tries) for c in some}
             wanted = some if tries < TRIES else ()  # at last they are given up
-            sailed = sail_all([o for c in wanted for o in _orders(c, drawn[c])])
+            sailed = sail_all([o for c in wanted for o in _orders(c, drawn[c], pilot[c.seed % 100])])
             left = []
             for k, cell in enumerate(some):
                 runs = sailed[RUNS * k : RUNS * (k + 1)]
@@ -144,11 +156,13 @@ def _drawn(cell: Cell, pilot: Sequence[Motion], less: float) -> list[Draw]:
     return [draw(e, rng, pilot, less) for e in cell.effects]
 
 
-def _orders(cell: Cell, hidden: Sequence[Draw]) -> list[Order]:
+def _orders(cell: Cell, hidden: Sequence[Draw], pilot: Sequence[Motion]) -> list[Order]:
     ships = [plant(cell, [d.during(run) for d in hidden]) for run in run_names(RUNS)]
     seeds = cell.rng(3).integers(0, 2**31, RUNS) + list(NOISE).index(cell.noise)
     along = zip(manoeuvres(cell.seed % 100), ships, seeds, strict=True)
-    return [Order(m, ship, NOISE[cell.noise], int(s)) for m, ship, s in along]
+    noisy = any(d.effect in NOISY for d in hidden)
+    push = process_noise(cell.rng(4), pilot) if noisy else None
+    return [Order(m, ship, NOISE[cell.noise], int(s), push) for m, ship, s in along]
 
 
 def _problem(cell: Cell, hidden: Sequence[Draw], redrawn: int, voyages: Sequence[Any]) -> Problem:
@@ -174,7 +188,7 @@ def confusable(hidden: Sequence[Draw], runs: Sequence[Voyage], wrong: bool) -> l
         runs: of the training.
         wrong: whether nominal coefficients may change by 10 %.
     """
-    if not hidden:
+    if not hidden or hidden[0].effect in NOISY:  # of which the intervals are judged
         return []
     measurement = {name: x for d in hidden for name, x in d.measured.items()}
     motions = [motion(v, measurement) for v in runs]

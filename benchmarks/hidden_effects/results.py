@@ -35,7 +35,9 @@ class Row:
         possible_ids: ids that were accepted, and are not believed.
         worse: position and heading, where predictions of the run held out became worse.
         remainder: whether the model leaves a significant remainder, "1" or "0"; empty if not told.
-        intervals, covered: 95 % intervals of right findings, and how many hold the true value.
+        intervals, covered: 95 % intervals of right findings, in process noise of all that was fitted,
+            and how many hold the true value.
+        damping: in process noise, how many standard deviations X_u, Y_v and N_r are off.
         alike: ids that could do the same within 5 %, by the truth; "" is no effect at all.
         separable: there are none.
         absorbed: changes of nominal coefficients alone could do the same.
@@ -68,6 +70,7 @@ class Row:
     remainder: str = ""
     intervals: int = 0
     covered: int = 0
+    damping: list[str] = field(default_factory=list)
     alike: list[str] = field(default_factory=list)
     separable: bool = False
     absorbed: bool = False
@@ -83,7 +86,7 @@ class Row:
 
     @property
     def kind(self) -> str:
-        """single, none, pair or foreign."""
+        """One of :data:`.cells.KINDS`."""
         return kind_of(self.effect)
 
     @property

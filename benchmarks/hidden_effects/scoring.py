@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from diagnosis import Model
 from fmus.effects import STANDARD
 
 from .answers import Answer
@@ -20,6 +23,8 @@ SAME_AS = {
     "loss_vsp": {"plant_F_vsp"},
     "loss_bow": {"plant_F_bow"},
 }
+WIDE = 1.96  # standard deviations in half of a 95 % interval
+DAMPING = ("X_u", "Y_v", "N_r")
 IN_TIME = 0.5  # s, from the end of an outage as it was; half a second moves the ship by millimetres
 SMALL = 1e-6  # of a parameter that is told in the table
 
@@ -52,8 +57,28 @@ def row(problem: Problem, answer: Answer) -> Row:
     if made.kind == "outages":
         made.right = made.right and in_time(answer["effects"][0]["coefficients"], hidden[0])
     made.in_set = any(set(d.right) & set(made.reported) for d in hidden)
-    made.intervals, made.covered = _coverage(answer["effects"], hidden)
+    if made.kind == "process noise":
+        _hold(made, problem, answer["posterior"])
+    else:
+        made.intervals, made.covered = _coverage(answer["effects"], hidden)
     return made
+
+
+def _hold(
+    made: Row, problem: Problem, posterior: tuple[list[str], list[float], list[list[float]]]
+) -> None:
+    """How many intervals hold the true value, of all that was fitted, and how far damping is off."""
+    names, mean, C = posterior[0], np.array(posterior[1]), np.array(posterior[2])
+    values = {**(problem.vessel or {}), **(problem.thrusters or {})}
+    nominal = Model()
+    off = mean - [values.get(n, nominal.value(n)) for n in names]
+    inside = np.abs(off) <= WIDE * np.sqrt(C.diagonal()) if names else off
+    made.intervals, made.covered = len(names), int(np.sum(inside))
+    for coefficient in DAMPING:
+        # With an effect of the same form it is their sum that the data know.
+        k = [n in (coefficient, f"delta_{coefficient}") for n in names]
+        if any(k):
+            made.damping.append(f"{float(off[k].sum() / np.sqrt(C[np.ix_(k, k)].sum())):.4g}")
 
 
 def _told(made: Row, answer: Answer) -> None:

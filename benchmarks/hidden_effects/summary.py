@@ -24,6 +24,9 @@ Two effects are *separable* where the best fit of one leaves at least 5 % of the
 computed from the true motion without noise, with coefficients free to change by 10 % where they are
 nuisance parameters. There the right effect must come first; two must come within two steps.
 
+*Process noise* is a force of nobody's on all axes, 2 to 10 % of the commanded one, correlated over 1 to
+5 s; there nominal coefficients, where wrong, are normal with the prior's standard deviation.
+
 *Foreign physics* is in no candidate of the diagnosis: nothing that it names is a true cause.
 
 The fall of the held-out error stands beside that with the true model, and that with the

@@ -1,7 +1,7 @@
 """The targets of the benchmark, and the numbers that were reached."""
 
 from collections.abc import Callable, Iterable, Sequence
-from statistics import median
+from statistics import mean, median, stdev
 
 from .cost import Cost
 from .draw import FOREIGN
@@ -10,7 +10,7 @@ from .results import Row
 from .simulated_runs import NOISE
 
 Rows = Sequence[Row]
-KINDS_SHOWN = ("single", "pair", "none", "foreign", "outages")
+KINDS_SHOWN = ("single", "pair", "none", "foreign", "outages", "process noise")
 LEAVES_REMAINDER = ("waves",)  # the ship moves with them, but no model predicts them
 SURE, CERTAIN = (
     0.9,
@@ -42,7 +42,7 @@ def fall(rows: Iterable[Row]) -> str:
 def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
     """Measure, target, and what was reached."""
     good = [r for r in rows if not r.note]
-    one, two, none, foreign, outages = ([r for r in good if r.kind == k] for k in KINDS_SHOWN)
+    one, two, none, foreign, outages, noisy = ([r for r in good if r.kind == k] for k in KINDS_SHOWN)
     exact, wrong = ([r for r in one if r.coefficients == kind] for kind in ("exact", "wrong"))
     alone = [r for r in one if r.right and r.effect not in LEAVES_REMAINDER and r.remainder]
     found = [
@@ -93,8 +93,12 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
         some = [r for r in exact if r.noise == noise]
         found.append((f"held-out position error falls, exact, {noise}", "", fall(some)))
     found.append(("the same, wrong, all noises", "", fall(wrong)))
-    intervals = sum(r.intervals for r in good)
-    found.append(("95 % intervals that hold the true value", "93-97 %", coverage(good, intervals)))
+    rest = [r for r in good if r.kind != "process noise"]
+    found.append(("95 % intervals that hold the true value", "93-97 %", coverage(rest)))
+    found.append(("the same in process noise, of all that was fitted", "92-98 %", coverage(noisy)))
+    found.append(
+        ("there: damping is off by, mean in standard deviations", "0 within error", bias(noisy))
+    )
     peers = [r for r in one if r.separable and r.sindy]
     if peers:
         found.append(("right effect first where separable: PySINDy", "", share(peers, by("sindy"))))
@@ -154,8 +158,17 @@ def reached(rows: Rows) -> str:
     return f"{median(known):.2f} ({len(known)})" if known else "-"
 
 
-def coverage(rows: Rows, intervals: int) -> str:
+def bias(rows: Rows) -> str:
+    """Mean of how far damping is off, with its standard error."""
+    off = [float(z) for r in rows for z in r.damping]
+    if len(off) < 2:
+        return "-"
+    return f"{mean(off):.2f} +- {stdev(off) / len(off) ** 0.5:.2f} ({len(off)})"
+
+
+def coverage(rows: Rows) -> str:
     """Share of intervals that hold the true value, with its binomial interval."""
+    intervals = sum(r.intervals for r in rows)
     if not intervals:
         return "-"
     covered = sum(r.covered for r in rows)
