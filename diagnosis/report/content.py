@@ -2,7 +2,6 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypedDict, TypeVar
@@ -10,8 +9,6 @@ from typing import TypedDict, TypeVar
 from fmus.effects.text import Found
 
 from ..assessment.evaluation import Evaluation
-from ..assessment.regions import ErrorRegions, Profile, Region
-from ..assessment.remainder import Remainder
 from ..identification.findings import Finding
 from ..model.ship_model import of_one_run, parameter_and_run
 from ..prediction_error.unrecorded import Unrecorded
@@ -40,7 +37,7 @@ def comparison_content(
     return result_keys.ComparisonContent(
         data=_data(comparison.evaluations),
         errors=[_errors(e) for e in comparison.evaluations],
-        where=_where(comparison.before),
+        where=result_keys.WhereResult.model_validate(comparison.before),
         **_provenance(comparison, model, files),
     )
 
@@ -55,19 +52,18 @@ def diagnosis_content(
         model: file of the initial model; None: the nominal one.
         files: names of the files that are written together.
     """
-    learned, comparison, s = diagnosis.learned, diagnosis.comparison, diagnosis.stability
-    prior = diagnosis.prior
+    learned, comparison, prior = diagnosis.learned, diagnosis.comparison, diagnosis.prior
     effects, possibilities = _effects(diagnosis)
-    suspects = [result_keys.SuspectResult(name=x.name, z=x.z, value=x.value) for x in learned.suspects]
+    suspects = [result_keys.SuspectResult.model_validate(x) for x in learned.suspects]
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
         sentence=headline(
             diagnosis.verdict, effects, possibilities, suspects, diagnosis.remainder.beyond_chance
         ),
-        remainder=_remainder(diagnosis.remainder),
+        remainder=result_keys.RemainderResult.model_validate(diagnosis.remainder),
         effects=effects,
         possibilities=possibilities,
-        withdrawn=[result_keys.WithdrawnResult(id=w.id, reason=w.reason) for w in diagnosis.withdrawn],
+        withdrawn=[result_keys.WithdrawnResult.model_validate(w) for w in diagnosis.withdrawn],
         unrecorded=_unrecorded(diagnosis.unrecorded),
         correlation=result_keys.CorrelationResult(
             names=list(diagnosis.posterior.names),
@@ -75,31 +71,16 @@ def diagnosis_content(
             together=diagnosis.posterior.together,
         ),
         suspect_coefficients=suspects,
-        ranking=[result_keys.RankedResult(**asdict(r)) for r in learned.ranking],
+        ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
         errors=[_errors(e) for e in comparison.evaluations],
-        where=_where(comparison.before),
-        where_after=_where(comparison.after),
-        stability=result_keys.StabilityResult(
-            nominal_min_dissipation=s.nominal_min_dissipation,
-            learned_min_dissipation=s.learned_min_dissipation,
-            bounded=s.bounded,
-            region=s.region,
-            mass_definite=s.mass_definite,
-            notes=list(s.notes),
-        ),
+        where=result_keys.WhereResult.model_validate(comparison.before),
+        where_after=result_keys.WhereResult.model_validate(comparison.after),
+        stability=result_keys.StabilityResult.model_validate(diagnosis.stability),
         prior=dict(prior) if isinstance(prior, Mapping) else prior,
         seed=diagnosis.seed,
         **_provenance(comparison, model, files),
     )
-
-
-def _remainder(r: Remainder) -> result_keys.RemainderResult:
-    axes = {
-        name: result_keys.AxisRemainderResult(rms=a.rms, uncertainty=a.uncertainty, share=a.share)
-        for name, a in r.axes.items()
-    }
-    return result_keys.RemainderResult(significant=r.significant, axes=axes, sentence=r.sentence)
 
 
 def _unrecorded(u: Unrecorded) -> result_keys.UnrecordedResult:
@@ -160,42 +141,6 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
         window_heading_rmse=result_keys.Change(before=b.heading, after=a.heading),
         omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
-    )
-
-
-def _where(found: ErrorRegions) -> result_keys.WhereResult:
-    return result_keys.WhereResult(
-        sentences=list(found.sentences),
-        regions=[_region(r) for r in found.regions],
-        profiles=[_profile(p) for p in found.profiles],
-    )
-
-
-def _region(r: Region) -> result_keys.RegionResult:
-    return result_keys.RegionResult(
-        axis=r.axis,
-        by=r.covariate.id,
-        unit=r.covariate.unit,
-        run=r.run,
-        low=r.low,
-        high=r.high,
-        rms=r.rms,
-        elsewhere=r.elsewhere,
-        share_of_time=r.share,
-        sentence=r.sentence,
-    )
-
-
-def _profile(p: Profile) -> result_keys.ProfileResult:
-    return result_keys.ProfileResult(
-        axis=p.axis,
-        by=p.covariate.id,
-        unit=p.covariate.unit,
-        run=p.run,
-        ends=p.edges.tolist(),
-        rms=p.rms.tolist(),
-        uncertainty=p.uncertainty.tolist(),
-        share_of_time=p.share.tolist(),
     )
 
 

@@ -6,7 +6,7 @@ All numbers are in SI; a number that is not finite, or not known, is null.
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field
 
 
 def _finite(value: float | None) -> float | None:
@@ -14,13 +14,17 @@ def _finite(value: float | None) -> float | None:
 
 
 Number = Annotated[float | None, BeforeValidator(_finite)]
+Numbers = Annotated[list[Number], BeforeValidator(list)]
+# Where other names are behind those of the files.
+COVARIATE, UNIT = (Field(validation_alias=AliasPath("covariate", name)) for name in ("id", "unit"))
+SHARE = Field(validation_alias="share")
 Axes = Literal["X", "Y", "N", "XY", "XYN"]
 
 
 class Part(BaseModel):
-    """A part of a result."""
+    """A part of a result, also by what has attributes of the same names."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, from_attributes=True, populate_by_name=True)
 
 
 class SampleCounts(Part):
@@ -80,14 +84,14 @@ class RegionResult(Part):
     """Interval of a covariate where the model error is larger than elsewhere; an open end is null."""
 
     axis: str
-    by: str
-    unit: str
+    by: Annotated[str, COVARIATE]
+    unit: Annotated[str, UNIT]
     run: str | None
     low: Number
     high: Number
     rms: Number
     elsewhere: Number
-    share_of_time: Number
+    share_of_time: Annotated[Number, SHARE]
     sentence: str
 
 
@@ -95,13 +99,13 @@ class ProfileResult(Part):
     """RMS of the model error of an axis over a covariate, bin by bin, with its uncertainty."""
 
     axis: str
-    by: str
-    unit: str
+    by: Annotated[str, COVARIATE]
+    unit: Annotated[str, UNIT]
     run: str | None
-    ends: list[Number]
-    rms: list[Number]
-    uncertainty: list[Number]
-    share_of_time: list[Number]
+    ends: Annotated[Numbers, Field(validation_alias="edges")]
+    rms: Numbers
+    uncertainty: Numbers
+    share_of_time: Annotated[Numbers, SHARE]
 
 
 class WhereResult(Part):
