@@ -31,7 +31,7 @@ from .master.simulation import simulate
 from .process.run_state import STATE
 from .process.spawned import mute_started_processes
 from .results.performance import table
-from .scenario.load import load_scenario, with_settings
+from .scenario.load import cut_short, load_scenario, with_settings
 from .scenario.schema import Scenario
 from .scenario.setting import parse_assignment
 
@@ -134,7 +134,9 @@ def _scenario(options: argparse.Namespace) -> Scenario:
     settings += [] if options.log is None else [("log.signals", options.log)]
     settings += [("log.format", "parquet")] if options.parquet else []
     settings += [] if options.native is None else [("native", options.native)]
-    return with_settings(scenario, settings, Path.cwd(), "--set") if settings else scenario
+    if settings:
+        scenario = with_settings(scenario, settings, Path.cwd(), "--set")
+    return scenario if options.stop is None else cut_short(scenario)
 
 
 def _no_interrupt() -> None:

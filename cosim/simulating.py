@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from .errors import InputError
 from .master import simulation
 from .master.ending import Result
-from .scenario.load import load_scenario, with_settings
+from .scenario.load import cut_short, load_scenario, with_settings
 from .scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -58,11 +58,15 @@ class Options(TypedDict, total=False):
 def simulate(
     scenario: Scenario | str | Path | dict[str, Any],
     out: str | Path | None = None,
-    parameters: Sequence[str | Path] = (),
+    parameters: str | Path | Sequence[str | Path] = (),
     *,
+    stop: float | None = None,
+    step: float | None = None,
     seed: int | None = None,
+    log: str | None = None,
+    parquet: bool = False,
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the option of the command
-    believe: Sequence[str | Path] = (),
+    believe: str | Path | Sequence[str | Path] = (),
     **options: Unpack[Options],
 ) -> Result:
     """Run a scenario, and write its log and metrics.
@@ -76,7 +80,11 @@ def simulate(
         out: result folder; by default ``results/<name>`` in the working directory, or, where another run
             is there, ``results/<name>_2`` and so on.
         parameters: SSP parameter sets for the plant, whose values override the scenario's.
+        stop, step: end and base step [s], in place of the scenario's; a run that ends before the window
+            of its metrics begins is measured from its start.
         seed: of noise and faults, in place of the scenario's.
+        log: which signals: ``"all"``, or ``"compact"``, what metrics, pictures and the diagnosis need.
+        parquet: whether to write ``log.parquet`` in place of ``log.csv``.
         set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
             files are relative to the working directory.
         believe: SSP parameter sets that controllers and observers believe of the plant.
@@ -93,8 +101,13 @@ def simulate(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    settings = dict(set or {}) | ({} if seed is None else {"seed": seed})
+    chosen = {"stop": stop, "step": step, "seed": seed, "log.signals": log}
+    settings = dict(set or {}) | {path: value for path, value in chosen.items() if value is not None}
+    settings |= {"log.format": "parquet"} if parquet else {}
     if settings:
         scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
+    if stop is not None:
+        scenario = cut_short(scenario)
+    sets, beliefs = ([p] if isinstance(p, (str, Path)) else p for p in (parameters, believe))
     with _one_at_a_time():
-        return simulation.simulate(scenario, out, parameters, believe=believe, **options)
+        return simulation.simulate(scenario, out, sets, believe=beliefs, **options)

@@ -33,7 +33,7 @@ WORTH = 60_000
 
 
 def gather(
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path | Run],
     advance: Advance = silent,
     anyway: bool = False,
     model: Model | None = None,
@@ -43,7 +43,7 @@ def gather(
     All commands, and :func:`diagnosis.load`, get their runs here.
 
     Args:
-        paths: files or folders of logs, see :func:`diagnosis.read`.
+        paths: files or folders of logs, see :func:`diagnosis.read`, or runs that were read.
         advance: progress callback.
         anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
         model: the initial one, by which that is judged; the nominal one by default.
@@ -54,10 +54,13 @@ def gather(
     Raises:
         InputError: a run cannot be used, is given twice by whatever name, or seems to be misread.
     """
+    if not paths:
+        raise InputError("there is no run to read")
     advance("reading")
-    runs = [read(path) for path in paths]
-    _refuse_twice(runs, paths)
-    windows = [_windows(s, anyway) for s in _smooth_all(_distinct(runs, paths), advance, anyway)]
+    runs = [path if isinstance(path, Run) else read(path) for path in paths]
+    names = [path.name if isinstance(path, Run) else path for path in paths]
+    _refuse_twice(runs, names)
+    windows = [_windows(s, anyway) for s in _smooth_all(_distinct(runs, names), advance, anyway)]
     if not anyway:
         refuse_implausible(windows, model or Model())
     return windows

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from cosim import InputError
+from cosim import InputError, Result
 
 from . import session
+from .data import Run, read_frame
 from .gathering import gather
 from .identification import DEFAULT, Method, Prior
 from .model import Integrals, Model, write_model
@@ -22,21 +23,27 @@ from .report.result_keys import DiagnosisContent
 from .report.terminal import summary
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     import pandas
+
+    Source: TypeAlias = str | Path | Result | pandas.DataFrame
 
 AXES = ("X", "Y", "N")
 
 
 def load(
-    paths: str | Path | Sequence[str | Path],
+    sources: Source | Sequence[Source],
     anyway: bool = False,
     advance: Advance = silent,
     model: Model | None = None,
 ) -> list[Integrals]:
-    """Read and smooth measured runs, as they lie in files.
+    """Read and smooth measured runs.
 
     Args:
-        paths: files (CSV, Parquet, MATLAB) or folders of logs, one or several.
+        sources: one or several: files (CSV, Parquet, MATLAB), folders of logs, results of
+            :func:`cosim.simulate`, tables with the columns of a file and units in their names
+            (``x [mm]``) or in ``attrs["units"]``.
         anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
         advance: receives the name of each step when it begins.
         model: the initial one, by which that is judged; the nominal one by default.
@@ -47,7 +54,28 @@ def load(
     Raises:
         InputError: a run cannot be used, or is given twice.
     """
-    return gather([paths] if isinstance(paths, (str, Path)) else paths, advance, anyway, model)
+    import pandas
+
+    every = sources if isinstance(sources, (list, tuple)) else [sources]
+    found: list[str | Path | Run] = []
+    for k, source in enumerate(every, 1):
+        if isinstance(source, pandas.DataFrame):
+            found.append(read_frame(source, f"table {k}"))
+        elif isinstance(source, Result):
+            found.append(source.folder)
+        elif isinstance(source, (str, Path)):
+            found.append(source)
+        else:
+            kind = type(source).__name__
+            raise InputError(f"a run is a file, a folder, a result or a table, not of type {kind}")
+    return gather(found, advance, anyway, model)
+
+
+def _loaded(runs: Any, model: Model | None) -> Sequence[Integrals]:
+    """Runs that were loaded, or are now."""
+    if isinstance(runs, (list, tuple)) and all(isinstance(w, Integrals) for w in runs):
+        return runs
+    return load(runs, model=model)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,8 +145,8 @@ class ShownDiagnosis(session.Diagnosis):
 
 
 def diagnose(
-    runs: Sequence[Integrals],
-    held_out: Sequence[Integrals] = (),
+    runs: Sequence[Integrals] | Source | Sequence[Source],
+    held_out: Sequence[Integrals] | Source | Sequence[Source] = (),
     prior: Prior = None,
     model: Model | None = None,
     advance: Advance = silent,
@@ -128,8 +156,8 @@ def diagnose(
     """Learn what a model lacks.
 
     Args:
-        runs: to learn from, see :func:`load`.
-        held_out: runs to test on only.
+        runs: to learn from: from :func:`load`, or what that takes.
+        held_out: runs to test on only; likewise.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
         model: the initial one; the nominal one by default.
@@ -140,5 +168,6 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    found = session.diagnose(runs, held_out, prior, model, advance, seed, by)
+    train, test = _loaded(runs, model), _loaded(held_out, model)
+    found = session.diagnose(train, test, prior, model, advance, seed, by)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

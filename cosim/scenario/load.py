@@ -1,6 +1,7 @@
 """Scenarios from JSON, or from the formats of other tools, with messages for mistakes."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,22 @@ def with_settings(
     """
     content = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
     for path, value in settings:
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{name}: {path} cannot be {value}")
         set_value(content, path, value, folder)
     changed = _validate(content, name, scenario.folder)
     changed.set_origin(scenario.folder, scenario.notes, scenario.unpacked)
+    return changed
+
+
+def cut_short(scenario: Scenario) -> Scenario:
+    """A scenario that may end before the window of its metrics begins: then that is the whole run."""
+    first, last = scenario.metrics.start or 0.0, scenario.metrics.stop or math.inf
+    if not scenario.stop <= first < last:
+        return scenario
+    changed = with_settings(scenario, [("metrics.from", 0.0)], Path.cwd())
+    note = f"metrics are from 0 s on: the run ends before their window begins, at {first:g} s"
+    changed.set_origin(scenario.folder, [*scenario.notes, note], scenario.unpacked)
     return changed
 
 

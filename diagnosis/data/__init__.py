@@ -3,7 +3,7 @@
 from .beside import line_beside
 from .cleaning import Counts, Track, clean, in_order, lost, repeated
 from .other_columns import other_columns
-from .reading import Run, read
+from .reading import Run, read, read_frame
 from .thinning import thinned
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "lost",
     "other_columns",
     "read",
+    "read_frame",
     "repeated",
     "thinned",
 ]

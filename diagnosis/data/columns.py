@@ -18,7 +18,8 @@ Columns that it does not name keep their names and SI units.
 
 import codecs
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ ALL = (*TAU, *THREE, *FIVE, *POWER)
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254},
-    "angle": {"rad": 1.0, "deg": 0.017453292519943295},
+    "angle": {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295},
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
     "command": {"1": 1.0, "%": 1e-2},
@@ -136,6 +137,29 @@ def _log() -> Layout:
 
 
 LOG = _log()
+WITH_UNIT = re.compile(r"(\w+)\s*[\[(]\s*(\S+)\s*[\])]")
+
+
+def layout_of(names: Sequence[str], units: Mapping[str, str], where: str) -> Layout:
+    """The layout of a table that says itself in which units it is.
+
+    Args:
+        names: of its columns, which may end in a unit, as ``x [mm]``.
+        units: column -> unit, where that is known otherwise; those of no signal do not count.
+        where: what messages call the table.
+
+    Raises:
+        InputError: no unit of that signal.
+    """
+    told = {name: (name, unit) for name, unit in units.items() if name in QUANTITY and name in names}
+    found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
+    told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in QUANTITY}
+    try:
+        return Layout.model_validate(
+            {"columns": {s: {"name": n, "unit": u} for s, (n, u) in told.items()}}
+        )
+    except ValidationError as error:
+        raise InputError(f"{where}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
 
 
 def to_si(values: Any, signal: str, column: Column) -> Any:

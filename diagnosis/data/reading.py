@@ -5,7 +5,7 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -18,7 +18,21 @@ from fmus.effects.single_propellers import ASIDE
 from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import decimal_comma, refuse_preamble, refuse_separator, refuse_units
-from .columns import ALL, FIVE, LOG, POSE, POWER, SHOWN, TAU, THREE, Layout, read_layout, signals, to_si
+from .columns import (
+    ALL,
+    FIVE,
+    LOG,
+    POSE,
+    POWER,
+    SHOWN,
+    TAU,
+    THREE,
+    Layout,
+    layout_of,
+    read_layout,
+    signals,
+    to_si,
+)
 from .csv_tables import csv_names, csv_table
 from .matlab_files import read_matlab
 
@@ -155,7 +169,7 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         names = _names(path, given or Layout())
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
-        layout = given or (LOG if LOG.column("x").name in names else Layout())
+        layout = given or (LOG if LOG.column("x").name in names else layout_of(names, {}, f"'{path}'"))
         wanted = signals(layout, names, f"'{path}'")
         table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
     except ImportError:
@@ -165,6 +179,32 @@ def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     except Exception as error:  # a broken file makes the readers stumble in many ways
         text = " ".join(str(error).split())
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None
+    return _signals(table, layout, wanted, path)
+
+
+def read_frame(frame: pd.DataFrame, name: str = "frame") -> Run:
+    """A measured run in a table.
+
+    Args:
+        frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
+            log of a run, :func:`cosim.log_frame`.
+        name: of the run.
+
+    Raises:
+        InputError: a column is missing, or commands are in another unit.
+    """
+    where, names = f"the table '{name}'", [str(column) for column in frame.columns]
+    frame = frame.set_axis(names, axis=1)
+    is_log = LOG.column("x").name in names
+    layout = LOG if is_log else layout_of(names, frame.attrs.get("units", {}), where)
+    columns, called = _signals(frame, layout, signals(layout, names, where), Path(name))
+    return replace(_run(name, columns, where), called=called or None)
+
+
+def _signals(
+    table: pd.DataFrame, layout: Layout, wanted: Sequence[str], path: Path
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Signals of a table in SI, and the names of their columns where these are others."""
     columns = {}
     for signal in wanted:
         column = layout.column(signal)
