@@ -53,11 +53,21 @@ def test_what_is_no_run_is_told_in_one_line(sources, said):
         diagnosis.load(sources)
 
 
+def test_what_is_shown_is_a_line(run):
+    (loaded,) = diagnosis.load(table(run))
+    assert repr([loaded]) == f"[{loaded}]"
+    assert str(loaded).startswith(f"<run table 1: {run.time.size} samples in 63.98 s, ")
+    model = diagnosis.Model().plus({"delta_X_u": -2.0, "bow_outage_start_1@a": 3.0})
+    assert str(model) == "<model: vessel.delta_X_u = -2; times of a>"
+    assert str(diagnosis.Model()) == "<model: nominal>"
+
+
 def test_options_of_the_command_are_those_of_the_function(tmp_path):
     notes = []
     out = tmp_path / "out"
     short = cosim.simulate("ellipse", stop=3.0, log="compact", out=out, show=notes.append)
     assert (short.metrics["from"], short.metrics["to"]) == (0.0, 3.0)
+    assert str(short).startswith(f"<run done: 301 rows in '{out}', e_pos_rms = ")
     assert any("metrics are from 0 s on" in note for note in notes)
     with pytest.raises(cosim.InputError, match=r"vessel\.m cannot be nan"):
         cosim.simulate("ellipse", set={"vessel.m": float("nan")})

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas
 
 
-@dataclass
+@dataclass(repr=False)
 class Result:
     """How a run ended, and its results.
 
@@ -51,6 +51,11 @@ class Result:
     loop: str = ""
     loop_reason: str = ""
     native: bool | None = None
+
+    def __repr__(self) -> str:
+        told = [f"{self.status}: {self.rows} rows in '{self.folder}'", self.message]
+        told += [f"{name} = {value:.4g}" for name, value in self.metrics.items()]
+        return f"<run {', '.join(text for text in told if text)}>"
 
     @cached_property
     def log(self) -> pandas.DataFrame:

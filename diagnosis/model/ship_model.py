@@ -56,7 +56,7 @@ def parameters(component: Component, values: Values) -> Any:
     return packer(component.params)([v if isinstance(v, np.ndarray) else float(v) for v in flat])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """Parameters of a ship, by name; what is not named is nominal.
 
@@ -79,6 +79,15 @@ class Model:
     ship: Ship = field(default_factory=ship)
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        parts = (*self.ship.parameters, "measurement")
+        told = {
+            f"{part}.{n}": x for part in dict.fromkeys(parts) for n, x in getattr(self, part).items()
+        }
+        values = ", ".join(f"{name} = {x:.4g}" for name, x in told.items())
+        runs = f"; times of {', '.join(self.runs)}" if self.runs else ""
+        return f"<model: {values or 'nominal'}{runs}>"
 
     def during(self, run: str) -> "Model":
         """The model of one run, with the values that hold in it alone; mostly the model itself."""

@@ -50,7 +50,7 @@ def kernel_integral(s: np.ndarray) -> np.ndarray:
     return 35.0 / 32.0 * (s - s**3 + 0.6 * s**5 - s**7 / 7.0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Integrals:
     """The windows of one run that can be used, and the integrals over them.
 
@@ -70,6 +70,11 @@ class Integrals:
     slope: csr_matrix
     held: csr_matrix
     memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        time = self.run.time
+        seconds, count = time[-1] - time[0], self.middle.size
+        return f"<run {self.run.name}: {time.size} samples in {seconds:.6g} s, {count} windows>"
 
     @property
     def run(self) -> Run:
