@@ -1,5 +1,7 @@
 """What the functions in Python take: runs as files, results and tables; settings of a run."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -73,3 +75,21 @@ def test_options_of_the_command_are_those_of_the_function(tmp_path):
         cosim.simulate("ellipse", set={"vessel.m": float("nan")})
     with pytest.raises(cosim.InputError, match=r"no such parameter set: '/nowhere/model\.ssv'"):
         cosim.simulate("ellipse", parameters="/nowhere/model.ssv")
+
+
+def test_shipped_parameter_sets_are_known_by_name(tmp_path):
+    for name in ("sysid4", "sysid4.ssv"):
+        run = cosim.simulate("ellipse", stop=0.5, parameters=name, out=tmp_path / "out")
+        told = json.loads((run.folder / "log.json").read_text())["scenario"]["fmus"]["vessel"][
+            "parameters"
+        ]
+        assert any(name.startswith("delta_") for name in told)
+    with pytest.raises(cosim.InputError, match="did you mean 'sysid4'"):
+        cosim.simulate("ellipse", parameters="sysid_4.ssv")
+
+
+def test_misspelt_key_is_told_before_the_one_that_is_missing():
+    with pytest.raises(cosim.InputError, match="axis: unknown key; did you mean 'axes'"):
+        cosim.run_campaign({"scenario": "ellipse", "axis": {}})
+    with pytest.raises(cosim.InputError, match="stopp: unknown key; did you mean 'stop'"):
+        cosim.load_scenario({"name": "s", "step": 0.1, "stopp": 1.0, "fmus": {"a": {"path": "b.fmu"}}})

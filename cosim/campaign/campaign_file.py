@@ -184,7 +184,8 @@ def _read(path: Path) -> Any:
 
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line."""
-    first = error.errors()[0]
+    problems = error.errors()
+    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
     place = ".".join(
         str(part) for part in first["loc"] if not str(part).startswith(("literal", "list["))
     )

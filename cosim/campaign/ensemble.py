@@ -15,10 +15,10 @@ from rich.table import Table
 
 from ..errors import InputError, SimulationError, nearest
 from ..files import atomic_write
-from ..formats.ssv import read_parameters
 from ..results.log import read_log
 from ..results.performance import METRICS
 from ..scenario.schema import LogOptions, Scenario
+from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
 from .conduct import Progress, demand_packages, run_campaign
 from .posterior import Posterior, read_posterior
@@ -82,8 +82,7 @@ def run_ensemble(
         raise InputError(f"an ensemble has two members or more, not {members}")
     demand_packages()
     given = read_posterior(posterior)
-    overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
-    beliefs = [(Path(p), read_parameters(Path(p))) for p in believe]
+    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
     system = prepare(scenario, overrides, only_own, beliefs=beliefs)
     try:
         for warning in system.warnings:

@@ -13,8 +13,8 @@ from rich.console import Console
 
 from ..command import BAD_INPUT, complain, printable, program, run_command
 from ..errors import InputError
-from ..formats.ssv import read_parameters
 from ..scenario.load import load_scenario, with_settings
+from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
 from ..system.system import System
 from .writing import export_fmu, export_osp, export_ssp
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
-        overrides = [(path, read_parameters(path)) for path in options.parameters]
+        overrides = list(find_parameters(options.parameters))
         scenario = load_scenario(options.scenario)
         if scenario.native == "auto":  # FMUs in Python run on every computer, compiled ones on this one
             scenario = with_settings(scenario, [("native", False)], Path.cwd())

@@ -13,13 +13,13 @@ from typing import Any
 from ..compiled.library import prepare_library
 from ..errors import InputError, SimulationError
 from ..files import update_json, write_json, write_roomy_json
-from ..formats.ssv import read_parameters
 from ..process.run_state import LOGGING, STATE, Owner
 from ..process.scratch import sweep
 from ..results import log as logs
 from ..results.result_files import clear_results, default_folder, others_file
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
+from ..scenario.shipped import find_parameters
 from ..system.instance_pool import InstancePool
 from ..system.preparation import prepare
 from ..system.system import System
@@ -77,8 +77,7 @@ def simulate(
         raise InputError("out is the name of a folder, and is empty")
     if realtime is not None and not 0.0 < realtime < math.inf:
         raise InputError(f"realtime is a positive factor, not {realtime:g}")
-    overrides = [(Path(p), read_parameters(Path(p))) for p in parameters]
-    beliefs = [(Path(p), read_parameters(Path(p))) for p in believe]
+    overrides, beliefs = list(find_parameters(parameters)), list(find_parameters(believe))
     if native is not None:
         scenario = with_settings(scenario, [("native", native)], Path.cwd())
     # FMUs may change the working directory.

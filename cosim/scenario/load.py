@@ -125,7 +125,8 @@ def _validate(content: Any, name: str, folder: Path) -> Scenario:
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line, with the number of further ones."""
     problems = error.errors()
-    first = problems[0]
+    # A misspelt key is the reason where the right one is missing.
+    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
     place = ""
     for part in first["loc"]:
         if isinstance(part, int):

@@ -1,8 +1,11 @@
 """The scenarios that come with the project, by name: ``ellipse``, ``eight``, ``setpoint``, ..."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from ..errors import InputError, nearest
 from ..formats.namespaces import OSP_STRUCTURE
+from ..formats.ssv import ParameterSet, read_parameters
 
 # In a clone beside the packages, in an installation within this one (setup.py).
 FOLDERS = (Path(__file__).parents[2] / "scenarios", Path(__file__).parents[1] / "shipped")
@@ -16,6 +19,23 @@ def shipped_folder() -> Path:
 def shipped_names() -> list[str]:
     """The names of the shipped scenarios."""
     return sorted(path.stem for path in shipped_folder().glob("*.json"))
+
+
+def find_parameters(sources: Iterable[str | Path]) -> Iterator[tuple[Path, ParameterSet]]:
+    """Parameter sets with their files: paths, or bare names of shipped ones.
+
+    Raises:
+        InputError: there is no such set, or it cannot be read.
+    """
+    for source in sources:
+        path = Path(source)
+        if path.name == str(source) and not path.exists():
+            shipped = shipped_folder() / f"{path.name.removesuffix('.ssv')}.ssv"
+            near = [p.stem for p in shipped.parent.glob("*.ssv")]
+            if not shipped.is_file():
+                raise InputError(f"no such parameter set: '{path}'{nearest(path.stem, near)}")
+            path = shipped
+        yield path, read_parameters(path)
 
 
 def find_scenario(source: str | Path, folder: Path = Path()) -> Path:

@@ -50,7 +50,6 @@ def believe(system: System, path: Path, given: ParameterSet, chosen: Chosen) -> 
                 used.update((model_name, used_name) for used_name in names)
     if not believers:
         raise InputError(f"'{path}': no FMU here believes anything of {', '.join(given.values)}")
-    system.warnings.append(f"{', '.join(sorted(believers))} believe the model of '{path}'")
     unused = [f"{m}.{n}" for m, values in given.values.items() for n in values if (m, n) not in used]
     if unused:
         system.warnings.append(f"'{path}': nothing here can believe {', '.join(unused)}")
