@@ -21,7 +21,7 @@ from diagnosis import (
     method,
     smooth,
 )
-from diagnosis.assessment.bands import LEVELS
+from diagnosis.assessment.bands import LEVELS, Bands
 from diagnosis.progress import silent
 
 from .cells import Key
@@ -40,10 +40,10 @@ def answer(problem: Problem, peers: bool) -> Answer:
     Returns:
         ``diagnosis.json`` without what no score needs; besides ``evidence``, what the confidence of each
         finding is made of (None where the method has none), ``posterior``, names, mean and covariance of
-        what was fitted, ``bands``, see :func:`within_bands`, ``seconds`` of processor time from measured
-        runs to the answer, ``worse``, which predictions of the run held out became worse, ``truth_mm``,
-        the window position error of the true model on that run (None where the diagnosis has none of its
-        form), and ``peers``, what others find first.
+        what was fitted, ``bands``, see :func:`window_shares`, ``seconds`` of processor time from
+        measured runs to the answer, ``worse``, which predictions of the run held out became worse,
+        ``truth_mm``, the window position error of the true model on that run (None where the diagnosis
+        has none of its form), and ``peers``, what others find first.
     """
     if problem.note:
         return {"note": problem.note}
@@ -71,15 +71,20 @@ def answer(problem: Problem, peers: bool) -> Answer:
 
 
 def within_bands(comparison: Comparison) -> list[list[float]]:
-    """For the bands of 50 and 90 % the share of each window's samples of the last run within them.
-
-    Positions and headings count alike.
-    """
+    """The same as :func:`window_shares`, of the last run; nothing where it has no window."""
     e = comparison.evaluations[-1]
-    if e.bands is None:
-        return []
-    window = e.bands.windows.sample_window
-    inside = [e.bands.inside(e.after.residuals, level).mean(axis=1) for level in LEVELS]
+    return [] if e.bands is None else window_shares(e.bands, e.after.residuals)
+
+
+def window_shares(bands: Bands, residuals: np.ndarray) -> list[list[float]]:
+    """For the bands of 50 and 90 % the share of each window's samples that lie within them.
+
+    Args:
+        bands: of a run.
+        residuals: (samples, 3), measured minus predicted pose; positions and headings count alike.
+    """
+    window = bands.windows.sample_window
+    inside = [bands.inside(residuals, level).mean(axis=1) for level in LEVELS]
     return [(np.bincount(window, x) / np.bincount(window)).tolist() for x in inside]
 
 

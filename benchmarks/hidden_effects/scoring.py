@@ -58,27 +58,36 @@ def row(problem: Problem, answer: Answer) -> Row:
         made.right = made.right and in_time(answer["effects"][0]["coefficients"], hidden[0])
     made.in_set = any(set(d.right) & set(made.reported) for d in hidden)
     if made.kind == "process noise":
-        _hold(made, problem, answer["posterior"])
+        names, mean, covariance = answer["posterior"]
+        shape = (len(names), len(names))  # also where nothing was fitted
+        held = off_by(problem, names, np.array(mean), np.reshape(covariance, shape))
+        made.intervals, made.covered = len(held[0]), sum(held[0])
+        made.damping = [f"{z:.4g}" for z in held[1]]
     else:
         made.intervals, made.covered = _coverage(answer["effects"], hidden)
     return made
 
 
-def _hold(
-    made: Row, problem: Problem, posterior: tuple[list[str], list[float], list[list[float]]]
-) -> None:
-    """How many intervals hold the true value, of all that was fitted, and how far damping is off."""
-    names, mean, C = posterior[0], np.array(posterior[1]), np.array(posterior[2])
-    values = {**(problem.vessel or {}), **(problem.thrusters or {})}
-    nominal = Model()
-    off = mean - [values.get(n, nominal.value(n)) for n in names]
-    inside = np.abs(off) <= WIDE * np.sqrt(C.diagonal()) if names else off
-    made.intervals, made.covered = len(names), int(np.sum(inside))
-    for coefficient in DAMPING:
-        # With an effect of the same form it is their sum that the data know.
-        k = [n in (coefficient, f"delta_{coefficient}") for n in names]
-        if any(k):
-            made.damping.append(f"{float(off[k].sum() / np.sqrt(C[np.ix_(k, k)].sum())):.4g}")
+def off_by(
+    problem: Problem, names: Sequence[str], mean: np.ndarray, covariance: np.ndarray
+) -> tuple[list[bool], list[float]]:
+    """Of each fitted value whether its 95 % interval holds the truth, and how far damping is off.
+
+    Args:
+        problem: with the true ship.
+        names: of the fitted values.
+        mean, covariance: (q,), (q, q), of their posterior.
+
+    Returns:
+        Both; damping X_u, Y_v and N_r in standard deviations.
+    """
+    values, nominal = {**(problem.vessel or {}), **(problem.thrusters or {})}, Model()
+    off = mean - np.array([values.get(n, nominal.value(n)) for n in names])
+    inside = np.abs(off) <= WIDE * np.sqrt(covariance.diagonal())
+    # With an effect of the same form it is their sum that the data know.
+    rows = [np.flatnonzero([n in (c, f"delta_{c}") for n in names]) for c in DAMPING]
+    damping = [off[k].sum() / np.sqrt(covariance[np.ix_(k, k)].sum()) for k in rows if k.size]
+    return inside.tolist(), [float(z) for z in damping]
 
 
 def _told(made: Row, answer: Answer) -> None:

@@ -15,7 +15,7 @@ from ..model import Integrals
 from ..model.uncertainty import omega_std
 from .fit import fit_predictions, shootings
 from .joint_posterior import Posterior
-from .push import Push, estimate
+from .push import estimate
 from .unrecorded import Unrecorded, unrecorded
 
 
@@ -53,7 +53,9 @@ def to_predictions(
     begin, searched, windows = found.estimate, found.searched, shootings(runs) if fits else []
     known = begin is None or not (begin.fitted or any(prior.std.values()))
     if known or begin is None or searched is None or not windows:
-        return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, _push(runs, found), {}))
+        std = np.concatenate([omega_std(w, found.model) for w in runs])
+        push = estimate(runs, model_error(runs, found.model), std)
+        return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, push, {}))
     begin = replace(begin, offset=rescaled(begin.offset, searched, prior))
     weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
     fitted = fit_predictions(runs, windows, weak, prior)
@@ -82,11 +84,6 @@ def to_predictions(
         estimate=at,
     )
     return Outcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
-
-
-def _push(runs: Sequence[Integrals], found: Findings) -> Push:
-    std = np.concatenate([omega_std(w, found.model) for w in runs])
-    return estimate(runs, model_error(runs, found.model), std)
 
 
 def rescaled(offset: np.ndarray, old: NominalPrior, new: NominalPrior) -> np.ndarray:
