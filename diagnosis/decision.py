@@ -22,8 +22,6 @@ Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 # Confidence from which on an effect is found; and of its set from which on the set is a finding, else it
 # is a possibility; contract.
 FOUND, BELIEVED = 0.8, 0.5
-# Prior standard deviations beyond which a coefficient alone is no explanation; contract.
-MOST_MOVED = 3.0
 # Of a limit of a parameter's range: a value so near to it is not one that the data chose; contract.
 NEAR_LIMIT = 0.05
 AT_LIMIT = "{0} is at the limit of what was looked for"
@@ -79,7 +77,7 @@ def concluded(found: Findings, runs: Sequence[Integrals], unseen: Unseen, start:
         return Conclusion(found, False, [])
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
-    if other is not None and all(abs(z) <= MOST_MOVED for z in alone.moved.values()):
+    if other is not None and alone.plausible:
         missing, left = (_left(runs, start, m) for m in (start, other))
         before = [found, start] if found.effects else [start]
         if _any(missing) and not _any(left) and unseen.judges(alone):

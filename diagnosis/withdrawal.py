@@ -91,7 +91,8 @@ def withdraw(
     while left:
         rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
         on = {i for i, rest in rests.items() if drives(kept.model, _model(rest, start))}
-        worst = _worst(kept, rests, unseen, on)
+        against = {i: _instead(r, kept, start) for i, r in rests.items()}
+        worst = _worst(kept, against, unseen, on)
         if worst is None:
             break
         # One at a time: of two that stand in for each other, the other may be needed then.
@@ -109,14 +110,29 @@ def withdraw(
     return kept, gone
 
 
+def _instead(rest: Findings, kept: Findings, start: Model) -> Findings | Model:
+    """What an effect is held against: the findings without it, all else fitted anew.
+
+    Coefficients moved beyond belief can do what an effect does, and explain nothing: where they are not
+    beyond belief with it, those of the first model stand beside what is left.
+    """
+    if rest.plausible or not kept.plausible:
+        return rest
+    first = added(rest, rest.effects, start)
+    return replace(first, fold_models=[first.model] * len(rest.fold_models)) if rest.effects else start
+
+
 def _worst(
-    kept: Findings, rests: Mapping[str, Findings], unseen: Unseen, drive: Collection[str]
+    kept: Findings,
+    rests: Mapping[str, Findings | Model],
+    unseen: Unseen,
+    drive: Collection[str],
 ) -> Withdrawn | None:
     """The effect without which unseen data gain the most, of those that are to go; None: none is.
 
     Args:
         kept: the findings.
-        rests: effect -> the findings without it.
+        rests: effect -> what is left without it.
         unseen: the data that decide.
         drive: effects with which the hull drives the ship on.
     """

@@ -293,6 +293,22 @@ def test_of_two_effects_that_stand_in_for_each_other_one_stays():
     assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
 
 
+@pytest.mark.parametrize(("moved", "stays"), [(15.0, True), (2.0, False)])
+def test_coefficients_moved_beyond_belief_do_not_take_the_place_of_an_effect(moved, stays):
+    runs, start = voyages(**SHORT, ship={"delta_X_u": -3.0}), Model()
+    nominal = start.value("X_u")
+    rest = Findings(refitted=Model(vessel={"X_u": nominal - 3.0}), moved={"X_u": moved})
+    almost = finding(start, delta_X_u=-2.5)
+    found = Findings([almost], model=almost.model, sigma=np.full(3, 0.01), keep=lambda ids: rest)
+    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+    full, other, first = unseen.losses(found, rest, start)
+    assert harm(full, other)
+    assert not harm(full, first)
+    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    assert [f.id for f in kept.effects] == (["X_u"] if stays else [])
+    assert len(gone) == (not stays)
+
+
 def left_on(**significant):
     """A remainder that is significant on some axes."""
     axes = {a: AxisRemainder(1.0, 0.1, 0.5, 1.0, 0.5, 0.1, significant.get(a, False)) for a in "XYN"}

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from .refinement import Estimate
 
 
+# Prior standard deviations beyond which a coefficient alone is no explanation; contract.
+MOST_MOVED = 3.0
+
+
 @dataclass(frozen=True, eq=False)
 class Ranked:
     """A candidate in the order of its score.
@@ -123,3 +127,8 @@ class Findings:
     keep: "Callable[[Sequence[str]], Findings] | None" = None
     estimate: "Estimate | None" = None
     searched: NominalPrior | None = None
+
+    @property
+    def plausible(self) -> bool:
+        """Whether no nominal coefficient is further from what is believed of it than MOST_MOVED."""
+        return all(abs(z) <= MOST_MOVED for z in self.moved.values())

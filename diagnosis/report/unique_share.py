@@ -6,7 +6,6 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from ..assessment.evaluation import Evaluation
-from ..decision import MOST_MOVED
 from ..identification.findings import Findings
 from ..model import Integrals, Model, omega
 
@@ -48,7 +47,7 @@ def unique_shares(
             continue
         without = others.model if others.effects else others.refitted or start
         fitted = learned.model.ship.effects[finding.id].search.by == "regression"
-        if fitted and any(abs(z) > MOST_MOVED for z in others.moved.values()):
+        if fitted and not others.plausible:
             without = learned.model.plus({name: -value for name, value in finding.values.items()})
         found.append(min(1.0, max(0.0, (squares(without) - squares(learned.model)) / squares(start))))
     return found
