@@ -13,6 +13,7 @@ from dataclasses import fields, replace
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -278,7 +279,7 @@ def test_a_model_that_is_not_sound_is_written_only_on_demand(options, code, runs
     def loose(*args, **kwargs):
         stability = check(*args, **kwargs)
         values = {n: getattr(stability, n) for n in result_keys.StabilityResult.model_fields}
-        return type("Stability", (), values | {"bounded": False, "safe": False})
+        return SimpleNamespace(**values | {"bounded": False, "safe": False})
 
     monkeypatch.setattr(session, "check_stability", loose)
     (tmp_path / "knowing.py").write_text(KNOWING)

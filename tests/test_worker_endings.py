@@ -42,7 +42,9 @@ def test_workers_that_are_interrupted_while_they_start_are_no_traceback(tmp_path
     (tmp_path / "s.json").write_text(json.dumps({"name": "s", "step": 0.1, "stop": 1.0, "fmus": fmus}))
     axes = {"a": {"set": "path.a_x", "values": [4.0, 5.0]}}
     (tmp_path / "c.json").write_text(json.dumps({"scenario": "s.json", "axes": axes}))
-    done = ran(INTERRUPTED_START, tmp_path / "c.json", "--workers", 2, "--out", tmp_path / "out")
+    done = ran(
+        INTERRUPTED_START, tmp_path / "c.json", "--workers", 2, "--quiet", "--out", tmp_path / "out"
+    )
     line = f"what has finished is in '{tmp_path / 'out'}'; the same command goes on"
     assert (done.returncode, done.stderr) == (130, f"interrupted: {line}\n")
 

@@ -21,7 +21,7 @@ from diagnosis import (
     method,
     smooth,
 )
-from diagnosis.assessment.bands import LEVELS, Bands
+from diagnosis.assessment import LEVELS, Bands
 from diagnosis.progress import silent
 
 from .cells import Key

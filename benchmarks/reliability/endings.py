@@ -83,7 +83,7 @@ def long_scenario(work: Path, native: bool = False) -> Path:
     path = work / f"long_{native}.json"
     # Native FMUs are many times as fast.
     stop = 1_000_000.0 if native else 100_000.0
-    path.write_text(json.dumps(content | {"stop": stop, "metrics": {}, "native": native or None}))
+    path.write_text(json.dumps(content | {"stop": stop, "metrics": {}, "native": native}))
     return path
 
 

@@ -143,6 +143,8 @@ def _message(error: ValidationError, name: str) -> str:
         text = "needs a 'kind'" + nearest("", faults.KINDS)
     elif first["type"] == "missing":
         text = "is missing"
+    elif first["loc"][0] == "native":
+        place, text = "native", 'is true, false or "auto"'
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"{name}: {place or 'the content'}: {text}{more}"
 

@@ -1,5 +1,6 @@
 """The FMUs that a scenario names: files, and the project's own, built when needed."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -8,6 +9,7 @@ from pathlib import Path, PurePath
 from ..compiled.library import compiles
 from ..errors import InputError
 from ..fmu.fmu_model import Model
+from ..interrupts import INTERRUPTED
 from ..scenario.schema import Scenario
 
 
@@ -62,10 +64,13 @@ def run_builder(*arguments: str | Path, warnings: list[str] | None = None) -> li
 
     Raises:
         InputError: the last line of its complaint.
+        KeyboardInterrupt: the builder was interrupted.
     """
     done = subprocess.run(
         [sys.executable, "-m", "fmus.build", *arguments], capture_output=True, text=True, check=False
     )
+    if done.returncode in (INTERRUPTED, -signal.SIGINT):
+        raise KeyboardInterrupt
     if done.returncode != 0:
         reason = done.stderr.strip().splitlines()[-1:] or ["python -m fmus.build failed"]
         raise InputError(reason[0].removeprefix("error: "))

@@ -5,6 +5,7 @@ whether a learned model is stable.
 """
 
 from ..model.uncertainty import omega_std
+from .bands import LEVELS, Bands
 from .evaluation import Evaluation, PredictionError, evaluate_run
 from .regions import ErrorRegions, Profile, Region, find_regions
 from .remainder import AxisRemainder, Remainder
@@ -12,7 +13,9 @@ from .stability import OperatingRegion, Stability, check_stability, least_dissip
 from .windows import WindowErrors, Windows
 
 __all__ = [
+    "LEVELS",
     "AxisRemainder",
+    "Bands",
     "ErrorRegions",
     "Evaluation",
     "OperatingRegion",

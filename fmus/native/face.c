@@ -216,7 +216,7 @@ EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     Instance *m = c;
     if (m->stale) initialise(m);
-    if (m->failed) return fmi2Error;
+    if (m->failed) return refuse(m, "initialisation failed: division by zero");
     m->initialising = 0;
     return fmi2OK;
 }
