@@ -36,9 +36,10 @@ LIGHTLY_DAMPED = -0.62  # N m s/rad, hidden
 DRAGGED = Model({"delta_X_u": DRAG})
 
 
-def pushed(t, axis, size):
+def pushed(t, axis, size, seconds=2.0):
     """The commands, with more on an axis for two seconds."""
-    return commands(t) + np.where((t >= 30.0) & (t < 32.0), size, 0.0)[:, None] * np.eye(3)[axis]
+    during = (t >= 30.0) & (t < 30.0 + seconds)
+    return commands(t) + np.where(during, size, 0.0)[:, None] * np.eye(3)[axis]
 
 
 def straight_on(t):
@@ -235,6 +236,12 @@ def test_push_at_a_time_is_told_with_time_axis_and_size(axis, size):
     assert (found.run, found.axis) == (w.run.name, "XYN"[axis])
     assert (found.start, found.end) == pytest.approx((30.0, 32.0), abs=0.5)
     assert found.size * (found.end - found.start) == pytest.approx(2.0 * size, rel=0.2)
+
+
+def test_blow_that_may_be_a_jump_of_the_pose_is_not_told():
+    run = sail(given=partial(pushed, axis=2, size=2.0, seconds=0.3))[0]
+    w = integrals(smoothed(replace(run, tau_cmd=commands(run.time))))
+    assert not unrecorded([w], Model(), NO_PUSH, {}).stretches
 
 
 def test_run_without_a_push_tells_of_none():

@@ -20,7 +20,9 @@ from .push import Push
 CHANCE = 0.01  # that a run without a push tells of one; that of the remainder
 MAD = 1.4826  # standard deviations of a normal distribution in a median absolute deviation
 MOST = 5  # pushes that are told, the clearest; chosen
-LONGEST = 10.0  # s; what lasts longer is no push but a remainder; chosen
+# s; what lasts longer is no push but a remainder, and what is shorter than a third of a window of the
+# weak form cannot be told from a jump of the measured pose; chosen.
+SHORTEST, LONGEST = 1.0, 10.0
 AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
 
 
@@ -120,7 +122,8 @@ def _pushes(
         if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST:
             near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + WIDTH
             start, end, size = box(w.middle[near], error[near])
-            yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
+            if end - start >= SHORTEST:
+                yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
 
 
 def box(middle: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
