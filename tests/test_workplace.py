@@ -304,7 +304,7 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
 
     def keep(ids):
         (gone,) = left.keys() - set(ids)
-        return SimpleNamespace(effects=ids, model=model(left[gone]), moved={})
+        return SimpleNamespace(effects=ids, model=model(left[gone]), plausible=True)
 
     found = SimpleNamespace(
         effects=[SimpleNamespace(id="a", of_runs=[]), SimpleNamespace(id="b", of_runs=[])],
