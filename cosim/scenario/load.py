@@ -143,7 +143,7 @@ def _message(error: ValidationError, name: str) -> str:
         text = "needs a 'kind'" + nearest("", faults.KINDS)
     elif first["type"] == "missing":
         text = "is missing"
-    elif first["loc"][0] == "native":
+    elif first["loc"][:1] == ("native",):
         place, text = "native", 'is true, false or "auto"'
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"{name}: {place or 'the content'}: {text}{more}"
