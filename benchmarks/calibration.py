@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis import Model, clean, diagnose, evaluate, integrals, load, smooth
-from diagnosis.assessment.bands import LEVELS
+from diagnosis.assessment import LEVELS
 from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate

@@ -8,7 +8,7 @@ from pydantic import Field, PositiveInt, ValidationError, field_validator, model
 
 from ..errors import InputError, nearest
 from ..results.performance import METRICS
-from ..scenario.load import load_scenario
+from ..scenario.load import load_scenario, telling_error
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
 from ..scenario.shipped import find_scenario
@@ -184,8 +184,7 @@ def _read(path: Path) -> Any:
 
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line."""
-    problems = error.errors()
-    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+    first = telling_error(error)
     place = ".".join(
         str(part) for part in first["loc"] if not str(part).startswith(("literal", "list["))
     )

@@ -106,8 +106,8 @@ def run_campaign(
         rule = None if stop_when is None else StopRule(stop_when, every, loaded.campaign.seed)
         for note in scenarios.check(every):
             show(f"note: {note}")
-        for native in {files.fmus[name].is_native for name in files.identities}:
-            show(f"note: {kind_of(native)}")
+        for compiled in {files.fmus[name].is_native for name in files.identities}:
+            show(f"note: {kind_of(compiled)}")
         # Workers would wait for each other, deaf to interrupts.
         if note := prepare_library(loaded.base.native):
             show(f"note: {note}")

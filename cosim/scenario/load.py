@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from ..errors import InputError, most_alike, nearest
 from ..formats.systems import is_system, read_system
@@ -122,11 +123,15 @@ def _validate(content: Any, name: str, folder: Path) -> Scenario:
     return scenario
 
 
+def telling_error(error: ValidationError) -> ErrorDetails:
+    """The error to tell: the first, but a misspelt key before the one that it leaves missing."""
+    problems = error.errors()
+    return next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+
+
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line, with the number of further ones."""
-    problems = error.errors()
-    # A misspelt key is the reason where the right one is missing.
-    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+    first, problems = telling_error(error), error.errors()
     place = ""
     for part in first["loc"]:
         if isinstance(part, int):

@@ -32,9 +32,8 @@ BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
 KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
 ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
-MEMORIES = (
-    4e7  # bytes for commands after a memory: of four minutes those of 60 lags, delays and the like
-)
+# Bytes for commands that thrusters with a memory respond to: of four minutes those of 60 such models.
+MEMORIES = 4e7
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
