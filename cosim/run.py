@@ -7,7 +7,7 @@ if __name__ == "__main__":
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from rich.console import Console
@@ -51,7 +51,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scenario = _scenario(options)
         if options.ensemble is not None or options.posterior is not None:
             return _ensemble(scenario, options, console, show)
-        with _progress(console, scenario, options.quiet) as progress:
+        with ExitStack() as shown:
+            progress = shown.enter_context(_progress(console, scenario, options.quiet))
+
+            def measured(metrics: dict[str, float]) -> None:
+                shown.close()  # the metrics do not wait for the pictures
+                if not options.quiet:
+                    with suppress(BrokenPipeError):
+                        Output(highlight=False).print(table(metrics))
+
             result = simulate(
                 scenario,
                 options.out,
@@ -63,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 progress=progress,
                 believe=options.believe,
                 overwrite=options.overwrite,
+                measured=measured,
             )
     except InputError as error:
         complain(error)
@@ -169,8 +178,6 @@ def _report(result: Result, quiet: bool) -> None:
     if quiet:
         return
     output = Output(highlight=False)
-    if result.metrics:
-        output.print(table(result.metrics))
     if result.pace:
         output.print(
             f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} missed deadlines, "

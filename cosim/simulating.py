@@ -53,6 +53,7 @@ class Options(TypedDict, total=False):
     pool: InstancePool | None
     native: bool | str | None
     overwrite: bool
+    measured: Callable[[dict[str, float]], None]
 
 
 def simulate(
@@ -91,7 +92,8 @@ def simulate(
         options: ``realtime``: simulated seconds for each second of wall time; ``pictures``: whether to
             write them; ``only_own``: whether to refuse FMUs with programs that were not built on this
             computer; ``show``: receives notes, a line each; ``progress``: receives the simulated time
-            [s]; ``native``: whether to compile; ``overwrite``: use ``results/<name>`` whatever is there.
+            [s]; ``native``: whether to compile; ``overwrite``: use ``results/<name>`` whatever is there;
+            ``measured``: receives the metrics before anything is drawn.
 
     Returns:
         How it ended, with ``metrics``, ``log``, ``plot()``. A failed or interrupted run keeps its log.

@@ -18,6 +18,7 @@ from cosim.results import (
     track,
     tracking,
 )
+from cosim.results.picture_files import PictureOptions
 from cosim.scenario import Roles
 
 ROLES = Roles()
@@ -320,6 +321,37 @@ class TestPlots:
         assert self.names(files) == self.ALL
         assert all(file.read_bytes().startswith(b"\x89PNG") for file in files)
         assert {path.name for path in (tmp_path / "new").iterdir()} == set(self.ALL)
+
+    @pytest.mark.parametrize(
+        ("size", "width", "scale"), [(10.0, 8.0, 1.0), (10.0, 6.0, 3e4), (18.0, 8.0, 1e-3)]
+    )
+    def test_labels_keep_clear_of_numbers_and_edges(self, size, width, scale):
+        """Margins are set, not measured: they follow the size of letters and of the picture."""
+        from matplotlib import rc_context
+
+        log = {name: values if name == "time" else scale * values for name, values in wild().items()}
+        look = PictureOptions(width=width)
+        with rc_context({"font.size": size}):
+            for _, figure in drawing.figures({"first run": log, "second run": log}):
+                look.sized(figure).draw_without_rendering()
+                drawn = figure.get_tightbbox()  # in
+                assert np.all(drawn.min > 0.0)
+                assert np.all(drawn.max < figure.get_size_inches())
+                legend = figure.legends[0].get_window_extent()
+                for panel in figure.axes:
+                    numbers = [n.get_window_extent() for n in panel.get_yticklabels()]
+                    label = panel.yaxis.label.get_window_extent()
+                    assert label.width == 0.0 or label.x1 < min(n.x0 for n in numbers)
+                    assert panel.get_window_extent().y1 < legend.y0
+
+    def test_a_picture_is_drawn_once(self, tmp_path, monkeypatch):
+        """Measuring its letters, or a first pass for its size, would take as long again."""
+        from matplotlib.figure import Figure
+
+        draw, drawn = Figure.draw, []
+        monkeypatch.setattr(Figure, "draw", lambda *told: (drawn.append(told[0]), draw(*told))[1])
+        drawing.draw({"a": wild()}, tmp_path)
+        assert len(drawn) == len(set(drawn)) == len(self.ALL)
 
     def test_pictures_without_their_columns_are_left_out(self, tmp_path):
         log = {name: values for name, values in wild().items() if not name.startswith("controller.")}

@@ -59,6 +59,16 @@ def test_run_leaves_log_metrics_and_pictures(scenario, tmp_path):
     assert list(json.loads((tmp_path / "out" / "metrics.json").read_text())) == keys.split()
 
 
+def test_metrics_are_told_before_anything_is_drawn(scenario, tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(
+        cosim.results.drawing, "draw", lambda *_: told.append(sys.stdout.getvalue()) or []
+    )
+    done = command(scenario(), "--out", tmp_path / "out")
+    assert "e_pos_rms" in told[0]
+    assert done.stdout.count("e_pos_rms") == 1
+
+
 def test_quiet_without_plots_says_and_draws_nothing(scenario, tmp_path):
     done = in_a_process(scenario(), "--out", tmp_path / "out", "--quiet", "--no-plots")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -34,6 +34,10 @@ def report(results: dict[str, Any]) -> None:
     print("\nWhole command, from the start of the process to its end [s]   median     min")
     for label, times in results["commands"].items():
         print(f"  {label:58} {statistics.median(times):7.2f} {min(times):7.2f}")
+    for label, times in results["commands"].items():
+        if (plain := label.replace("with", "no")) != label:
+            ratio = min(times) / min(results["commands"][plain]) - 1.0
+            print(f"  {label}: the pictures take {ratio:.2f} times as long as all else")
 
 
 def _report_tools(cases: dict[str, Any]) -> None:

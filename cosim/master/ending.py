@@ -115,8 +115,9 @@ def finish(
     recorder: Recorder,
     draw: bool,
     show: Callable[[str], None],
+    measured: Callable[[dict[str, float]], None],
 ) -> None:
-    """Write metrics, pictures and the log's final format."""
+    """Write metrics, tell them by ``measured``, and write pictures and the log's final format."""
     window, roles = system.scenario.metrics, system.scenario.roles
     columns = recorder.kept()
     try:
@@ -125,6 +126,8 @@ def finish(
             write_json(result.folder / logs.METRICS, result.metrics)
     except performance.MetricsError as error:
         show(f"note: no metrics: {error}")
+    else:
+        measured(result.metrics)
     if draw and result.status != "interrupted":
         from ..results import drawing
 

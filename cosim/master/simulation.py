@@ -48,6 +48,7 @@ def simulate(
     native: bool | str | None = None,
     believe: Sequence[str | Path] = (),
     overwrite: bool = False,
+    measured: Callable[[dict[str, float]], None] = lambda _: None,
 ) -> Result:
     """Run a scenario and write its log, metrics and pictures.
 
@@ -66,6 +67,7 @@ def simulate(
         believe: SSP parameter sets that controllers and observers believe of the plant.
         overwrite: whether the default folder is ``results/<name>``, whatever is there, and whether files
             of no run may be replaced.
+        measured: receives the metrics as soon as they are known, before anything is drawn.
 
     Returns:
         How it ended. A failed or interrupted run keeps its log.
@@ -110,7 +112,7 @@ def simulate(
                 system.close()
             os.chdir(here)
         if recorder is not None:
-            finish(system, result, recorder, pictures, show)
+            finish(system, result, recorder, pictures, show, measured)
     except KeyboardInterrupt:
         if result is not None:
             interrupted_late(result)

@@ -25,6 +25,11 @@ DPI = 150  # chosen
 WIDTH = 8.0  # of a picture [in], chosen
 MAX_POINTS = 2000  # of a line over time: more than the pixels of its panel (WIDTH times DPI)
 LETTERS_PER_INCH = 12  # of a legend, in the default font
+NUMBERS = (-4, 5)  # smallest and largest power of ten that is written out: no more than seven signs
+# Room around the panels, in sizes of the font: for such numbers and a label; chosen.
+LEFT, RIGHT, BOTTOM, TOP, BETWEEN = 6.6, 1.5, 4.0, 1.8, 2.2
+LABEL = 5.0  # from the panel to its label
+POINTS = 72.0  # in an inch
 
 
 class Run(NamedTuple):
@@ -72,10 +77,36 @@ def thin(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def blank(width: float, height: float) -> Figure:
     """An empty figure, width by height [in]."""
     from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06)  # in
-    return Figure(figsize=(width, height), dpi=DPI, layout=layout)
+    return Figure(figsize=(width, height), dpi=DPI)
+
+
+def arrange(figure: Figure) -> Figure:
+    """Set the panels between margins that depend on the size of the font, below the legend.
+
+    Matplotlib's own layouts measure every letter, which takes as long as drawing them.
+    """
+    from matplotlib import rcParams
+    from matplotlib.transforms import ScaledTranslation
+
+    letter = rcParams["font.size"] / POINTS
+    wide, high = figure.get_size_inches() / letter
+    top = TOP + sum(s.get_window_extent().height / figure.dpi / letter for s in figure.legends)
+    grid = figure.axes[0].get_gridspec()
+    assert grid is not None
+    apart = LEFT if any(panel.get_ylabel() for panel in figure.axes[1 : grid.ncols]) else RIGHT
+    figure.subplots_adjust(
+        left=LEFT / wide,
+        right=1.0 - RIGHT / wide,
+        bottom=BOTTOM / high,
+        top=1.0 - top / high,
+        wspace=apart * grid.ncols / (wide - LEFT - RIGHT - (grid.ncols - 1) * apart),
+        hspace=BETWEEN * grid.nrows / (high - BOTTOM - top - (grid.nrows - 1) * BETWEEN),
+    )
+    aside = ScaledTranslation(-LABEL * letter, 0.0, figure.dpi_scale_trans)
+    for panel in figure.axes:
+        panel.yaxis.set_label_coords(0.0, 0.5, panel.transAxes + aside)
+    return figure
 
 
 def stacked(
@@ -95,6 +126,7 @@ def stacked(
 def grid(panel: Axes) -> None:
     """Pale grid lines behind the data, and no frame at the sides without a scale."""
     panel.grid(visible=True, color="0.88", linewidth=0.6)
+    panel.ticklabel_format(axis="y", scilimits=NUMBERS)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
 
@@ -106,7 +138,7 @@ def legend(figure: Figure, panel: Axes, entries: int) -> None:
     figure.legend(
         handles,
         labels,
-        loc="outside upper center",
+        loc="upper center",
         ncols=max(1, min(entries, int(figure.get_figwidth() * LETTERS_PER_INCH / widest))),
         columnspacing=1.5,
         frameon=False,
@@ -120,16 +152,15 @@ def plot(panel: Axes, run: Run, values: np.ndarray, **line: Any) -> None:
 
 
 def finish(figure: Figure, panels: np.ndarray, runs: Runs, least: float = 0.0) -> Figure:
-    """Align the labels, name the runs, and give a flat line at least the range ``least``."""
+    """Name the runs, give a flat line at least the range ``least``, and arrange the panels."""
     for panel in panels.flat:
         low, high = panel.get_ylim()
         if high - low < least:
             middle = 0.5 * (low + high)
             panel.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
-    figure.align_ylabels(panels)
     if len(runs) > 1:
         legend(figure, panels[0, 0], len(runs))
-    return figure
+    return arrange(figure)
 
 
 def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
@@ -144,4 +175,10 @@ def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
     # Without a date the same figure is the same file.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
     with atomic_write(file) as scratch:
-        figure.savefig(scratch, format=form, dpi=dpi, metadata=metadata)
+        if form == "png":
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+            figure.set_dpi(dpi)
+            FigureCanvasAgg(figure).print_png(scratch)  # savefig would draw it twice
+        else:
+            figure.savefig(scratch, format=form, metadata=metadata)

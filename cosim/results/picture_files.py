@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError, nearest
-from .canvas import DPI, WIDTH, save
+from .canvas import DPI, WIDTH, arrange, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +58,7 @@ class PictureOptions(NamedTuple):
         """The figure in another size, of the same shape."""
         scale = self.width / WIDTH
         figure.set_size_inches(scale * figure.get_figwidth(), scale * figure.get_figheight())
-        return figure
+        return arrange(figure)
 
 
 class Drawn:

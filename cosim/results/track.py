@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scenario.roles import Columns
-from .canvas import WIDTH, Run, Runs, blank, grid, legend
+from .canvas import WIDTH, Run, Runs, arrange, blank, grid, legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -141,7 +141,7 @@ def trajectory(runs: Runs) -> "Figure":
     ratio = "full length" if scale == 1.0 else f"1:{1.0 / scale:g}"
     panel.set_title(f"ships drawn {ratio}, every {period:.3g} s", loc="right", fontsize=8, color="0.4")
     legend(figure, panel, len(runs) + 2)
-    return figure
+    return arrange(figure)
 
 
 def _path(run: Run, columns: Columns) -> Path:
