@@ -18,6 +18,7 @@ from ..results.log_frame import log_frame
 from ..results.picture_files import Drawn
 from ..results.run_options import read_options
 from ..system.system import System
+from .loop_surroundings import paused_collector
 from .recorder import Recorder
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def finish(
     if draw and result.status != "interrupted":
         from ..results import drawing
 
-        with writing(result):
+        with paused_collector(), writing(result):  # figures are many small objects, and short-lived
             runs = {system.scenario.name: columns}
             used = {system.scenario.name: roles}
             drawn = drawing.draw(runs, result.folder, window.start, window.stop, used)

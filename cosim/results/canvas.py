@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from ..scenario.roles import Roles
 
-DPI = 150  # chosen
+DPI = 120  # chosen
+COMPRESSION = 3  # of a PNG, chosen: two thirds of the usual time, files a fifth larger
 WIDTH = 8.0  # of a picture [in], chosen
 MAX_POINTS = 2000  # of a line over time: more than the pixels of its panel (WIDTH times DPI)
 LETTERS_PER_INCH = 12  # of a legend, in the default font
@@ -127,6 +128,7 @@ def grid(panel: Axes) -> None:
     """Pale grid lines behind the data, and no frame at the sides without a scale."""
     panel.grid(visible=True, color="0.88", linewidth=0.6)
     panel.ticklabel_format(axis="y", scilimits=NUMBERS)
+    panel.locator_params(nbins=5)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
 
@@ -179,6 +181,7 @@ def save(figure: Figure, file: Path, dpi: float = DPI) -> None:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
 
             figure.set_dpi(dpi)
-            FigureCanvasAgg(figure).print_png(scratch)  # savefig would draw it twice
+            # savefig would draw it twice
+            FigureCanvasAgg(figure).print_png(scratch, pil_kwargs={"compress_level": COMPRESSION})
         else:
             figure.savefig(scratch, format=form, metadata=metadata)

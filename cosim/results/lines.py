@@ -41,7 +41,7 @@ GROWING = (
     ("ISE", "ISE [m² s]"),
     ("IAE", "IAE [m s]"),
     ("W", "W [J]"),
-    ("I_tau_dot", r"$I_{\dot\tau}$ [N]"),
+    ("I_tau_dot", "I_tau_dot [N]"),
     ("IAEW", "IAEW [m s J]"),
     ("IAEWWT", "IAEWWT [m s J N]"),
 )
