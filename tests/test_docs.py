@@ -5,12 +5,14 @@ import importlib
 import json
 import pkgutil
 import re
+import shlex
 import subprocess
 import sys
 from functools import cache
 from pathlib import Path
 
 import pytest
+from support.command import command
 
 import cosim
 import diagnosis.assessment
@@ -117,7 +119,9 @@ def blocks(kind):
     """(page, reason it is not run here, text) of each code block of a kind; CONTRIBUTING's by its tests."""
     for page in PAGES:
         for reason, text in re.findall(
-            rf"(?:<!-- (run by [^>]*) -->\n)?```{kind}\n(.*?)```", page.read_text("utf-8"), re.DOTALL
+            rf"(?:<!-- ((?:not )?run(?: by|:) [^>]*) -->\n)?```{kind}\n(.*?)```",
+            page.read_text("utf-8"),
+            re.DOTALL,
         ):
             yield pytest.param(page, reason, text, id=f"{page.name}: {text.splitlines()[0][:40]}")
 
@@ -180,3 +184,46 @@ def test_json_of_the_pages_can_be_read(page, reason, text):
 
 
 EXAMPLES = {"fmus/controller/pull.py"}  # a newcomer's
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with the shipped scenarios, cut to 70 s, a learned model, and a run."""
+    folder = tmp_path_factory.mktemp("shell")
+    (folder / "results" / "diagnosis").mkdir(parents=True)
+    model = diagnosis.model.Model().plus({"delta_X_u": -2.0})
+    diagnosis.model.write_model(folder / "results" / "diagnosis" / "model.ssv", model)
+    (folder / "scenarios").mkdir()
+    for path in (ROOT / "scenarios").glob("*.json"):
+        content = json.loads(path.read_text("utf-8"))
+        content["stop"] = min(content["stop"], 70.0)
+        (folder / "scenarios" / path.name).write_text(json.dumps(content), "utf-8")
+    scenario = cosim.load_scenario(folder / "scenarios" / "eight.json")
+    cosim.simulate(scenario, folder / "results" / "c")
+    return folder
+
+
+def commands(text):
+    """Module and arguments of each line of a shell block."""
+    for line in text.replace("\\\n", " ").splitlines():
+        python, option, module, *arguments = shlex.split(line, comments=True)
+        assert (python, option) == ("python", "-m"), line
+        yield module, arguments
+
+
+@pytest.mark.parametrize(("page", "reason", "text"), [*blocks("sh")])
+def test_shell_of_the_pages_is_run_or_says_why_not(page, reason, text):
+    tests = re.findall(r"tests/\w+\.py", reason)
+    assert all((ROOT / test).is_file() for test in tests)
+    assert reason.startswith("not run: ") or tests or [*commands(text)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("page", "reason", "text"), [b for b in blocks("sh") if not b.values[1]])
+def test_shell_of_the_pages_runs(page, reason, text, place):
+    for name, arguments in commands(text):
+        module = importlib.import_module(name)
+        if not hasattr(module, "main"):
+            module = importlib.import_module(f"{name}.__main__")
+        done = command(module.main, *arguments, cwd=place)
+        assert done.returncode == 0, done.stderr
