@@ -243,6 +243,15 @@ class TestPls:
         assert pls.enough(np.array([[1.0], [2.0], [3.0]])) == 1
         assert pls.enough(np.array([[3.0], [2.0], [1.0]])) == 3
 
+    def test_factors_are_counted_where_the_recipe_does_not_say(self):
+        """Of columns that are equally large and uncorrelated one factor makes the whole prediction."""
+        rng = np.random.default_rng(2)
+        X = rng.normal(size=(2000, 5))
+        y = X[:, :1] + 0.3 * rng.normal(size=(2000, 1))
+        free = replace(recipe("PLS2"), factors=None, most=5)
+        assert pls.fitted(X, y, (0,), free).factors == 1
+        assert pls.fitted(X, y, (0,), replace(free, factors=4)).factors == 4
+
     def test_explained_share_by_factors_is_that_of_each_regression(self):
         s = made(n=400)
         found = pls.fitted(s.x, s.omega, (0, 1, 2), replace(recipe("PLS2"), factors=4))

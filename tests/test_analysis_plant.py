@@ -282,6 +282,7 @@ def test_acceleration_in_a_steady_turn_is_none_and_the_force_that_of_both_steps(
     x = (u * np.sin(psi) + v * np.cos(psi)) / r
     y = (-u * np.cos(psi) + v * np.sin(psi)) / r
     tau = np.column_stack([np.where(np.arange(t.size) % 2, k, -0.01) for k in (0.0, 0.005, 0.02)])
+    tau *= 1.0 + t[:, None] / 60.0  # so that its mean over the run is none of its values
     pose = np.column_stack([x, y, np.angle(np.exp(1j * psi))])
     pose += 2e-4 * np.random.default_rng(0).normal(size=pose.shape)
     columns = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
