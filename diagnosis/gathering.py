@@ -1,35 +1,27 @@
 """From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
 
-import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from cosim import InputError
-from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
-from cosim.process import end_with_parent, without_program
 
 from .assessment.plausibility import refuse_implausible
 from .data import Run, Track, clean, read, thinned
 from .data.unit_check import GO_ON
 from .model import Integrals, Model, integrals
 from .model.weak_form import WIDTH
+from .parallel import for_each
 from .progress import Advance, silent
 from .smoothing import Smoothed, smooth
 
-PROCESSES = 2  # more need more memory than they save time (chosen)
 # Samples in a window of the weak form. Derived: with so many its kernel's slope integrates a velocity
 # that grows evenly to 2 %, with five to 3 %, with three to 23 %.
 FEWEST = 6
 MOST_SPIKES = 0.1  # of the samples; chosen: of a run of the real ship 7 % are spikes, and it can be used
-# Rows in all; below, a second process takes longer to start than it saves.
-WORTH = 60_000
 
 
 def gather(
@@ -60,7 +52,9 @@ def gather(
     runs = [path if isinstance(path, Run) else read(path) for path in paths]
     names = [path.name if isinstance(path, Run) else path for path in paths]
     _refuse_twice(runs, names)
-    windows = [_windows(s, anyway) for s in _smooth_all(_distinct(runs, names), advance, anyway)]
+    advance(f"smoothing {', '.join(run.name for run in runs)}")
+    smoothed = for_each(lambda run: _smoothed(run, anyway), _distinct(runs, names))
+    windows = [_windows(s, anyway) for s in smoothed]
     if not anyway:
         refuse_implausible(windows, model or Model())
     return windows
@@ -92,30 +86,6 @@ def _smoothed(run: Run, anyway: bool) -> Smoothed:
     if not anyway:
         _refuse_rare(track)
     return smooth(thinned(track))
-
-
-def _begin(parent: int) -> None:
-    ignore_interrupts()
-    end_with_parent(parent)
-
-
-def _smooth_all(runs: Sequence[Run], advance: Advance, anyway: bool) -> Iterable[Smoothed]:
-    if len(runs) < 2 or sum(run.time.size for run in runs) < WORTH:
-        for run in runs:
-            advance(f"smoothing {run.name}")
-            yield _smoothed(run, anyway)
-        return
-    # Ctrl-C is for this process alone, which then lets the others end.
-    pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"), _begin, (os.getpid(),))
-    try:
-        with UninterruptedProcesses(), without_program():
-            futures = [pool.submit(_smoothed, run, anyway) for run in runs]
-        for run, future in zip(runs, futures, strict=True):
-            advance(f"smoothing {run.name}")
-            yield future.result()
-    finally:
-        with suppress(KeyboardInterrupt):
-            pool.shutdown(cancel_futures=True)
 
 
 def _windows(smoothed: Smoothed, anyway: bool) -> Integrals:

@@ -10,6 +10,7 @@ from scipy.linalg import LinAlgError
 
 from cosim import InputError
 
+from .assessment.bands import Bands
 from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
@@ -22,6 +23,7 @@ from .identification.prior import shares as prior_shares
 from .model import Integrals, Model, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
+from .parallel import for_each
 from .prediction_error.joint_posterior import Posterior
 from .prediction_error.predicted_bands import prediction_bands
 from .prediction_error.refit import to_predictions
@@ -144,12 +146,15 @@ def evaluate(
     Raises:
         InputError: the runs are so ill-conditioned that nothing can be computed of them.
     """
-    model, evaluations = model or Model(), []
-    for is_held_out, group in ((False, runs), (True, held_out)):
-        for w in group:
-            advance(f"predicting {w.run.name}")
-            evaluations.append(evaluate_run(w, model, after, is_held_out))
-    return Comparison(evaluations, [omega_std(e.integrals, model) for e in evaluations])
+    every, before = [*runs, *held_out], model or Model()
+    advance(f"predicting {', '.join(w.run.name for w in every)}")
+    known = [before, after, *every, *(w.smoothed for w in every)]
+
+    def of_run(k: int) -> Evaluation:
+        return evaluate_run(every[k], before, after, k >= len(runs))
+
+    evaluations = for_each(of_run, range(len(every)), known)
+    return Comparison(evaluations, [omega_std(w, before) for w in every])
 
 
 @well_posed()
@@ -205,18 +210,13 @@ def diagnose(
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)
-    comparison = replace(
-        comparison,
-        evaluations=[
-            replace(
-                e,
-                bands=prediction_bands(
-                    e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push
-                ),
-            )
-            for e in comparison.evaluations
-        ],
-    )
+
+    def bands(e: Evaluation) -> Bands | None:
+        return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)
+
+    every = comparison.evaluations
+    banded = [replace(e, bands=b) for e, b in zip(every, for_each(bands, every), strict=True)]
+    comparison = replace(comparison, evaluations=banded)
     advance("what is left")
     # What fails at times of its own in a run held out says nothing of what was learned of others.
     judged = comparison.evaluations[: len(train) if learned.model.runs else None]

@@ -5,8 +5,8 @@ is its model error, by blocks, and the error of its window predictions, by windo
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from cosim import InputError
 from .assessment.windows import Windows
 from .identification.acceptance import worse
 from .model import Integrals, Model, omega
+from .parallel import for_each
 
 FITS = "the model fits {where} worse"
 PREDICTS = "predictions of {where} are worse"
@@ -49,13 +50,9 @@ class Part:
         self._block = number[self._rows]
         first, last = w.middle[self._rows][[0, -1]]
         self._span = (-np.inf, np.inf) if blocks is None else (first, last)
-
-    @cached_property
-    def _windows(self) -> Windows | None:
-        try:
-            return Windows([self.data.smoothed])
-        except InputError:  # no window has enough samples
-            return None
+        self._windows: Windows | None = None
+        with suppress(InputError):  # no window has enough samples
+            self._windows = Windows([w.smoothed])
 
     def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
         """What each of some models misses here, sigma (3,) being what an error is divided by."""
@@ -106,7 +103,7 @@ def losses(
         variants: of each variant the model of each part.
         sigma: (3,), what an error is divided by [N, N, N m].
     """
-    by_part = [p.losses([v[k] for v in variants], sigma) for k, p in enumerate(parts)]
+    by_part = for_each(lambda k: parts[k].losses([v[k] for v in variants], sigma), range(len(parts)))
     return [
         Losses._make(map(np.concatenate, zip(*one, strict=True))) for one in zip(*by_part, strict=True)
     ]

@@ -34,7 +34,7 @@ COSIM_LAYERS = (
 
 # The same of diagnosis: the steps of the work, in their order.
 DIAGNOSIS_LAYERS = (
-    ("progress", "result_folder"),
+    ("parallel", "progress", "result_folder"),
     ("data",),
     ("smoothing",),
     ("model",),

@@ -372,12 +372,10 @@ def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
 
 @pytest.mark.slow
 def test_two_processes_give_what_one_gives(runs, monkeypatch):
-    from diagnosis import gathering
-
     files = [runs / "a.csv", runs / "b.csv"]
-    alone = diagnosis.gather(files)
-    monkeypatch.setattr(gathering, "WORTH", 0)
-    for one, two in zip(alone, diagnosis.gather(files), strict=True):
+    together = diagnosis.gather(files)
+    monkeypatch.setattr("diagnosis.parallel._alone", True)
+    for one, two in zip(diagnosis.gather(files), together, strict=True):
         np.testing.assert_array_equal(one.smoothed.nu, two.smoothed.nu)
         assert one.run.name == two.run.name
 

@@ -133,15 +133,19 @@ def test_a_propeller_to_port_that_pushes_ahead_turns_the_ship_to_starboard():
             np.testing.assert_allclose(N, (0.055, -0.055)[k] * X)
 
 
+def along_time(response):
+    """Commands that arrive and shares that act (n, sets, 3), or the one that is both."""
+    return np.moveaxis(response.between_samples, -1, 1)
+
+
 @pytest.mark.parametrize("period", [0.02, 0.05, 0.1])
 @pytest.mark.parametrize("delay", [0.013, 0.1, 0.33, 1.2, 3.0])
 def test_delay_is_that_of_the_held_commands_whatever_the_period(period, delay):
     t = np.arange(round(20.0 / period)) * period
     tau = np.column_stack([np.sign(np.sin(0.7 * t)), 0.0 * t, 0.0 * t])
     run = Run("steps", t, np.zeros((t.size, 3)), tau)
-    given, acting = Response(run, Model(thrusters={"delay": delay})).between_samples
-    np.testing.assert_array_equal(given, acting)
-    nominal = Response(run, Model()).between_samples[0]
+    (given,) = along_time(Response(run, Model(thrusters={"delay": delay})))  # what arrives acts
+    (nominal,) = along_time(Response(run, Model()))
     held = Integral(np.append(t, t[-1] + period), nominal, 0.0 * nominal[0])
     ends = np.append(t, t[-1] + period) - delay
     exact = np.diff(held(ends), axis=0) / period
@@ -152,8 +156,8 @@ def test_delay_is_that_of_the_held_commands_whatever_the_period(period, delay):
 
 def test_a_run_that_begins_under_way_had_its_first_command_before():
     model = Model(thrusters={"lag": 1.0})
-    rest, moving = (Response(base(), model, moving=m).between_samples[1] for m in (False, True))
-    first = Response(base(), Model()).between_samples[0][0]
+    rest, moving = (along_time(Response(base(), model, moving=m))[1] for m in (False, True))
+    first = along_time(Response(base(), Model()))[0][0]
     np.testing.assert_allclose(moving[0], first, rtol=1e-5)
     assert np.abs(rest[0]).max() < 0.05 * np.abs(first).max()
 
@@ -162,8 +166,8 @@ def test_a_long_gap_takes_neither_time_nor_memory():
     later = np.where(base().time > 20.0, base().time + 1e9, base().time)
     run = Run("gap", later, base().pose, base().tau_cmd)
     model = Model(thrusters={"lag": 0.5})
-    with_gap = Response(run, model).between_samples[1]
-    without = Response(base(), model).between_samples[1]
+    with_gap = along_time(Response(run, model))[1]
+    without = along_time(Response(base(), model))[1]
     before = base().time < 19.9
     np.testing.assert_allclose(with_gap[before], without[before], atol=1e-9)
     after = base().time > 27.0  # twelve time constants later the gap is forgotten

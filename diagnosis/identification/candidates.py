@@ -14,6 +14,8 @@ from fmus.effects import Effect
 from fmus.effects.effect import EACH_VSP
 
 from ..model import Integrals, Model, omega
+from ..model.weak_form import remember_responses
+from ..parallel import for_each
 from .multistart import Landscape, best_values
 from .segmentation import FLOOR, intervals, problem
 
@@ -242,5 +244,7 @@ def candidates(data: Sequence[Integrals], model: Model, base: np.ndarray) -> lis
     each = any(w.run.five is not None for w in data)
     effects = [ship.effects[name] for name in ship.candidates]
     possible = [e for e in effects if e.search.by == "regression" and (each or EACH_VSP not in e.needs)]
-    found = [candidate(data, model, base, e) for e in possible]
+    tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
+    remember_responses(data, [model, *map(model.plus, tried)])
+    found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
     return [c for c in found if c.shapes]

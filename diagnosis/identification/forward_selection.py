@@ -150,24 +150,24 @@ def searched_again(
     law does, gives way to what is better beside the others.
     """
     found = list(places)
-    for _ in range(ROUNDS):
-        changed = False
-        for k in range(len(found) - 1):
-            advance(f"effect {k + 1}: its place searched again")
-            others = [p for p in found if p is not found[k]]
-            beside = at.without(found[k].names)
-            beside = refit(t, beside, nuisance(t, beside, t.error(beside))).estimate
-            ranking = rank(t, beside, {p.id for p in others})
-            weighed = reweighted(t, beside, ranking)
-            chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
-            if weighed is None or chosen is None:
-                continue
+    count = len(found) - 1
+    due = [*range(count)]  # places of which something beside them has changed
+    for _ in range(ROUNDS * count):
+        if not due:
+            break
+        k = due.pop(0)
+        advance(f"effect {k + 1}: its place searched again")
+        others = [p for p in found if p is not found[k]]
+        beside = at.without(found[k].names)
+        beside = refit(t, beside, nuisance(t, beside, t.error(beside))).estimate
+        ranking = rank(t, beside, {p.id for p in others})
+        weighed = reweighted(t, beside, ranking)
+        chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
+        if weighed is not None and chosen is not None:
             t, _, best = weighed
-            changed = True
             found[k] = place(best, rng, chosen)
             at = best.of(chosen)
-        if not changed:
-            break
+            due = [(k + j) % count for j in range(1, count)]
     return at, found
 
 

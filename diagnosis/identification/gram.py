@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model import Integrals
 from ..model.weak_form import OVERLAP
+from ..parallel import for_each
 from .candidates import Candidate
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
@@ -124,16 +125,17 @@ class GramTable:
 
 def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
     """RMS of what even all columns together leave of the model error, by axis, at least ``floor``."""
-    left = []
-    for axis in range(3):
+
+    def left(axis: int) -> float:
         A = columns[:, axis, :]
         A = A[:, np.abs(A).max(axis=0) > 0.0]
         scale = np.sqrt((A**2).mean(axis=0))
         A = A / scale
         gram = A.T @ A + NOISE_RIDGE * len(A) * np.eye(A.shape[1])
         fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
-        left.append(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
-    return np.maximum(left, floor)
+        return float(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
+
+    return np.maximum(for_each(left, range(3)), floor)
 
 
 def gram_table(

@@ -173,7 +173,7 @@ class Refined:
     Attributes:
         estimate: the model with it.
         left: (K, 3), its model error.
-        columns: (K, 3, p), slopes by the parameters that were fitted.
+        columns: (K, 3, p), slopes by the parameters of the candidate that were fitted.
         cost: sum of squares and prior penalty.
         intervals: 95 % interval of each change point [s].
     """
@@ -213,18 +213,19 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
     weight = t.weight
 
     def evaluate(estimate: Estimate) -> Refined:
-        model = estimate.model(t.prior)
-        left = model_error(t.data, model)
-        columns = [slope(t, model, left, n, estimate.values[n]) for n in start.fitted]
-        stacked = np.stack(columns, axis=2) if columns else np.zeros((*left.shape, 0))
-        theta = parameters(estimate)
+        left, theta = t.error(estimate), parameters(estimate)
         cost = float(((left * weight) ** 2).sum() + theta @ precision @ theta)
-        return Refined(estimate, left, stacked, cost)
+        return Refined(estimate, left, np.zeros((*left.shape, 0)), cost)
+
+    def with_slopes(r: Refined) -> Refined:
+        model = r.estimate.model(t.prior)
+        columns = [slope(t, model, r.left, n, r.estimate.values[n]) for n in start.fitted]
+        return replace(r, columns=np.stack(columns, axis=2)) if columns else r
 
     def parameters(estimate: Estimate) -> np.ndarray:
         return np.array([*[estimate.values[n] for n in fitted], *estimate.offset])
 
-    best = evaluate(at.plus(start.values, np.zeros(t.prior.size)))
+    best = with_slopes(evaluate(at.plus(start.values, np.zeros(t.prior.size))))
     for _ in range(STEPS):
         columns = np.concatenate([best.columns, along.columns], axis=2)
         A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
@@ -239,10 +240,9 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
             if further.cost < best.cost:
                 break
         gained = best.cost - further.cost
-        if gained > 0.0:
-            best = further
         if gained < ENOUGH:
-            break
+            return replace(further, columns=best.columns) if gained > 0.0 else best
+        best = with_slopes(further)
     return best
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..model.correlation import independent
+from ..parallel import for_each
 from .candidates import Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
 from .map_regression import RIDGE, Scored, regression, score
@@ -82,7 +83,7 @@ def weighted(
     free = len(along.offset) - t.prior.size
     size = float(table.total[0, 0])
     new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
-    order = in_order([score(table, k, len(found[k].shapes)) for k in new])
+    order = in_order(for_each(lambda k: score(table, k, len(found[k].shapes)), new))
     return Ranking(base, along, table, found, order)
 
 
@@ -155,7 +156,7 @@ def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
     best = sorted(ranking.order[:LENGTH], key=lambda s: s.candidate)
     effects = [ranking.candidates[s.candidate].effect for s in best]
     starts = [start(at, ranking, s) for s in best]
-    refined = [refine(t, at, ranking.nuisance, s) for s in starts]
+    refined = for_each(lambda s: refine(t, at, ranking.nuisance, s), starts, [at.start])
     starts = [replace(s, values=r.own(at)) for r, s in zip(refined, starts, strict=True)]
     shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
     found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]

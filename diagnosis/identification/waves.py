@@ -19,6 +19,7 @@ from ..data import Track
 from ..model import Model
 from ..model.thrust import Response, thrust
 from ..model.weak_form import acceleration, by_mass
+from ..parallel import for_each
 from ..smoothing import Smoothed, smooth
 
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
@@ -66,15 +67,10 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
         model: the most likely one; what it leaves over is looked at.
         rng: for the bootstrap.
     """
-    left, noise, white = [], [], []
-    for smoothed in runs:
-        run = smooth(smoothed.track, driven=False)
-        error = model_error(run, model)
-        left += stretches(error, run.time)
-        white.append(2.0 * run.noise**2 * run.track.period)
-        other = redrawn(run, rng)
-        del run  # of a long run there is not room for two
-        noise += stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time)
+    each = zip(runs, rng.spawn(len(runs)), strict=True)
+    parts = for_each(lambda one: _signals(*one, model), [*each])
+    left, noise = ([x for part in parts for x in part[k]] for k in (0, 1))
+    white = [part[2] for part in parts]
     if not left or not noise:
         return None
     frequency, segments = segments_of(left)
@@ -97,6 +93,18 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
         float(extra[found.axis] / power[:, found.axis].sum()),
         float(np.mean(np.array(heights) >= least)),
     )
+
+
+def _signals(
+    smoothed: Smoothed, rng: np.random.Generator, model: Model
+) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
+    """Of a run stretches of its model error, of what noise makes of that, and its noise (3,)."""
+    run = smooth(smoothed.track, driven=False)
+    error = model_error(run, model)
+    white = 2.0 * run.noise**2 * run.track.period
+    left, other = stretches(error, run.time), redrawn(run, rng)
+    del run  # of a long run there is not room for two
+    return left, stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time), white
 
 
 def redrawn(run: Smoothed, rng: np.random.Generator) -> Track:

@@ -24,6 +24,7 @@ from .thrust import Response, commanded_shares, placed, places
 
 LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
+CLOSE = 1e-12  # m and rad, to which a true pose is found
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
 
@@ -209,5 +210,7 @@ def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
     for _ in range(8):
         x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
+        if max(np.abs(o).max(initial=0.0) for o in off) < CLOSE:
+            break
         pose = [a + b for a, b in zip(pose, off, strict=True)]
     return pose

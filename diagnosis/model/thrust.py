@@ -66,19 +66,18 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     Args:
         run: its time and power.
         model: whose thrusters act.
-        between: (2, n, sets, 3), their response to the run's commands, :attr:`Response.between_samples`.
+        between: (2 or 1, sets, 3, n), what becomes of the commands, :attr:`Response.between_samples`.
         nu: (n, 3), body-fixed velocity.
     """
     power = None if run.power is None else chain.Power(*run.power.T)
-    given, acting = between
-    total = np.zeros_like(run.tau_cmd)
-    for k, aside in enumerate(places(run)):
-        u, v, r = nu.T
-        x, y, bow = given[:, k].T
-        now = Running(run.time, u, v, r, x, y, bow, aside)
-        drive = placed(model.drive, aside, power)
-        total += np.column_stack(np.broadcast_arrays(*chain.act(tuple(acting[:, k].T), now, drive)))
-    return total
+    total = np.zeros((3, run.time.size))
+    for aside, given, acting in zip(places(run), between[0], between[-1], strict=True):
+        now = Running(run.time, *nu.T, *given, aside)
+        for sum_, part in zip(
+            total, chain.act(tuple(acting), now, placed(model.drive, aside, power)), strict=True
+        ):
+            sum_ += part
+    return total.T
 
 
 class Response:
@@ -113,11 +112,17 @@ class Response:
 
     @property
     def between_samples(self) -> np.ndarray:
-        """Means (2, n, sets, 3) from each sample to the next: commands that arrive, shares that act."""
+        """Means (2, sets, 3, n) from each sample to the next: commands that arrive, shares that act.
+
+        Where these are the same there is one of them.
+        """
         if not self.slow and self.model.clock == 0.0:
-            return np.stack([commanded_shares(self.run, self.model)] * 2)
-        ends = np.append(self.run.time, self.run.time[-1] + self._period)
-        return np.stack(self.mean(ends[:-1], ends[1:]))
+            means = np.array([commanded_shares(self.run, self.model)])
+        else:
+            ends = np.append(self.run.time, self.run.time[-1] + self._period)
+            means = np.array(self.mean(ends[:-1], ends[1:]))
+        lasting = means[:1] if (means[0] == means[-1]).all() else means
+        return np.ascontiguousarray(np.moveaxis(lasting, 1, -1))
 
     def mean(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Means over intervals of the run's time: commands that arrive, and shares that act.

@@ -17,6 +17,7 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..data.reading import Run
+from ..parallel import for_each
 from ..smoothing import Smoothed
 from ..smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
@@ -32,8 +33,9 @@ BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
 KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
 ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
-# Bytes for commands that thrusters with a memory respond to: of four minutes those of 60 such models.
-MEMORIES = 4e7
+# Bytes for commands that thrusters with a memory respond to: of 700 s with two sets of thrusters those
+# of 30 such models.
+MEMORIES = 8e7
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -218,9 +220,25 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
     model = model.during(w.run.name)
     if nu is None:
         nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
-    key, moving = Response.key(model), not at_rest(w.smoothed)
-    between = w.recall("response", key, lambda: Response(w.run, model, moving).between_samples, MEMORIES)
+    between = w.recall("response", Response.key(model), lambda: _between(w, model), MEMORIES)
     return thrust(w.run, model, between, nu)
+
+
+def _between(w: Integrals, model: Model) -> np.ndarray:
+    return Response(w.run, model, not at_rest(w.smoothed)).between_samples
+
+
+def remember_responses(data: Sequence[Integrals], models: Sequence[Model]) -> None:
+    """Compute what the thrusters of some models make of the commands of all runs, and keep it."""
+    missing: dict[Any, tuple[Integrals, Model]] = {}
+    for w in data:
+        for model in (m.during(w.run.name) for m in models):
+            key = Response.key(model)
+            if key not in w.memory.get("response", {}):
+                missing[w.run.name, key] = w, model
+    found = for_each(lambda one: _between(*one), [*missing.values()])
+    for (_, key), (w, _), between in zip(missing, missing.values(), found, strict=True):
+        w.recall("response", key, lambda between=between: between, MEMORIES)
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -247,6 +265,6 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
 def _motion(w: Integrals, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
     motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
-    eta, nu = (np.concatenate(part).T for part in motion)
-    eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (eta, nu))
+    # Columns in one piece each: all that is computed of them goes along time.
+    eta, nu = (np.where(w.known, np.concatenate(part), 0.0).T for part in motion)
     return eta, nu, w.slope @ nu

@@ -33,6 +33,7 @@ from ..identification.prior import NominalPrior
 from ..identification.refinement import HALVINGS, SMALLEST_SCALE, Estimate
 from ..model import Integrals
 from ..model.uncertainty import omega_std
+from ..parallel import for_each
 from .push import NO_PUSH, Push, covariance, estimate
 from .shooting import UNKNOWN, Around, Shooting
 
@@ -168,31 +169,34 @@ class PredictionFit:
     def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
         """Twice the negative logarithm of the posterior, but for a constant."""
         theta, model = self.theta(at), at.model(self.prior)
-        total = float(theta @ self.precision @ theta)
-        for s, W in zip(self.windows, weights, strict=True):
-            total += power / len(self.windows) * float(np.sum(whitened(W, s.residuals(model)) ** 2))
+
+        def of_windows(k: int) -> float:
+            return float(np.sum(whitened(weights[k], self.windows[k].residuals(model)) ** 2))
+
+        squares = for_each(of_windows, range(len(self.windows)))
+        total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
         return total if np.isfinite(total) else np.inf
 
     def information(self, at: Estimate) -> Information:
         """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
         push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
-        model, q, n = at.model(self.prior), self.unit.size, len(self.windows)
-        H, G, g, weights = np.zeros((q, q)), np.zeros((q, q)), np.zeros(q), []
-        for s in self.windows:
+        model, q = at.model(self.prior), self.unit.size
+
+        def of_windows(s: Shooting) -> tuple[np.ndarray, ...]:
             around = s.around(model, self._steps)
             W = self.whitening(s, around)
-            weights.append(W)
             A = whitened(W, around.slopes * self.unit)
             flat = A.reshape(-1, q)
-            H += flat.T @ flat / n
-            g += flat.T @ whitened(W, around.residuals[..., None]).ravel() / n
             fine = running(W)
             sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
             V = covariance(around.motion[fine], s.at_start[fine], Push(sizes, push.time))
             back = W[fine].transpose(0, 2, 1) @ A[fine]
             pushed = (_square(V, s.noise[fine]) @ back).reshape(-1, q)
-            G += back.reshape(-1, q).T @ pushed / n
-        return Information(H, G, g, weights, push)
+            g = flat.T @ whitened(W, around.residuals[..., None]).ravel()
+            return flat.T @ flat, back.reshape(-1, q).T @ pushed, g, W
+
+        H, G, g, weights = zip(*for_each(of_windows, self.windows), strict=True)
+        return Information(np.mean(H, axis=0), np.mean(G, axis=0), np.mean(g, axis=0), weights, push)
 
 
 def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """The report: content of a JSON file as text and tables, with figures of the runs, in one HTML page."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,6 +10,7 @@ import numpy as np
 import cosim
 
 from ..assessment.evaluation import Evaluation
+from ..parallel import for_each
 from ..progress import Advance, silent
 from . import figures, formatting, tracks
 from .headline import told, verdict_title
@@ -60,15 +61,16 @@ def write_report(
     learned = any(e.after is not e.before for e in evaluations)
     diagnosis = content if isinstance(content, DiagnosisContent) else None
     advance("report: figures")
+    makers: dict[str, Callable[[], Iterator[Drawing]]] = {
+        "tracks": lambda: _tracks(evaluations, learned),
+        "where": lambda: _profiles(evaluations, omega_std, learned),
+        "omega": lambda: _omega(evaluations, omega_std, learned),
+        "growth": lambda: _growth(evaluations, learned),
+        "shapes": lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations),
+        "ranking": lambda: iter(()) if diagnosis is None else _ranking(diagnosis),
+    }
     with style():
-        drawn = {
-            "shapes": [] if diagnosis is None else list(_shapes(diagnosis, evaluations)),
-            "ranking": [] if diagnosis is None else list(_ranking(diagnosis)),
-            "tracks": list(_tracks(evaluations, learned)),
-            "growth": list(_growth(evaluations, learned)),
-            "omega": list(_omega(evaluations, omega_std, learned)),
-            "where": list(_profiles(evaluations, omega_std, learned)),
-        }
+        drawn = dict(zip(makers, for_each(lambda m: list(m()), [*makers.values()]), strict=True))
     advance("report: page")
     text = _template().render(
         content=content,

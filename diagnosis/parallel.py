@@ -1,0 +1,100 @@
+"""The same work for several items, in two processes where the system can fork.
+
+The second process begins as a copy of this one, so that nothing is sent to it; it takes the next item
+whenever it is free, and sends back what it found.
+"""
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from io import BytesIO
+from multiprocessing import get_context
+from pickle import Pickler, Unpickler
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
+from cosim.process import end_with_parent
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+# Elsewhere a process begins with imports of some seconds, or libraries do not outlive a fork.
+FORKS = sys.platform == "linux" and (os.cpu_count() or 1) > 1
+NUMBER = 2  # bytes of an item's number; all fit into a pipe's 64 kB
+_alone = not FORKS  # whether this process shares no work: it is a second one itself
+
+
+def for_each(
+    function: Callable[[Item], Found], items: Sequence[Item], common: Sequence[object] = ()
+) -> list[Found]:
+    """What a function gives for each item, in their order.
+
+    Args:
+        function: depends on nothing that it changes.
+        items: what it is called with.
+        common: objects that results may contain and that are not sent, as both processes have them.
+    """
+    main = threading.current_thread() is threading.main_thread()  # others might hold what a fork needs
+    if _alone or not main or len(items) < 2:
+        return [function(item) for item in items]
+    context, parent = get_context("fork"), os.getpid()
+    receiver, sender = context.Pipe(duplex=False)
+    known = {id(x): x for x in common}
+    following, numbers = os.pipe()  # both take the next item's number from it
+    os.write(numbers, b"".join(k.to_bytes(NUMBER, "big") for k in range(len(items))))
+    os.close(numbers)
+
+    def work() -> dict[int, Found]:
+        found: dict[int, Found] = {}
+        with suppress(Exception):  # what is missing is computed at last, in order, and meets the same
+            while number := os.read(following, NUMBER):
+                k = int.from_bytes(number, "big")
+                found[k] = function(items[k])
+        return found
+
+    def beside() -> None:
+        global _alone
+        _alone = True
+        ignore_interrupts()
+        end_with_parent(parent)
+        receiver.close()
+        with suppress(Exception):  # a result that cannot be sent is missing, too
+            sender.send_bytes(_packed(work(), known))
+
+    second = context.Process(target=beside, daemon=True)
+    with threadpool_limits(1, "blas"):  # or each process would have a thread for each core
+        with UninterruptedProcesses():
+            second.start()
+        sender.close()
+        try:
+            found = work()
+            with suppress(EOFError):  # the second process was killed
+                found |= _unpacked(receiver.recv_bytes(), known)
+        finally:
+            receiver.close()
+            os.close(following)
+            second.kill()
+            second.join()
+    return [found[k] if k in found else function(item) for k, item in enumerate(items)]
+
+
+def _packed(content: Any, known: dict[int, Any]) -> bytes:
+    class Packer(Pickler):
+        def persistent_id(self, obj: Any) -> int | None:
+            return id(obj) if id(obj) in known else None
+
+    buffer = BytesIO()
+    Packer(buffer, protocol=5).dump(content)
+    return buffer.getvalue()
+
+
+def _unpacked(content: bytes, known: dict[int, Any]) -> Any:
+    class Unpacker(Unpickler):
+        def persistent_load(self, pid: int) -> Any:
+            return known[pid]
+
+    return Unpacker(BytesIO(content)).load()

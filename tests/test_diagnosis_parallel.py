@@ -1,0 +1,75 @@
+"""The same work for several items in two processes."""
+
+import os
+import signal
+import time
+
+import pytest
+
+from diagnosis.parallel import FORKS, for_each
+
+forked = pytest.mark.skipif(not FORKS, reason="needs fork and two cores")
+
+
+def patient(x):
+    """Leaves time for the other process to take something."""
+    time.sleep(0.02)
+    return x
+
+
+@forked
+def test_both_processes_work_and_results_are_in_order():
+    found = for_each(lambda k: (k, os.getpid(), patient(None)), range(12))
+    assert [k for k, *_ in found] == list(range(12))
+    assert {pid for _, pid, _ in found} > {os.getpid()}
+
+
+def test_the_error_is_that_of_the_first_item_that_has_one():
+    def fails(k):
+        patient(k)
+        if k in (3, 4, 9):
+            raise ValueError(f"item {k}")
+        return k
+
+    with pytest.raises(ValueError, match="item 3"):
+        for_each(fails, range(12))
+
+
+@forked
+def test_what_a_killed_process_did_not_find_is_computed():
+    here = os.getpid()
+
+    def once(k):
+        if os.getpid() != here:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return patient(k)
+
+    assert for_each(once, range(6)) == list(range(6))
+
+
+def test_a_common_object_stays_the_same_object():
+    class Local:  # cannot be pickled
+        pass
+
+    common = Local()
+    assert all(x is common for x, _ in for_each(lambda k: (common, patient(k)), range(4), [common]))
+
+
+@forked
+def test_no_process_and_no_open_file_is_left():
+    before = len(os.listdir("/proc/self/fd"))
+    for_each(patient, range(4))
+    with pytest.raises(KeyboardInterrupt):
+        for_each(interrupted, range(4))
+    assert len(os.listdir("/proc/self/fd")) == before
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+HERE = os.getpid()
+
+
+def interrupted(k):
+    if os.getpid() == HERE:
+        raise KeyboardInterrupt
+    time.sleep(60.0)
