@@ -12,19 +12,17 @@ from .assessment.regions import Region
 from .assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from .assessment.remainder_text import remainder_sentence
 from .identification.findings import Finding, Findings
+from .identification.refinement import at_limit
 from .model import Integrals, Model, omega
 from .model.uncertainty import omega_std
 from .unseen import harm
-from .withdrawal import Unseen, without
+from .withdrawal import AT_LIMIT, Unseen, without
 
 Verdict = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
 
 # Confidence from which on an effect is found; and of its set from which on the set is a finding, else it
 # is a possibility; contract.
 FOUND, BELIEVED = 0.8, 0.5
-# Of a limit of a parameter's range: a value so near to it is not one that the data chose; contract.
-NEAR_LIMIT = 0.05
-AT_LIMIT = "{0} is at the limit of what was looked for"
 # Confidence at the most where something acts on the axes of an effect that it does not explain: whether
 # it is a cause or stands in for a part of the other is even odds, as long as the other is not known.
 EVEN_ODDS = 0.5
@@ -90,22 +88,11 @@ def concluded(found: Findings, runs: Sequence[Integrals], unseen: Unseen, start:
 
 
 def limited(f: Finding, start: Model) -> Finding:
-    """A finding; with a value at the limit of its range it is none.
-
-    A limit of zero is where an effect begins. The nodes of a free curve are not values of their own.
-    """
-    effect = start.ship.effects[f.id]
-    at = [n for n, x in f.values.items() if _at_limit(start, n, start.value(n) + x)]
-    if not at or effect.search.smooth:
+    """A finding; with a value at the limit of its range it is none."""
+    at = at_limit(start, f.id, f.values)
+    if not at:
         return f
     return replace(f, confidence=0.0, together=0.0, doubt=AT_LIMIT.format(" and ".join(at)))
-
-
-def _at_limit(start: Model, name: str, value: float) -> bool:
-    allowed = start.declared(name).range
-    return any(
-        limit and abs(value - limit) <= NEAR_LIMIT * abs(limit) for limit in (allowed.min, allowed.max)
-    )
 
 
 def doubted(learned: Findings, remainder: Remainder, start: Model) -> Findings:

@@ -13,11 +13,13 @@ import numpy as np
 from .identification.acceptance import worse
 from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
+from .identification.refinement import at_limit
 from .model import Integrals, Model
 from .unseen import Losses, Part, gain, harm, losses
 
 ALONE = "with it {harm}"
 WHOLE_SET = "with it and what was found before it {harm} than at first"
+AT_LIMIT = "{0} is at the limit of what was looked for"
 DRIVES = "with it the hull drives the ship on, and {where} do not show that it does"
 
 
@@ -92,7 +94,7 @@ def withdraw(
         rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
         on = {i for i, rest in rests.items() if drives(kept.model, _model(rest, start))}
         against = {i: _instead(r, kept, start) for i, r in rests.items()}
-        worst = _worst(kept, against, unseen, on)
+        worst = _at_limit(kept, left, start) or _worst(kept, against, unseen, on)
         if worst is None:
             break
         # One at a time: of two that stand in for each other, the other may be needed then.
@@ -120,6 +122,18 @@ def _instead(rest: Findings, kept: Findings, start: Model) -> Findings | Model:
         return rest
     first = added(rest, rest.effects, start)
     return replace(first, fold_models=[first.model] * len(rest.fold_models)) if rest.effects else start
+
+
+def _at_limit(found: Findings, ids: Collection[str], start: Model) -> Withdrawn | None:
+    """An effect whose value no data chose; None: there is none.
+
+    A share may well be all there is, as of a force that is lost; other ranges end where nobody looked.
+    """
+    for f in found.effects:
+        names = at_limit(start, f.id, f.values) if f.id in ids else []
+        if names := [n for n in names if start.declared(n).unit != "1"]:
+            return Withdrawn(f.id, AT_LIMIT.format(" and ".join(names)))
+    return None
 
 
 def _worst(

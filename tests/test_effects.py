@@ -18,11 +18,11 @@ from fmus.effects import STANDARD, Loaded, Motion, Running, Thrust
 from fmus.effects.__main__ import table as effects_table
 from fmus.effects.environment import surface
 from fmus.frames import rotate_to_earth
-from fmus.hull import Inertia
+from fmus.hull import Inertia, damping_force
 from fmus.signals import Force, Velocity
 from fmus.thrusters import propeller, table, thrusters
 from fmus.thrusters.chain import Inputs
-from fmus.vessel.vessel import COMPONENT, Start, State
+from fmus.vessel.vessel import COMPONENT, Start, State, hull
 from fmus.vessel.vessel_effects import vessel_effects
 
 CONTRACT = [
@@ -186,6 +186,20 @@ def test_without_effects_there_is_no_model_error_at_all():
     assert (out.omega_X, out.omega_Y, out.omega_N) == (0.0, 0.0, 0.0)
     assert not any(out.change)
     assert not any(out.outside)
+
+
+@pytest.mark.parametrize("values", [{"X_u": -100.0, "Y_v": -9.0}, {"N_absr_r": -5.0, "delta_X_u": -1.0}])
+def test_scaled_damping_is_that_of_the_ship_at_hand(values):
+    """What remains without damping is the same; the rest is one and a half times as much."""
+    s = State(0.0, 0.0, 0.3, 0.2, -0.1, 0.15, 0.0)
+
+    def omega_star(**more):
+        _, out = COMPONENT.step(s, Force(0.0, 0.0, 0.0), with_params(COMPONENT, **values, **more), 0.0)
+        return np.array([out.omega_X, out.omega_Y, out.omega_N])
+
+    _, _, damping = hull(with_params(COMPONENT, **values), vessel_effects(STANDARD))
+    gained = omega_star(scale_damping=0.5) - omega_star()
+    assert gained == pytest.approx(0.5 * np.array(damping_force(s.u, s.v, s.r, damping)), abs=1e-12)
 
 
 @given(st.floats(-3.0, 3.0), speeds, speeds)

@@ -5,7 +5,7 @@ formula stands in the declaration of the effect and nowhere else. An effect whos
 coefficients has one shape; any other has several, one for each value tried of what it is nonlinear in.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -235,14 +235,16 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     return Candidate(e, shapes)
 
 
-def candidates(data: Sequence[Integrals], model: Model, base: np.ndarray) -> list[Candidate]:
-    """All effects that the ship can have and that a regression can find.
+def candidates(
+    data: Sequence[Integrals], model: Model, base: np.ndarray, known: Set[str] = frozenset()
+) -> list[Candidate]:
+    """All effects that the ship can have and that a regression can find, but those that are known.
 
     Those of a single propeller only where the propellers have commands of their own.
     """
     ship = model.ship
     each = any(w.run.five is not None for w in data)
-    effects = [ship.effects[name] for name in ship.candidates]
+    effects = [ship.effects[name] for name in ship.candidates if name not in known]
     possible = [e for e in effects if e.search.by == "regression" and (each or EACH_VSP not in e.needs)]
     tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
     remember_responses(data, [model, *map(model.plus, tried)])

@@ -32,6 +32,7 @@ STEPS = 5  # of Gauss-Newton, at the most
 ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
 SMALLEST_SCALE = 1e-2  # of a parameter, by which the step of its finite difference is scaled
 HALVINGS = (1.0, 0.5, 0.25)
+NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +125,21 @@ def bounded(start: Model, name: str, addition: float) -> float:
     low = -np.inf if limits.min is None else limits.min
     high = np.inf if limits.max is None else limits.max
     return min(max(addition, low - present), high - present)
+
+
+def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[str]:
+    """Parameters of an effect with a value at a limit of their range, which the data did not choose.
+
+    A limit of zero is where an effect begins. The nodes of a free curve are not values of their own.
+    """
+    if start.ship.effects[effect].search.smooth:
+        return []
+
+    def at(name: str) -> bool:
+        limits, value = start.declared(name).range, start.value(name) + additions[name]
+        return any(end and abs(value - end) <= NEAR_LIMIT * abs(end) for end in (limits.min, limits.max))
+
+    return [name for name in additions if at(name)]
 
 
 def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:

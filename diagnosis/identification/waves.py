@@ -67,8 +67,8 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
         model: the most likely one; what it leaves over is looked at.
         rng: for the bootstrap.
     """
-    each = zip(runs, rng.spawn(len(runs)), strict=True)
-    parts = for_each(lambda one: _signals(*one, model), [*each])
+    each = [(smoothed, rng.standard_normal(smoothed.eta.shape)) for smoothed in runs]
+    parts = for_each(lambda one: _signals(*one, model), each)
     left, noise = ([x for part in parts for x in part[k]] for k in (0, 1))
     white = [part[2] for part in parts]
     if not left or not noise:
@@ -96,20 +96,20 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
 
 
 def _signals(
-    smoothed: Smoothed, rng: np.random.Generator, model: Model
+    smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what noise makes of that, and its noise (3,)."""
     run = smooth(smoothed.track, driven=False)
     error = model_error(run, model)
     white = 2.0 * run.noise**2 * run.track.period
-    left, other = stretches(error, run.time), redrawn(run, rng)
+    left, other = stretches(error, run.time), redrawn(run, drawn)
     del run  # of a long run there is not room for two
     return left, stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time), white
 
 
-def redrawn(run: Smoothed, rng: np.random.Generator) -> Track:
-    """The run as it was smoothed, with other noise of the same strength."""
-    pose = run.eta + run.noise * rng.standard_normal(run.eta.shape)
+def redrawn(run: Smoothed, drawn: np.ndarray) -> Track:
+    """The run as it was smoothed, with other noise of the same strength, by draws (n, 3)."""
+    pose = run.eta + run.noise * drawn
     return replace(run.track, pose=np.where(run.used[:, None], pose, run.track.pose))
 
 

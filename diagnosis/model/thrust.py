@@ -72,11 +72,11 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     power = None if run.power is None else chain.Power(*run.power.T)
     total = np.zeros((3, run.time.size))
     for aside, given, acting in zip(places(run), between[0], between[-1], strict=True):
-        now = Running(run.time, *nu.T, *given, aside)
-        for sum_, part in zip(
-            total, chain.act(tuple(acting), now, placed(model.drive, aside, power)), strict=True
-        ):
-            sum_ += part
+        (u, v, r), (x, y, bow) = nu.T, given
+        now = Running(run.time, u, v, r, x, y, bow, aside)
+        force = chain.act(tuple(acting), now, placed(model.drive, aside, power))
+        for axis in range(3):
+            total[axis] += force[axis]
     return total.T
 
 

@@ -30,6 +30,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from ..declare import DeclarationError, Variable, variables
 from ..docstring import docstring
+from ..hull import Damping
 from .families import UNKNOWN, Family
 
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
@@ -67,7 +68,7 @@ class Motion(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """A :class:`Motion`, and the thrusters' force on the hull [N, N, N m]."""
+    """A :class:`Motion`, the thrusters' force on the hull [N, N, N m], and the hull's damping."""
 
     x: Any = 0.0
     y: Any = 0.0
@@ -79,6 +80,7 @@ class Loaded(NamedTuple):
     tau_X: Any = 0.0
     tau_Y: Any = 0.0
     tau_N: Any = 0.0
+    damping: Any = Damping()
 
 
 class Running(NamedTuple):

@@ -8,8 +8,8 @@ ratios can be known.
 from typing import Annotated
 
 from ..declare import Range
-from ..hull import Damping, Inertia, Triple, damping_force
-from .effect import Motion, Search, Wording, effect
+from ..hull import Inertia, Triple, damping_force
+from .effect import Loaded, Search, Wording, effect
 from .families import INERTIA, SURGE_DRAG
 from .text import Found, percent
 
@@ -50,7 +50,7 @@ def scale_inertia(
     "scale_damping",
     "force",
     "XYN",
-    formula="-k D(nu) nu, D of Table 2.1",
+    formula="-k D(nu) nu, D of the model",
     symbol="k = delta_D - 1",
     sign="positive brakes more",
     source="(2.22)",
@@ -58,9 +58,9 @@ def scale_inertia(
     wording=sentence("scale_damping", "The damping"),
 )
 def scale_damping(
-    ship: Motion,
+    ship: Loaded,
     scale_damping: Annotated[float, "1", "excess of the damping's factor, delta_D - 1", _FACTOR] = 0.0,
 ) -> Triple:
     """All of the nominal damping by one factor."""
-    X, Y, N = damping_force(ship.u, ship.v, ship.r, Damping())
+    X, Y, N = damping_force(ship.u, ship.v, ship.r, ship.damping)
     return scale_damping * X, scale_damping * Y, scale_damping * N

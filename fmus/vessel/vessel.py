@@ -143,7 +143,7 @@ def disturbed(s: State, tau: Force, b: Prepared) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] with every effect, in a current that the hull sees as nu_r."""
     ship, u_c, v_c = through_water(s, b)
     X, Y, N = tau
-    loaded = Loaded(*ship, *tau)
+    loaded = Loaded(*ship, *tau, b.hull.damping)
     for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
         dX, dY, dN = member.apply(acts, b.params.outside, NONE, loaded)
         X, Y, N = X + dX, Y + dY, N + dN
@@ -193,7 +193,7 @@ def change_forces(s: State, b: Prepared) -> Any:
 def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
     """The force of each other effect on the hull."""
     ship, _, _ = through_water(s, b)
-    forces = forces_of(b.effects.outside, b.outside, b.params.outside, Loaded(*ship, *tau))
+    forces = forces_of(b.effects.outside, b.outside, b.params.outside, Loaded(*ship, *tau, b.hull.damping))
     return b.effects.outside_forces._make(forces)
 
 
