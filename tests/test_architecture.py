@@ -49,7 +49,7 @@ DIAGNOSIS_LAYERS = (
     ("analysis",),
     ("open_loop",),
     ("interactive", "command_line"),
-    ("compare", "learn", "pca", "pls", "replay", "sysid", "watch"),  # commands
+    ("compare", "learn", "pca", "pls", "propose_columns", "replay", "sysid", "watch"),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.

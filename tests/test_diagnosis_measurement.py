@@ -8,10 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import savemat
+from support.command import command
 from support.measured import DATA, needs_data
 
 import cosim
 import diagnosis
+from diagnosis import propose_columns
+from diagnosis.data import propose
 from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Layout
 from diagnosis.data.csv_tables import csv_table
 from diagnosis.data.reading import force
@@ -377,3 +380,118 @@ def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):
     assert (table["x"] == 2 * table["time"]).all()
     assert len(table) == 20_000
     assert most < 0.5 * path.stat().st_size
+
+
+FOREIGN = {
+    "time": "Time [ms]", "x": "North (mm)", "y": "West", "psi": "Heading_deg",
+    "tau_X": "Surge force", "tau_Y": "Sway force [mN]", "tau_N": "Yaw moment",
+}  # fmt: skip
+
+
+class TestColumns:
+    """``cybership columns``: what a file needs to be told is read off the file."""
+
+    def foreign(self, path, encoding="latin-1", sep=";", decimal=",", units_line=False):
+        """A measurement in names, units and text of somebody else; the same run as ``with_tau``."""
+        table = with_tau()
+        table["time"] *= 1e3
+        table["x"] *= 1e3
+        table["y"] *= -1.0
+        table["psi"] = np.degrees(table["psi"])
+        table["tau_Y"] *= 1e3
+        names, units = dict(FOREIGN), {}
+        if units_line:
+            units = {
+                "time": "ms",
+                "x": "[mm]",
+                "y": "m",
+                "psi": "°",
+                "tau_X": "N",
+                "tau_Y": "mN",
+                "tau_N": "N.m",
+            }
+            names = {
+                k: n.partition(" [")[0].partition(" (")[0].removesuffix("_deg") for k, n in names.items()
+            }
+        table.insert(2, "Länge", 12.0)
+        text = table.rename(columns=names).to_csv(index=False, sep=sep, decimal=decimal)
+        head, rows = text.split("\n", 1)
+        below = sep.join(units.get(name, "-") for name in table.columns) + "\n" if units_line else ""
+        path.write_bytes(f"Schlepptank Länge\n\nrun 3\n{head}\n{below}{rows}".encode(encoding))
+
+    @pytest.mark.parametrize("units_line", [False, True])
+    @pytest.mark.parametrize(
+        ("encoding", "sep", "decimal"),
+        [("latin-1", ";", ","), ("utf-8", ",", "."), ("utf-16", "\t", ".")],
+    )
+    def test_foreign_file_is_proposed_written_and_read(
+        self, tmp_path, encoding, sep, decimal, units_line
+    ):
+        path = tmp_path / "mine.csv"
+        self.foreign(path, encoding, sep, decimal, units_line)
+        done = command(propose_columns.main, path, "--anyway")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "not used: Länge" in done.stdout
+        assert [p.name for p in tmp_path.iterdir()] == ["mine.csv"]
+        assert command(propose_columns.main, path, "--write", "--anyway").returncode == 0
+        found = diagnosis.read(path)
+        with_tau().to_csv(tmp_path / "plain.csv", index=False)
+        plain = diagnosis.read(tmp_path / "plain.csv")
+        for name in ("time", "pose", "tau_cmd"):
+            assert getattr(found, name) == pytest.approx(getattr(plain, name), abs=1e-9)
+
+    def test_what_is_there_is_replaced_only_on_request(self, tmp_path):
+        path, beside = tmp_path / "mine.csv", tmp_path / "mine.csv.json"
+        self.foreign(path)
+        beside.write_text("{}")
+        done = command(propose_columns.main, path, "--write", "--anyway")
+        assert done.returncode == 2
+        assert "is there already; --overwrite replaces it" in done.stderr
+        assert beside.read_text() == "{}"
+        assert command(propose_columns.main, path, "--write", "--overwrite", "--anyway").returncode == 0
+        assert json.loads(beside.read_text())["skip"] == 3
+
+    def test_units_that_nobody_told_are_seen_in_the_numbers(self, tmp_path):
+        table = with_tau()
+        table["time"] *= 1e3
+        table["psi"] = np.degrees(table["psi"]) % 360.0
+        table[["x", "y"]] *= 1e5
+        table.to_csv(tmp_path / "a.csv", index=False)
+        told = propose(tmp_path / "a.csv").needed["columns"]
+        assert {signal: column["unit"] for signal, column in told.items()} == {
+            "time": "ms", "x": "mm", "y": "mm", "psi": "deg",
+        }  # fmt: skip
+
+    def test_a_file_as_it_should_be_needs_nothing(self, tmp_path):
+        with_tau().to_csv(tmp_path / "a.csv", index=False)
+        assert propose(tmp_path / "a.csv").needed == {}
+        done = command(propose_columns.main, tmp_path / "a.csv", "--write", "--anyway")
+        assert "nothing needs to be told" in done.stdout
+        assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
+
+    @pytest.mark.parametrize(
+        ("content", "message"),
+        [
+            ("time,north,east,speed\n0,0,0,1\n1,0,1,1\n", "has no commands"),
+            (
+                "time,x [fathom],y,psi,tau_X\n0,0,0,0,1\n1,0,1,1,1\n",
+                "'fathom' in the column 'x [fathom]'",
+            ),
+            ("0,0,0,1\n1,0,1,1\n", "no table of numbers below a line of names"),
+            ("a word\n", "no table of numbers below a line of names"),
+            ("", "no table of numbers below a line of names"),
+        ],
+    )
+    def test_what_cannot_be_proposed_is_one_line(self, tmp_path, content, message):
+        (tmp_path / "a.csv").write_text(content)
+        done = command(propose_columns.main, tmp_path / "a.csv", "--write")
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+        assert message in done.stderr
+
+    def test_lines_before_names_that_nobody_knows_are_told(self, tmp_path):
+        """The hint about ``skip`` needs no name: the line of the names is the one above the numbers."""
+        self.foreign(tmp_path / "a.csv", "utf-8", ",", ".")
+        with pytest.raises(
+            cosim.InputError, match=r"names of its columns in line 4; put \{\"skip\": 3\}"
+        ):
+            diagnosis.read(tmp_path / "a.csv")

@@ -3,6 +3,7 @@
 from .beside import line_beside
 from .cleaning import Counts, Track, clean, in_order, lost, repeated
 from .other_columns import other_columns
+from .proposal import propose
 from .reading import Run, read, read_frame
 from .thinning import thinned
 
@@ -15,6 +16,7 @@ __all__ = [
     "line_beside",
     "lost",
     "other_columns",
+    "propose",
     "read",
     "read_frame",
     "repeated",

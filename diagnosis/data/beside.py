@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,12 +11,11 @@ import pandas as pd
 from cosim import InputError
 
 from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
+from .text_layout import text_layout
 
-SEPARATORS = (";", "\t", "|")  # that a table may have in place of commas
 SI = ("s", "m", "rad", "N", "N.m", "1")  # need not be said
 SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
-PREAMBLE = 200  # lines among which that of the names is looked for; chosen
 
 
 class Change(NamedTuple):
@@ -79,15 +77,12 @@ def refuse_separator(path: Path, header: str) -> None:
     Raises:
         InputError: with the line that tells the separator.
     """
-    separator = max(SEPARATORS, key=header.count)
-    if separator not in header:
+    found = text_layout(path, UTF_8)
+    if found is None or found.separator == Layout().separator:
         return
-    with path.open(encoding="utf-8-sig") as file:
-        cells = [file.readline() for _ in range(2)][1]
-    layout = {"separator": separator} | ({"decimal": ","} if "," in cells else {})
     raise InputError(
         f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
-        f"{separator!r}; {_line(path, layout)}"
+        f"{found.separator!r}; {_line(path, found.model_dump(exclude_defaults=True))}"
     )
 
 
@@ -114,17 +109,13 @@ def refuse_preamble(path: Path, layout: Layout, names: Sequence[str]) -> None:
     Raises:
         InputError: with the line that tells where they are.
     """
-    time = layout.column("time").name
-    if time in names:
+    if layout.column("time").name in names:
         return
-    with path.open(encoding=layout.encoding, errors="replace") as file:
-        for number, line in enumerate(islice(file, PREAMBLE)):
-            for separator in (layout.separator, ",", *SEPARATORS):
-                cells = [cell.strip().strip('"') for cell in line.split(separator)]
-                if number != layout.skip and len(cells) > 1 and time in cells:
-                    changes = {} if separator == layout.separator else {"separator": separator}
-                    told = f"line {number + 1}; {_put(path, layout, skip=number, **changes)}"
-                    raise InputError(f"'{path}' has the names of its columns in {told}")
+    found = text_layout(path, layout.encoding)
+    if found is None or (found.skip, found.separator) == (layout.skip, layout.separator):
+        return
+    line = _put(path, layout, **found.model_dump(exclude_defaults=True))
+    raise InputError(f"'{path}' has the names of its columns in line {found.skip + 1}; {line}")
 
 
 def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:

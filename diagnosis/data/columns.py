@@ -58,6 +58,17 @@ QUANTITY = {
     "tau_Y": "force",
     "tau_N": "moment",
 } | dict.fromkeys((*THREE, *FIVE, *POWER), "command")
+# Other names of signals that files use, without case, blanks and marks between words.
+CALLED: dict[str, tuple[str, ...]] = {
+    "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
+    "x": ("north", "northing", "n", "posx", "positionx", "xn"),
+    "y": ("east", "easting", "e", "posy", "positiony", "ye"),
+    "psi": ("heading", "yaw", "hdg", "headingangle", "yawangle"),
+    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
+    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
+    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
+}
+OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
 class Column(BaseModel):
@@ -137,7 +148,7 @@ def _log() -> Layout:
 
 
 LOG = _log()
-WITH_UNIT = re.compile(r"(\w+)\s*[\[(]\s*(\S+)\s*[\])]")
+WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+)\s*[\])]")
 
 
 def layout_of(names: Sequence[str], units: Mapping[str, str], where: str) -> Layout:

@@ -96,11 +96,12 @@ def force(five: np.ndarray, power: np.ndarray | None = None) -> np.ndarray:
     return np.sum(both, axis=0).T
 
 
-def read(path: str | Path) -> Run:
+def read(path: str | Path, layout: Layout | None = None) -> Run:
     """A measured run.
 
     Args:
         path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
+        layout: in place of what the file beside it says.
 
     Raises:
         InputError: absent, unreadable, a column missing, or commands in another unit.
@@ -115,7 +116,7 @@ def read(path: str | Path) -> Run:
         near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     name = path.absolute().parent.name if path.name in LOGS else path.stem
-    columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path)
+    columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path, layout)
     return replace(_run(name, columns, f"'{path}'"), called=called or None, file=path)
 
 
@@ -162,11 +163,11 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
 
 
-def _tabular(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def _tabular(path: Path, layout: Layout | None) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Signals of a CSV or Parquet file, and the names of their columns where these are others."""
-    given = read_layout(path)
+    given = layout or read_layout(path)
     try:
-        names = _names(path, given or Layout())
+        names = column_names(path, given or Layout())
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
         layout = given or (LOG if LOG.column("x").name in names else layout_of(names, {}, f"'{path}'"))
@@ -238,7 +239,8 @@ def _seconds(cells: pd.Series, where: str) -> np.ndarray | None:
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 
-def _names(path: Path, layout: Layout) -> list[str]:
+def column_names(path: Path, layout: Layout) -> list[str]:
+    """The names of the columns of a CSV or Parquet file."""
     if path.suffix == ".parquet":
         from pyarrow import parquet
 

@@ -1,7 +1,8 @@
 """Units that a run cannot be in, whatever the ship."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +36,10 @@ def refuse_time(row: float, seconds: float, where: str, called: Mapping[str, str
     """
     if row > RAREST or row < OFTENEST:
         much = "rare" if row > RAREST else "frequent"
+        unit = likely_unit(row)
+        told = f" {_say(('time',), unit, called)}" if unit else ""
         raise InputError(
-            f"{where}: a sample each {row:.4g} s is too {much}; is the time in another unit?"
-            f"{_unit_of_time(row, called)}"
+            f"{where}: a sample each {row:.4g} s is too {much}; is the time in another unit?{told}"
         )
     if seconds > LONGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
@@ -48,6 +50,38 @@ def _refuse_nowhere(pose: np.ndarray, where: str) -> None:
     far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
     if far > FARTHEST:
         raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
+
+
+class Doubt(NamedTuple):
+    """Signals that seem to be in another unit: which, in which, and why."""
+
+    signals: tuple[str, ...]
+    unit: str
+    reason: str
+
+
+def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
+    """Units that no ship's motion can be in.
+
+    Args:
+        time: (n,) [s].
+        pose: (n, 3), as it was read, of samples that are valid.
+    """
+    second = np.searchsorted(time, time + 1.0)
+    second = second[second < time.size]
+    dt = time[second] - time[: second.size]
+    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
+    speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
+    if speed > FASTEST:
+        yield Doubt(("x", "y"), "mm", f"goes {speed:.3g} m/s: is its position in mm?")
+    psi = pose[:, 2]
+    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
+        return
+    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
+    turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
+    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
+        reason = f"turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?"
+        yield Doubt(("psi",), "deg", reason)
 
 
 def refuse_units(
@@ -66,28 +100,8 @@ def refuse_units(
         InputError: it goes or turns too fast, or is nowhere.
     """
     _refuse_nowhere(pose, where)
-    if anyway:
-        return
-    second = np.searchsorted(time, time + 1.0)
-    second = second[second < time.size]
-    dt = time[second] - time[: second.size]
-    moved = np.abs(pose[second] - pose[: second.size]) / dt[:, None]
-    speed = float(np.median(np.hypot(moved[:, 0], moved[:, 1]))) if dt.size else 0.0
-    if speed > FASTEST:
-        raise InputError(
-            f"{where} goes {speed:.3g} m/s: is its position in mm? "
-            f"{_say(('x', 'y'), 'mm', called)}; {GO_ON}"
-        )
-    psi = pose[:, 2]
-    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
-        return
-    jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
-    turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
-    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
-        raise InputError(
-            f"{where} turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg? "
-            f"{_say(('psi',), 'deg', called)}; {GO_ON}"
-        )
+    for signals, unit, reason in () if anyway else doubts(time, pose):
+        raise InputError(f"{where} {reason} {_say(signals, unit, called)}; {GO_ON}")
 
 
 def _say(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
@@ -96,8 +110,7 @@ def _say(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
     return f"Then put {json.dumps({'columns': columns})} into the .json file beside it"
 
 
-def _unit_of_time(row: float, called: Mapping[str, str]) -> str:
-    """A sentence with the unit in which a row each so many seconds is one of a usual measurement."""
+def likely_unit(row: float) -> str | None:
+    """The unit of a time in which a row each so many seconds is one of a usual measurement."""
     units = ((unit, row * size) for unit, size in UNITS["time"].items() if unit != "s")
-    likely = [unit for unit, period in units if USUAL[0] <= period < USUAL[1]]
-    return f" {_say(('time',), likely[0], called)}" if likely else ""
+    return next((unit for unit, period in units if USUAL[0] <= period < USUAL[1]), None)
