@@ -24,6 +24,8 @@ from .study_command import run_study, study_parser
 from .study_report import Report
 from .trials import CONTROLLERS, LABELS, TRIALS
 
+LEFT_OUT = "Experiments on spikes, stores and delay: not made of this ship (`--trials`)."
+
 
 def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
     """The numbers of one trial."""
@@ -87,7 +89,7 @@ def study(
         "and 0.1 rad off. `fault`: guidance set to a quarter of the speed, and called four times as "
         "often. The eight at 0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms "
         "stored errors anew, unless it says `as printed`. "
-        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else "")
+        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
     seen = observations(found)
