@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, TypedDict
 
 from .errors import InputError
@@ -103,6 +104,12 @@ def simulate(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
+    if log not in (None, "all", "compact"):
+        raise InputError(
+            f"log is 'all' or 'compact', not {log!r}; signals by name: set={{'log.signals': ...}}"
+        )
+    if not isinstance(set, (Mapping, NoneType)):
+        raise InputError("set is a dict of paths and values, such as {'vessel.m': 15.0}")
     chosen = {"stop": stop, "step": step, "seed": seed, "log.signals": log}
     settings = dict(set or {}) | {path: value for path, value in chosen.items() if value is not None}
     settings |= {"log.format": "parquet"} if parquet else {}

@@ -73,7 +73,7 @@ def load(
 
 def _loaded(runs: Any, model: Model | None) -> Sequence[Integrals]:
     """Runs that were loaded, or are now."""
-    if isinstance(runs, (list, tuple)) and all(isinstance(w, Integrals) for w in runs):
+    if isinstance(runs, (list, tuple)) and runs and all(isinstance(w, Integrals) for w in runs):
         return runs
     return load(runs, model=model)
 

@@ -382,6 +382,19 @@ def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):
     assert most < 0.5 * path.stat().st_size
 
 
+def test_roles_of_a_log_are_its_names(tmp_path):
+    """A system with instances of other names: the pose and the force are those that its roles state."""
+    roles = {"pose": ["boat.n", "boat.e", "boat.h"], "force": ["jets.a", "jets.b", "jets.c"]}
+    names = dict(zip(("x", "y", "psi", *TAU), [*roles["pose"], *roles["force"]], strict=True))
+    with_tau().rename(columns=names).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(cosim.InputError, match="has no commands"):
+        diagnosis.read(tmp_path)
+    told = {"metrics": {"from": None, "to": None}, "roles": roles}
+    (tmp_path / "log.json").write_text(json.dumps({"scenario": told}))
+    with_tau().to_csv(tmp_path / "plain.csv", index=False)
+    same(diagnosis.read(tmp_path), diagnosis.read(tmp_path / "plain.csv"))
+
+
 FOREIGN = {
     "time": "Time [ms]", "x": "North (mm)", "y": "West", "psi": "Heading_deg",
     "tau_X": "Surge force", "tau_Y": "Sway force [mN]", "tau_N": "Yaw moment",

@@ -31,6 +31,7 @@ from cybership.subcommands import SUBCOMMANDS
 from diagnosis import command_line, result_folder
 from diagnosis.report import unique_share
 from fmus import interruption
+from fmus.build import BuildError
 
 SHORT = {"stop": 1.0, "metrics": {}}
 
@@ -53,6 +54,37 @@ def test_a_run_by_name_has_log_metrics_and_pictures(tmp_path, monkeypatch):
     assert (ran["seed"], ran["fmus"]["vessel"]["parameters"]["m"]) == (3, 15)
     with pytest.raises(cosim.InputError, match="did you mean 'errors'"):
         result.plot("error")
+
+
+@pytest.mark.parametrize(
+    ("call", "line"),
+    [
+        (lambda: cosim.simulate("ellipse", stop=1, set={"vessel.m": float("nan")}), "vessel.m cannot be nan"),
+        (lambda: cosim.simulate("ellipse", stop=1, set=["vessel.m=1"]), "set is a dict of paths and values"),
+        (lambda: cosim.simulate("ellipse", stop=1, log="al"), "log is 'all' or 'compact', not 'al'"),
+        (lambda: cosim.load_scenario(3), "not of type int"),
+        (lambda: cosim.simulate("ellipse", stop=1, parameters="/"), "'/' cannot be read as a parameter set"),
+        (lambda: diagnosis.load([]), "there is no run to read"),
+        (lambda: diagnosis.diagnose([]), "there is no run to read"),
+        (lambda: diagnosis.load(3), "not of type int"),
+        (lambda: fmus.build_fmus("vesel", "out"), "no FMU 'vesel'; did you mean 'vessel'"),
+        (lambda: fmus.build_fmus(None, "out"), "not by NoneType"),
+        (lambda: fmus.build_fmus("mine.py"), "no such component file: 'mine.py'"),
+    ],
+)  # fmt: skip
+def test_what_was_meant_is_one_line(tmp_path, monkeypatch, call, line):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((cosim.InputError, BuildError)) as told:
+        call()
+    assert line in str(told.value)
+    assert "\n" not in str(told.value)
+    assert not any(tmp_path.iterdir())
+
+
+def test_one_fmu_by_its_name_goes_to_a_folder_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert fmus.build_fmus("vessel", "out") == [Path("out", "vessel.fmu")]
+    assert [path.name for path in Path("out").iterdir()] == ["vessel.fmu"]
 
 
 def described(folder, seed):

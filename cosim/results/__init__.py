@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .log_frame import log_frame
     from .performance import MetricsError, compute, over_time, tracking
     from .picture_files import Drawn
+    from .run_options import read_options
 
 __all__ = [
     "Drawn",
@@ -21,6 +22,7 @@ __all__ = [
     "log_frame",
     "over_time",
     "read_log",
+    "read_options",
     "thin",
     "tracking",
 ]
@@ -36,6 +38,7 @@ __getattr__ = lazy_names(
         "log_frame": "log_frame",
         "over_time": "performance",
         "read_log": "log",
+        "read_options": "run_options",
         "thin": "canvas",
         "tracking": "performance",
     },

@@ -42,7 +42,12 @@ def find_scenario(source: str | Path, folder: Path = Path()) -> Path:
     """The file of a scenario: a path relative to a folder, or the bare name of a shipped one.
 
     A file of that name, or a folder that is a system, comes first; any other folder does not count.
+
+    Raises:
+        InputError: it is no name.
     """
+    if not isinstance(source, (str, Path)):
+        raise InputError(f"a scenario is a name, a file or a dict, not of type {type(source).__name__}")
     path = folder / source
     is_there = path.is_file() or (path / OSP_STRUCTURE).is_file()
     if not is_there and path.name == str(source) and path.name in shipped_names():

@@ -28,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from cosim import InputError
 from cosim.errors import nearest
+from cosim.results import read_options
 
 MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
@@ -148,6 +149,27 @@ def _log() -> Layout:
 
 
 LOG = _log()
+
+
+def log_layout(folder: Path, names: Sequence[str]) -> Layout | None:
+    """The layout of the log of a run: by the roles that its scenario states, else by the usual names.
+
+    Args:
+        folder: of the run.
+        names: columns of its log.
+
+    Returns:
+        None if it is no log of a ship.
+    """
+    if LOG.column("x").name in names:
+        return LOG
+    roles = read_options(folder).roles
+    named = dict(zip((*POSE, *TAU), roles.of("pose", "force"), strict=True))
+    if not set(named.values()) <= set(names):
+        return None
+    return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
+
+
 WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+)\s*[\])]")
 
 

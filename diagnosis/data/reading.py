@@ -29,6 +29,7 @@ from .columns import (
     THREE,
     Layout,
     layout_of,
+    log_layout,
     read_layout,
     signals,
     to_si,
@@ -170,7 +171,7 @@ def _tabular(path: Path, layout: Layout | None) -> tuple[dict[str, np.ndarray], 
         names = column_names(path, given or Layout())
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
-        layout = given or (LOG if LOG.column("x").name in names else layout_of(names, {}, f"'{path}'"))
+        layout = given or log_layout(path.parent, names) or layout_of(names, {}, f"'{path}'")
         wanted = signals(layout, names, f"'{path}'")
         table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
     except ImportError:

@@ -21,8 +21,8 @@ CHECKER = ROOT / "check"  # judges FMUs, and is in none
 
 
 def build(
-    names: Sequence[str],
-    out: Path | None = None,
+    names: str | Path | Sequence[str | Path],
+    out: str | Path | None = None,
     starts: Starts | None = None,
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
@@ -32,7 +32,8 @@ def build(
     """FMUs that are up to date with the source.
 
     Args:
-        names: FMU names, with or without ``.fmu``, or paths of component files; none means all.
+        names: of an FMU or several, with or without ``.fmu``, or paths of component files; an empty
+            list means all.
         out: folder that receives copies; None leaves them in the user's cache.
         starts: a parameter set. The FMUs that it names start with its values; without names, they are
             the ones that are built.
@@ -50,9 +51,10 @@ def build(
             may write to, or files in ``out`` that would be replaced.
         DeclarationError: a parameter set that does not fit.
     """
+    out = None if out is None else Path(out)
     if out is not None and out.exists() and not out.is_dir():
         raise BuildError(f"'{out}' is a file, not a folder")
-    built = [_cached(name, effects, starts, native, note) for name in _every(names, starts)]
+    built = [_cached(name, effects, starts, native, note) for name in _every(_listed(names), starts)]
     if starts is not None:
         _tell_unused(starts, [fmu.stem for fmu in built], note)
     if out is None:
@@ -98,6 +100,15 @@ def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
             raise BuildError(f"'{there}' is there already, and is another file; --overwrite replaces it")
     folder.mkdir(parents=True, exist_ok=True)
     return [place(file, folder / file.name) for file in made]
+
+
+def _listed(names: object) -> list[str]:
+    """The names of one FMU or several, of whatever kind."""
+    every = names if isinstance(names, (list, tuple)) else [names]
+    for name in every:
+        if not isinstance(name, (str, Path)):
+            raise BuildError(f"an FMU is named by a text or a path, not by {type(name).__name__}")
+    return [str(name) for name in every]
 
 
 def _every(names: Sequence[str], starts: Starts | None) -> Sequence[str]:

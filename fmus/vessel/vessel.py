@@ -193,7 +193,9 @@ def change_forces(s: State, b: Prepared) -> Any:
 def outside_forces(s: State, tau: Force, b: Prepared) -> Any:
     """The force of each other effect on the hull."""
     ship, _, _ = through_water(s, b)
-    forces = forces_of(b.effects.outside, b.outside, b.params.outside, Loaded(*ship, *tau, b.hull.damping))
+    forces = forces_of(
+        b.effects.outside, b.outside, b.params.outside, Loaded(*ship, *tau, b.hull.damping)
+    )
     return b.effects.outside_forces._make(forces)
 
 
