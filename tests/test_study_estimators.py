@@ -10,7 +10,7 @@ from scipy.io import savemat
 from support.project import ROOT
 
 from cosim import InputError
-from studies import basin, estimators, observer_gains
+from studies import basin, claims, estimators, observer_gains
 from studies.claims import ahead
 from studies.estimates_replayed import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
 
@@ -181,3 +181,86 @@ def test_whole_study(tmp_path, monkeypatch, capsys):
     assert results["simulated"]["rich"]["kalman"]["rms_u_dot"]["mean"] < 0.01
     held_by = {o: results["simulated"]["rich"][o]["held"]["mean"] for o in ("df", "mdf")}
     assert held_by["df"] is None or held_by["df"] < 0.5 < held_by["mdf"]
+
+
+def replayed(variant, **measures):
+    """Three runs; ``measures`` are values by observer, a little another one in each run."""
+    return {
+        variant: [
+            {o: {m: of(o) * (1.0 + 0.01 * seed) for m, of in measures.items()} for o in OBSERVERS}
+            for seed in range(3)
+        ]
+    }
+
+
+@pytest.mark.parametrize(
+    ("slow", "noisy", "here"),
+    [
+        (True, True, "reproduced"),
+        (True, False, "lag reproduced, less noise not"),
+        (False, True, "less noise reproduced, lag not"),
+        (False, False, "not reproduced"),
+    ],
+)
+def test_claim_of_lag_and_of_noise(slow, noisy, here):
+    def runs(late, loud):
+        return replayed(
+            "rich, no freezes",
+            lag_u=lambda o: 0.3 if (o == "mdf") == late else 0.1,
+            noise_u=lambda o: 0.002 if (o == "mdf") == loud else 0.009,
+        )
+
+    said, verdict, numbers = claims.lag_and_noise(runs(slow, noisy))
+    assert "lags" in said
+    assert verdict == here
+    assert "luenberger: lag" in numbers
+
+
+def test_claim_needs_to_be_sure_in_every_seed():
+    found = replayed("rich", after_freeze_u=lambda o: {"mdf": 0.1, "df": 0.2}.get(o, 0.3))
+    assert claims.spikes(found)[1] == claims.robust(found)[1] == "reproduced"
+    found["rich"][0]["mdf"]["after_freeze_u"] = 0.3
+    assert claims.spikes(found)[1] == "not reproduced", "the difference is no longer sure"
+    found["rich"][1]["df"]["after_freeze_u"] = 0.4
+    assert claims.robust(found)[1] == "not reproduced"
+    found["rich"][0]["df"]["after_freeze_u"] = float("nan")
+    assert claims.spikes(found)[1] == "not reproduced", "one run has no such time"
+
+
+@pytest.mark.parametrize(
+    ("mdf", "df", "here"),
+    [
+        (1.0, 0.1, "reproduced"),
+        (0.9, 0.1, "not reproduced"),
+        (1.1, 0.1, "not reproduced"),
+        (1.0, 0.6, "not reproduced"),
+        (1.0, -0.6, "not reproduced"),
+    ],
+)
+def test_claim_of_the_velocity_that_is_held(mdf, df, here):
+    assert claims.held(replayed("rich", held=lambda o: mdf if o == "mdf" else df))[1] == here
+
+
+@pytest.mark.parametrize(
+    ("df", "mdf", "here"),
+    [
+        (5.0, 0.01, "reproduced"),
+        (0.5, 0.01, "not reproduced"),
+        (5.0, 0.2, "not reproduced"),
+    ],
+)
+def test_claim_of_the_wrap_of_the_heading(df, mdf, here):
+    runs = replayed("ellipse", after_wrap_r=lambda o: df if o == "df" else mdf)
+    assert claims.wrap(runs)[1] == here
+
+
+def test_claim_of_the_observers_that_get_stuck():
+    def runs(*names):
+        return replayed("ellipse, upsets", stuck=lambda o: float(o in names))
+
+    assert claims.stuck(runs())[1].startswith("mended")
+    assert claims.stuck(runs("luenberger"))[1] == "reproduced for luenberger"
+    assert claims.stuck(runs("nonlinear", "luenberger"))[1] == "reproduced for nonlinear and luenberger"
+    assert "of 3 runs" in claims.stuck(runs())[2]
+    assert "nonlinear 3" in claims.stuck(runs("nonlinear"))[2]
+    assert claims.stuck(runs("df"))[1].startswith("mended"), "the thesis says it of two"

@@ -17,13 +17,17 @@ from studies.verdict import (
     FOUR,
     ORDERS,
     PRINTED,
+    better,
     converged,
     correlation,
     error,
+    finite_ratio,
     goals,
     in_order,
+    judged,
     short,
     smoothest,
+    worse,
     worst,
 )
 
@@ -96,6 +100,57 @@ def test_table_of_weights_says_which_settings_have_the_order(tmp_path):
         report = Report(tmp_path, "t")
         tables(report, "eight", found)
         assert f"{count} of 24 settings" in report.write().read_text()
+
+
+@pytest.mark.parametrize(
+    ("shares", "below", "above"),
+    [
+        ([(0.8, 0.7, 0.9), (0.5, 0.4, 0.6)], "reproduced", "reversed"),
+        ([(1.2, 1.1, 1.3), (2.0, 1.8, 2.2)], "reversed", "reproduced"),
+        ([(1.0, 0.9, 1.1), (0.9, 0.7, 1.05)], "undecided", "undecided"),
+        ([(0.8, 0.7, 1.0), (1.2, 1.0, 1.3)], "undecided", "undecided"),
+        (
+            [(0.8, 0.7, 0.9), (1.2, 1.1, 1.3)],
+            "reproduced (a); reversed (b)",
+            "reversed (a); reproduced (b)",
+        ),
+        (
+            [(0.8, 0.7, 0.9), (1.0, 0.9, 1.1)],
+            "reproduced (a); undecided (b)",
+            "reversed (a); undecided (b)",
+        ),
+        (
+            [(1.0, 0.9, 1.1), (1.2, 1.1, 1.3)],
+            "undecided (a); reversed (b)",
+            "undecided (a); reproduced (b)",
+        ),
+        ([(float("nan"), 0.0, float("inf"))] * 2, "undecided", "undecided"),
+    ],
+)
+def test_shares_are_judged_by_their_intervals(shares, below, above):
+    named = dict(zip("ab", (Interval(*s) for s in shares), strict=True))
+    assert judged(named) == below
+    assert worse(named) == above
+
+
+def test_better_is_judged_on_each_path_and_condition():
+    def position(path, condition, name):
+        return {"abs": 0.2, "bs": 0.4 if path == "ellipse" else 0.1}.get(name, 1.0)
+
+    found = better(by_path(position=position), "said", "abs", "bs", "mdf", "true")
+    assert found.thesis == "said"
+    assert found.here.count("reproduced (ellipse") == found.here.count("reversed (eight") == 2
+    assert "error of abs over bs: ellipse, mdf: 0.5 [0.5, 0.5]; ellipse, true: 0.5" in found.numbers
+    assert "eight, mdf: 2 [2, 2]" in found.numbers
+
+
+def test_ratio_is_over_the_seeds_that_both_went_through():
+    nan = float("nan")
+    assert finite_ratio([1.0, nan, 2.0], [2.0, 1.0, 4.0]) == pytest.approx((0.5, 0.5, 0.5))
+    assert finite_ratio([1.0, 9.0, 2.0], [2.0, nan, 4.0]) == pytest.approx((0.5, 0.5, 0.5))
+    open_one = finite_ratio([nan], [1.0])
+    assert np.isnan(open_one.mean)
+    assert open_one[1:] == (0.0, float("inf"))
 
 
 def test_stale_errors_wind_up_where_they_are_worse_than_none():
