@@ -30,6 +30,13 @@ def test_commands_are_no_waves(quick, noise, seed):
     assert find_waves([run], Model(), np.random.default_rng(seed)) is None
 
 
+@pytest.mark.parametrize("seed", [0, 11])
+def test_a_drawing_of_noise_makes_no_waves_of_what_is_missing(seed):
+    """Drag and lost force are in the model error; of these drawings lines of the floor are low by chance."""
+    run = smoothed(sail(96.0, ship={"delta_X_u": -3.0}, thrusters={"loss_yaw": 0.3})[0])
+    assert find_waves([run], Model(), np.random.default_rng(seed)) is None
+
+
 def test_half_of_a_motion_is_followed_where_a_quarter_of_the_noise_is_left():
     f = np.linspace(0.0, 5.0, 126)
     white = np.array([1e-8, 1e-8, 1e-8])
