@@ -25,7 +25,7 @@ CHANCE = 0.01  # level of the test, all axes and both statistics together; contr
 SHARE_OF_FIRST = 0.05  # of an axis' first model error, from which a remainder matters; contract
 SPAN = 12  # windows: 6 s, twice their width, so that what is left is slower than a window; chosen
 # Variance of a mean of SPAN windows by noise alone, as a share of that of independent windows: measured
-# 0.04 to 0.13 on runs without a hidden cause (tests/test_diagnosis_remainder.py), and doubled.
+# 0.04 to 0.13 on runs without a hidden cause, and doubled.
 SLOW_NOISE = 0.25
 TESTS = 6  # three axes, two statistics: Bonferroni
 

@@ -1,0 +1,105 @@
+"""What a model leaves, on windows that are made up: noise, a size that is too large, a force that lasts."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from diagnosis import Model
+from diagnosis.assessment.remainder import CHANCE, SHARE_OF_FIRST, SPAN, TESTS, axis_remainders, spans
+from diagnosis.model.uncertainty import SHARE_OF_COMMAND
+from diagnosis.model.weak_form import EVERY
+
+K, NOISE = 100 * SPAN, 0.02
+
+
+def windows(count=K, first=0.0, command=0.1):
+    tau = np.full((count, 3), command)
+    middle = first + EVERY * np.arange(count)
+    return SimpleNamespace(middle=middle, held=np.eye(count), run=SimpleNamespace(tau_cmd=tau))
+
+
+def noise(count=K, seed=0):
+    return NOISE * np.random.default_rng(seed).normal(size=(count, 3))
+
+
+def left(after, before=0.1, command=0.1):
+    """The remainders of one run by axis, whose first model error is constant."""
+    std = np.full_like(after, NOISE)
+    data = [windows(len(after), command=command)]
+    return axis_remainders(data, [np.full_like(after, before)], [after], [std], Model())
+
+
+def test_spans_are_of_twelve_windows_of_one_run():
+    a, b = windows(2 * SPAN + 3), windows(SPAN)
+    groups = spans([a, b])
+    assert np.bincount(groups).tolist() == [SPAN, SPAN, 3, SPAN]
+    assert (np.diff(groups) >= 0).all()
+    gap = windows(2 * SPAN)
+    gap.middle[SPAN:] += 100.0
+    assert set(spans([gap])[:SPAN]).isdisjoint(spans([gap])[SPAN:]), "no mean over a gap"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_is_no_remainder(seed):
+    for found in left(noise(seed=seed)).values():
+        assert not found.significant
+        assert not found.beyond_chance
+        assert found.p_value > 10.0 * CHANCE / TESTS
+        assert found.uncertainty == pytest.approx(NOISE)
+        assert found.rms == pytest.approx(NOISE, rel=0.1)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_what_is_larger_than_noise_is_told_on_its_axis_alone(axis):
+    """Of one size and alternating sign, so that only its size shows."""
+    after = noise()
+    after[:, axis] += 0.06 * (-1.0) ** np.arange(K)
+    found = left(after)
+    assert [r.significant for r in found.values()] == [k == axis for k in range(3)]
+    one = list(found.values())[axis]
+    assert one.rms == pytest.approx(np.hypot(0.06, NOISE), rel=0.02)
+    assert one.share == pytest.approx((one.rms / 0.1) ** 2)
+    assert one.slow < 0.3 * NOISE
+
+
+@pytest.mark.parametrize("force", [0.01, -0.01])
+def test_a_force_below_the_noise_is_told_if_it_lasts(force):
+    after = noise()
+    after[:, 1] += force
+    found = left(after)
+    assert [r.significant for r in found.values()] == [False, True, False]
+    assert found["Y"].slow == pytest.approx(abs(force), rel=0.15)
+    assert found["Y"].rms < 1.3 * NOISE, "its size is not what tells it"
+    hardly = left(noise() + 0.1 * force)
+    assert not any(r.significant for r in hardly.values())
+
+
+def test_a_force_that_changes_sign_from_span_to_span_lasts_too():
+    after = noise()
+    after[:, 0] += 0.015 * np.repeat((-1.0) ** np.arange(K // SPAN), SPAN)
+    assert left(after)["X"].significant
+    assert left(after)["X"].slow == pytest.approx(0.015, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("before", "command"), [(0.02 / SHARE_OF_FIRST, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
+)
+def test_what_is_little_beside_the_first_error_or_the_command_does_not_matter(before, command):
+    after = noise()
+    after[:, 0] += 0.01
+    found = left(after, before, command)["X"]
+    assert found.least == pytest.approx(0.02)
+    assert found.beyond_chance
+    assert not found.significant
+    assert left(after, before=0.15, command=0.01)["X"].significant
+
+
+def test_runs_that_are_too_short_for_a_span_have_no_slow_part():
+    after = noise(SPAN // 2 - 1) + 0.02
+    assert left(after)["X"].slow == 0.0
+    assert left(noise(SPAN // 2) + 0.1)["X"].slow == pytest.approx(0.1, rel=0.3)
+
+
+def test_without_a_first_error_there_is_no_share():
+    assert left(noise(), before=0.0)["X"].share == 0.0
