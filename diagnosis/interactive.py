@@ -168,6 +168,7 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    train, test = _loaded(runs, model), _loaded(held_out, model)
+    none = isinstance(held_out, (list, tuple)) and not held_out
+    train, test = _loaded(runs, model), () if none else _loaded(held_out, model)
     found = session.diagnose(train, test, prior, model, advance, seed, by)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -129,8 +129,8 @@ def commanded(e: Evaluation, model: Model) -> Commanded:
     if w.run.five is None:
         return Commanded(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
-    arriving, _ = Response(w.run, model).between_samples
-    first, second = np.moveaxis(arriving[:, :, :2], 1, 0)
+    arriving = Response(w.run, model).between_samples[0]
+    first, second = np.moveaxis(arriving[:, :2], -1, 1)
     two, four = first + second, np.hstack([first, second])
     return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
 
