@@ -17,11 +17,13 @@ from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
 
-DIAGNOSIS, MODEL, POSTERIOR, REPORT = FILES = (
+DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "diagnosis.json",
     "model.ssv",
     "posterior.json",
     "report.html",
+    "coefficients.csv",
+    "coefficients.tex",
 )
 
 
@@ -36,7 +38,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from .gathering import gather
     from .identification import shares
     from .model import Model, read_model, write_model
-    from .report import diagnosis_content, show_diagnosis, write_report
+    from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
     with together(options.out, FILES) as new:
@@ -59,6 +61,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         files = [name for name in FILES if not (refused and name in (MODEL, POSTERIOR))]
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        write_coefficients(content, new / CSV, new / TEX)
         comparison = diagnosis.comparison
         origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
         write_report(

@@ -95,6 +95,8 @@ def test_the_files_are_there_and_nothing_else(learned):
     out, code, _ = learned
     assert code == 0
     assert sorted(p.name for p in out.iterdir()) == [
+        "coefficients.csv",
+        "coefficients.tex",
         "diagnosis.json",
         "model.ssv",
         "posterior.json",
@@ -165,7 +167,7 @@ def test_terminal_tells_what_the_file_tells_within_80_columns(learned):
     ):
         assert " ".join(part.split()) in flat
     assert "b (held out)" in flat
-    assert flat.endswith(f"diagnosis.json, model.ssv, posterior.json, report.html in {out}")
+    assert flat.endswith(f"report.html, coefficients.csv, coefficients.tex in {out}")
 
 
 @pytest.mark.slow

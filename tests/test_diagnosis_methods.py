@@ -167,5 +167,7 @@ def test_command_writes_what_another_method_finds(name, file, tmp_path, capsys):
         "model.ssv",
         "posterior.json",
         "report.html",
+        "coefficients.csv",
+        "coefficients.tex",
     }
     assert "loss_yaw" in capsys.readouterr().out

@@ -9,16 +9,29 @@ import subprocess
 from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, PredictionError, evaluate_run
+from diagnosis.assessment.windows import free_run
 from diagnosis.model import integrals
-from diagnosis.report import ComparisonContent, Curve, DiagnosisContent, curves, write_report
-from diagnosis.report.profiles import QUANTITIES, binned_errors
+from diagnosis.prediction_error.joint_posterior import Posterior
+from diagnosis.report import (
+    ComparisonContent,
+    Curve,
+    DiagnosisContent,
+    curves,
+    tracks,
+    write_coefficients,
+    write_report,
+)
+from diagnosis.report.content import coefficients
+from diagnosis.report.profiles import QUANTITIES, binned_errors, heading
 from fmus.effects import STANDARD
 
 HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
@@ -395,12 +408,14 @@ window.onload = () => {{
   document.body.dataset.height = page.scrollHeight;
   document.body.dataset.figures = figures.length;
   document.body.dataset.thin = figures.filter(f => f.width < 250 || f.height < 100).length;
+  const tables = [...page.querySelectorAll(".table")];
+  document.body.dataset.cut = tables.filter(t => t.scrollWidth > t.clientWidth).length;
   document.body.dataset.wide = figures.filter(f => f.right > {width}).length;
 }};
 </script></body></html>"""
 
 
-@pytest.mark.parametrize("width", [390, 1200])
+@pytest.mark.parametrize("width", [390, 1200, 1300])
 def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_path, width):
     wrapped = tmp_path / "wrapped.html"
     content = html.escape(report.read_text(encoding="utf-8"))
@@ -410,6 +425,7 @@ def test_browser_shows_the_page_without_a_sideways_scroll(report, browser, tmp_p
     assert int(seen["height"]) > 2000
     assert int(seen["figures"]) == Page(report).tags["svg"]
     assert seen["thin"] == seen["wide"] == "0"
+    assert width < 1000 or seen["cut"] == "0"  # on a phone tables may be scrolled
 
 
 def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path):
@@ -421,3 +437,83 @@ def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path
     content = printed.read_bytes()
     assert content.startswith(b"%PDF")
     assert len(re.findall(rb"/Type\s*/Page\b", content)) >= 3
+
+
+def region(by):
+    return {
+        "axis": "X", "by": by, "unit": "m", "run": None, "low": 1.0, "high": None, "rms": 0.2,
+        "elsewhere": 0.1, "share_of_time": 0.3, "sentence": "somewhere",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("by", "drawn"), [("east", True), ("north", True), ("speed", False)])
+def test_what_is_found_at_a_place_has_a_picture_of_the_place(data, tmp_path, by, drawn):
+    evaluations = [evaluate_run(w, Model()) for w in data[1:]]
+    where = {"sentences": [], "regions": [region(by)], "profiles": []}
+    content = ComparisonContent(**comparison(evaluations, where))
+    page = Page(write_report(tmp_path / "report.html", content, evaluations))
+    assert ("place-0.svg" in page.values("download")) is drawn
+    assert page.values("download").count("free.svg") == 1
+
+
+def test_arrows_point_where_the_missing_force_does(data):
+    """A force to the north and to the east by the heading of the ship, from its own axes."""
+    e = evaluate_run(data[1], Model())
+    north, east = 0.3, -0.2
+    c, s = np.cos(psi := np.radians(heading(e.integrals))), np.sin(psi)
+    omega = np.column_stack([c * north + s * east, c * east - s * north, 0.0 * c])
+    known = replace(e, before=replace(e.before, omega=omega))
+    (arrows,) = (a for a in tracks.place(known, False).axes[0].collections if hasattr(a, "U"))
+    assert np.allclose(arrows.U / arrows.V, east / north)
+    assert (arrows.V > 0.0).all()
+
+
+def test_a_whole_run_is_predicted_from_its_first_state(data):
+    """The ship with what is hidden in it stays near; the nominal one leaves."""
+    s = data[1].smoothed
+    measured = s.eta[np.flatnonzero(s.used)[0] :]
+    away = {}
+    for name, model in (("true", Model().plus(HIDDEN)), ("nominal", Model())):
+        pose = free_run(s, model)
+        assert pose[0] == pytest.approx(measured[0], abs=1e-6)
+        at = np.linspace(0, len(pose) - 1, len(measured)).round().astype(int)
+        away[name] = np.hypot(*(pose[at] - measured).T[:2]).max()
+    assert away["true"] < 0.1 * away["nominal"]
+
+
+def test_all_coefficients_before_and_after_as_files(evaluations, tmp_path):
+    learned = Model().plus({"Y_r": -0.5, "thrust_curve_deadband": 0.1})
+    posterior = Posterior(
+        ["vessel.Y_r", "thrusters.thrust_curve_deadband"],
+        ["kg.m/s", "1"],
+        np.zeros(2),
+        np.diag([0.01, 1e-4]),
+    )
+    made = SimpleNamespace(start=Model(), learned=SimpleNamespace(model=learned), posterior=posterior)
+    rows = list(coefficients(made))
+    table = {row.name: row for row in rows}
+    assert table["vessel.m"].before == table["vessel.m"].after
+    assert table["vessel.m"].ci95 is None
+    assert table["vessel.Y_r"].after - table["vessel.Y_r"].before == pytest.approx(-0.5)
+    assert np.ptp(table["vessel.Y_r"].ci95) == pytest.approx(2 * 1.96 * 0.1)
+    assert table["vessel.Y_r"].origin == Model().ship.coefficients["Y_r"].origin
+    assert table["thrusters.thrust_curve_deadband"].origin == "learned"
+    content = found(evaluations).model_copy(update={"coefficients": rows})
+    write_coefficients(content, tmp_path / "a.csv", tmp_path / "a.tex")
+    assert pd.read_csv(tmp_path / "a.csv")["name"].tolist() == list(table)
+    text = (tmp_path / "a.tex").read_text()
+    assert text.count(r"\\") == len(table) + 1
+    assert r"vessel.Y\_r" in text
+
+
+def test_ships_have_their_own_length_where_they_fit(data):
+    """On a track of some metres; within a window of centimetres there is none."""
+    for spread, fits in ((3.0, True), (0.3, False)):
+        _, panel = tracks._map(np.array([[0.0, 0.0], [spread, spread]]))
+        tracks._ships(panel, np.array([[1.0, 2.0, 0.5]]))
+        assert bool(panel.patches) is fits
+        for ship in panel.patches:
+            corners = ship.get_xy()
+            assert np.linalg.norm(corners[:, None] - corners, axis=2).max() == pytest.approx(
+                1.105, rel=0.01
+            )

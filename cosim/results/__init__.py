@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .performance import MetricsError, compute, over_time, tracking
     from .picture_files import Drawn
     from .run_options import read_options
+    from .track import hulls
 
 __all__ = [
     "Drawn",
@@ -19,6 +20,7 @@ __all__ = [
     "MetricsError",
     "compute",
     "draw",
+    "hulls",
     "log_frame",
     "over_time",
     "read_log",
@@ -35,6 +37,7 @@ __getattr__ = lazy_names(
         "MetricsError": "performance",
         "compute": "performance",
         "draw": "drawing",
+        "hulls": "track",
         "log_frame": "log_frame",
         "over_time": "performance",
         "read_log": "log",

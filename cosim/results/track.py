@@ -20,7 +20,8 @@ HULL_WIDTH = 0.248
 HULL = ((0.5, 0.0), (0.22, 0.5), (-0.5, 0.42), (-0.5, -0.42), (0.22, -0.5))
 OUTLINES = 12  # ships drawn along a path, chosen
 SCALES = (1.0, 0.5, 0.25, 0.125, 0.05, 0.02, 0.01)  # of those ships
-OUTLINE_SHARE = 0.1  # longest ship, as a share of the picture, chosen
+# Longest ship, as a share of the picture: in its own length unless the track is hardly longer; chosen
+OUTLINE_SHARE = 0.5
 STILL = 0.01  # m; a target that moves less is a point, chosen: below a line's width in most pictures
 
 
@@ -63,6 +64,23 @@ def once(paths: Sequence[Path], size: float) -> Path:
     return np.where(again, np.nan, x), np.where(again, np.nan, y)
 
 
+def hulls(poses: np.ndarray, length: float = HULL_LENGTH) -> np.ndarray:
+    """The hull from above at some poses.
+
+    Args:
+        poses: (n, 3), north, east [m] and heading [rad].
+        length: of the hull [m].
+
+    Returns:
+        Corners, east then north [m]: (n, corners, 2).
+    """
+    x, y, psi = np.asarray(poses).T[:, :, None]
+    forward, starboard = length * np.array(HULL).T * [[1.0], [HULL_WIDTH / HULL_LENGTH]]
+    north = x + np.cos(psi) * forward - np.sin(psi) * starboard
+    east = y + np.sin(psi) * forward + np.cos(psi) * starboard
+    return np.stack([east, north], axis=2)
+
+
 def outlines(run: Run, length: float) -> np.ndarray:
     """Hulls at equal distances in time, except where one is drawn already.
 
@@ -77,13 +95,9 @@ def outlines(run: Run, length: float) -> np.ndarray:
     rows = np.searchsorted(time, np.linspace(time[0], time[-1], OUTLINES)).clip(0, time.size - 1)
     drawn: list[np.ndarray] = []
     for pose in np.stack([run.log[name][rows] for name in run.roles.pose], axis=1):
-        if not any(np.all(np.abs(pose - other) < (length / 4, length / 4, 0.2)) for other in drawn):
+        if not any(np.all(np.abs(pose - other) < (length, length, 1.0)) for other in drawn):
             drawn.append(pose)
-    x, y, psi = np.array(drawn).T[:, :, None]
-    forward, starboard = length * np.array(HULL).T * [[1.0], [HULL_WIDTH / HULL_LENGTH]]
-    north = x + np.cos(psi) * forward - np.sin(psi) * starboard
-    east = y + np.sin(psi) * forward + np.cos(psi) * starboard
-    return np.stack([east, north], axis=2)
+    return hulls(np.array(drawn), length)
 
 
 def _limits(values: Sequence[np.ndarray]) -> tuple[float, float]:

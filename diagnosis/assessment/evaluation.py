@@ -56,6 +56,7 @@ class Evaluation:
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
+        learned: the learned model; None where nothing was learned.
     """
 
     model: Model
@@ -65,6 +66,7 @@ class Evaluation:
     before: PredictionError
     after: PredictionError
     bands: Bands | None = None
+    learned: Model | None = None
 
     @property
     def smoothed(self) -> Smoothed:
@@ -89,7 +91,7 @@ def evaluate_run(
     windows = _windows([w.smoothed])
     first = _prediction_error(w, windows, before)
     last = first if after is None else _prediction_error(w, windows, after)
-    return Evaluation(before, w, windows, held_out, first, last)
+    return Evaluation(before, w, windows, held_out, first, last, learned=after)
 
 
 def _windows(runs: Sequence[Smoothed]) -> Windows | None:

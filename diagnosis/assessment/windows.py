@@ -20,6 +20,7 @@ from ..smoothing import Smoothed
 
 # s. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s (docs/stability.md).
 LENGTH = 8.0
+LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
 MIN_COVERAGE = 0.5  # of a window's samples; chosen
 
 
@@ -173,6 +174,23 @@ def usable_windows(smoothed: Smoothed, length: float = LENGTH) -> RunWindows:
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def free_run(smoothed: Smoothed, model: Model) -> np.ndarray:
+    """A run as a model predicts it from its first state, by the commands that were given.
+
+    Args:
+        smoothed: the run, of which ``LONGEST_FREE`` seconds at the most.
+        model: what predicts it.
+
+    Returns:
+        (n, 3), pose [m, m, rad] at equal distances in time; not finite where the model runs away.
+    """
+    first = np.flatnonzero(smoothed.used)[:1]
+    h, five = RunWindows(smoothed, first, first, first).step_and_commands
+    seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), LONGEST_FREE)
+    starts = Starts(((smoothed, first),), h, int(seconds / h), five)
+    return predict(starts, model)[:, :, 0, 0]
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:

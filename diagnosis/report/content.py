@@ -1,7 +1,7 @@
 """Content of the JSON files, made from the results of the diagnosis."""
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypedDict, TypeVar
@@ -19,6 +19,7 @@ from .headline import headline
 from .unique_share import unique_shares
 
 T = TypeVar("T")
+Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
 AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
@@ -71,6 +72,7 @@ def diagnosis_content(
             together=diagnosis.posterior.together,
         ),
         suspect_coefficients=suspects,
+        coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
         errors=[_errors(e) for e in comparison.evaluations],
@@ -81,6 +83,38 @@ def diagnosis_content(
         seed=diagnosis.seed,
         **_provenance(comparison, model, files),
     )
+
+
+def coefficients(diagnosis: Diagnosis) -> Iterator[result_keys.CoefficientChange]:
+    """The nominal coefficients that are not zero, then what else was fitted."""
+    start, model, std = diagnosis.start, diagnosis.learned.model, diagnosis.posterior.std
+    known = start.ship.coefficients
+    for name in dict.fromkeys([*known, *std]):
+        before, after = start.value(name), model.value(name)
+        if before == after == 0.0:
+            continue
+        half = Z95 * std[name] if name in std else None
+        yield result_keys.CoefficientChange(
+            name=f"{start.owner(parameter_and_run(name)[0])}.{name}",
+            unit=start.declared(name).unit,
+            before=before,
+            after=after,
+            ci95=None if half is None else (after - half, after + half),
+            origin=known[name].origin if name in known else "learned",
+        )
+
+
+def write_coefficients(content: result_keys.DiagnosisContent, csv: Path, tex: Path) -> None:
+    """Write the table of all coefficients as CSV and as LaTeX (booktabs)."""
+    import pandas as pd
+
+    rows = [c.model_dump() for c in content.coefficients]
+    table = pd.DataFrame(rows, columns=[*result_keys.CoefficientChange.model_fields])
+    ends = [interval or (None, None) for interval in table.pop("ci95")]
+    table.insert(4, "ci95_low", [low for low, _ in ends])
+    table.insert(5, "ci95_high", [high for _, high in ends])
+    table.to_csv(csv, index=False)
+    table.to_latex(tex, index=False, escape=True, float_format="%.4g", na_rep="--")
 
 
 def _unrecorded(u: Unrecorded) -> result_keys.UnrecordedResult:

@@ -10,6 +10,7 @@ from cosim.results import thin
 from ..assessment.evaluation import Evaluation
 from ..identification.shortlist import TIE
 from ..model.weak_form import EVERY
+from .content import Z95
 from .panels import breaks, figure_of, legend, plain_numbers, stack
 from .profiles import BinnedError, Quantity
 from .result_keys import RankedResult
@@ -19,7 +20,6 @@ from .svg import AFTER, BAND, BEFORE, INK, THIRD
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 MAX_RANKED = 14  # candidates in the figure; chosen
 LOG_SPREAD = 20.0  # standard errors from which on the axis of scores is logarithmic; chosen
 GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; chosen
@@ -117,7 +117,8 @@ def ranking(ranked: Sequence[RankedResult]) -> "Figure":
     panel.set_yticks(range(len(shown)), [r.id for r in shown])
     panel.set_ylim(len(shown) - 0.5, -0.5)
     panel.set_xlabel(
-        "score behind the first, with its standard error [1]; right: explained beyond coefficients"
+        "score behind the first, with its standard error [1]\n"
+        "right: explained beyond other values of the coefficients"
     )
     return figure
 

@@ -9,6 +9,7 @@ import numpy as np
 
 import cosim
 
+from ..assessment.covariates import EAST, NORTH
 from ..assessment.evaluation import Evaluation
 from ..parallel import for_each
 from ..progress import Advance, silent
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+PLACE = (NORTH.id, EAST.id)
 NO_ORIGIN: Mapping[str, object] = {}
 
 
@@ -66,6 +68,8 @@ def write_report(
         "where": lambda: _profiles(evaluations, omega_std, learned),
         "omega": lambda: _omega(evaluations, omega_std, learned),
         "growth": lambda: _growth(evaluations, learned),
+        "free": lambda: _free(evaluations, learned),
+        "place": lambda: _places(content, evaluations, learned),
         "shapes": lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations),
         "ranking": lambda: iter(()) if diagnosis is None else _ranking(diagnosis),
     }
@@ -151,6 +155,38 @@ def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawin
         caption = f"Error of prediction over time, {part} runs: median, and half of all samples."
         figure = tracks.error_growth(runs, learned)
         yield _draw(figure, f"growth-{part}", caption, caption)
+
+
+def _free(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
+    """The first run of which nothing was learned, else the first one."""
+    for e in sorted(evaluations, key=lambda e: not e.held_out)[:1]:
+        caption = f"{_label(e, learned)}: predicted as a whole."
+        yield _draw(tracks.free(e), "free", f"{e.name} predicted as a whole", caption)
+
+
+def _places(
+    content: ComparisonContent | DiagnosisContent, evaluations: Sequence[Evaluation], learned: bool
+) -> Iterator[Drawing]:
+    """The runs in which something is found at a place or at a time, or that acts from outside."""
+    placed = any(r.by in PLACE for r in content.where.regions)
+    pushes: dict[str, list[tuple[float, float]]] = {}
+    if isinstance(content, DiagnosisContent):
+        effects = evaluations[0].model.ship.effects
+        placed = placed or any(effects[e.id].kind == "environment" for e in content.accepted)
+        for s in content.unrecorded.stretches:
+            if s.axis != "N":
+                pushes.setdefault(s.run, []).append((s.start or 0.0, s.end or 0.0))
+    for k, e in enumerate(evaluations):
+        if not e.integrals.middle.size:
+            continue
+        name = _label(e, learned)
+        if placed:
+            caption = f"{name}: the missing force along the track."
+            yield _draw(tracks.place(e, learned), f"place-{k}", f"Missing force, {e.name}", caption)
+        if e.name in pushes:
+            figure = tracks.place(e, learned, pushes[e.name])
+            caption = f"{name}: where something pushed the ship, and the force that is left."
+            yield _draw(figure, f"push-{k}", f"Pushes in {e.name}", caption)
 
 
 def _omega(

@@ -255,6 +255,17 @@ class CorrelationResult(Part):
     together: list[list[str]]
 
 
+class CoefficientChange(Part):
+    """A value of the model at first and with what was learned, and where the first is from."""
+
+    name: str
+    unit: str
+    before: Number
+    after: Number
+    ci95: tuple[Number, Number] | None
+    origin: str
+
+
 class DiagnosisContent(Part):
     """The content of ``diagnosis.json``; at its end what it was made with."""
 
@@ -267,6 +278,7 @@ class DiagnosisContent(Part):
     unrecorded: UnrecordedResult
     correlation: CorrelationResult
     suspect_coefficients: list[SuspectResult]
+    coefficients: list[CoefficientChange] = []
     ranking: list[RankedResult]
     data: Data
     errors: list[RunErrors]

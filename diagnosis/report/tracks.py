@@ -5,13 +5,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cosim.results import hulls
 from fmus.ops import wrap
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
-from ..assessment.windows import LENGTH
+from ..assessment.windows import LENGTH, free_run
 from .panels import breaks, figure_of, legend, plain_numbers
-from .svg import AFTER, BEFORE, INK, WIDTH
+from .profiles import heading, window_mean
+from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +24,8 @@ MARGIN = 0.06  # of the reach, around a track; chosen
 MIN_ASPECT = 0.4  # shorter side of a map by its longer one; chosen
 MAX_REACH = 2.0  # times the measured extent, beyond which a prediction leaves the figure; chosen
 QUARTILES = (0.25, 0.5, 0.75)
+ARROWS, ARROW = 80, 0.15  # of a force: how many, and the longest as a share of the reach; chosen
+SHIP = 0.5  # longest ship, as a share of a map; chosen
 BIN = 0.25  # s, over which errors of a window are summarised; chosen
 
 
@@ -40,7 +44,64 @@ def track(e: Evaluation, learned: bool) -> "Figure":
             panel.plot(east, north, color=colour, lw=1.0, alpha=0.85, label=label)
         starts = measured[np.r_[0, breaks(window)]]
         panel.plot(starts[:, 1], starts[:, 0], ".", color=INK, ms=4.0)
+        _ships(panel, starts)
     legend(figure, panel, 3)
+    return figure
+
+
+def free(e: Evaluation) -> "Figure":
+    """A whole run, predicted by the models from its first state."""
+    measured = e.smoothed.eta[:, :2]
+    low, high = np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)
+    far = MAX_REACH * (high - low).max()
+    models = [(e.model, BEFORE, "before" if e.learned else "predicted")]
+    models += [(e.learned, AFTER, "after")] if e.learned else []
+    paths = [(free_run(e.smoothed, model)[:, :2], colour, label) for model, colour, label in models]
+    near = [np.clip(_finite(path), low - far, high + far) for path, _, _ in paths]
+    figure, panel = _map(np.concatenate([measured, *near]))
+    panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
+    for path, colour, label in paths:
+        rows = np.arange(0, len(path), max(1, len(path) // MAX_POINTS))
+        panel.plot(_finite(path)[rows, 1], _finite(path)[rows, 0], color=colour, lw=1.2, label=label)
+    panel.plot(measured[:1, 1], measured[:1, 0], ".", color=INK, ms=8.0)
+    legend(figure, panel, 3)
+    return figure
+
+
+def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]] = ()) -> "Figure":
+    """The force that the model lacks as arrows along the track, over north and east.
+
+    Args:
+        e: the run.
+        learned: whether something was; then the force that is left is drawn as well.
+        stretches: begin and end [s] of parts that are marked; then only what is left is drawn.
+    """
+    eta, time = e.smoothed.eta, e.smoothed.time
+    rows = np.arange(0, len(eta), max(1, len(eta) // MAX_POINTS))
+    shown = np.linspace(0, e.integrals.middle.size - 1, ARROWS).astype(int)
+    at = window_mean(e.integrals, eta[:, :2])[shown]
+    psi = np.radians(heading(e.integrals))[shown]
+    c, s = np.cos(psi), np.sin(psi)
+    models = _models(e, learned)[-1 if stretches else 0 :]
+    forces = [p.omega[shown] for p, _, _ in models]
+    most = max(float(np.hypot(f[:, 0], f[:, 1]).max()) for f in forces) or 1.0
+    reach = ARROW * np.ptp(eta[np.isfinite(eta[:, 0]), :2], axis=0).max() / most
+    arrows = [
+        reach * np.column_stack([c * X - s * Y, s * X + c * Y]) for X, Y in (f[:, :2].T for f in forces)
+    ]
+    figure, panel = _map(np.concatenate([eta[:, :2], *(at + arrow for arrow in arrows)]))
+    panel.plot(eta[rows, 1], eta[rows, 0], color=INK, lw=1.0, alpha=0.3, label="track")
+    for k, (begin, end) in enumerate(stretches):
+        part = (time >= begin) & (time <= end)
+        label = None if k else "pushed"
+        panel.plot(eta[part, 1], eta[part, 0], color=THIRD, lw=4.0, alpha=0.6, label=label)
+    for arrow, (_, colour, label) in zip(arrows, models, strict=True):
+        panel.quiver(
+            *at.T[::-1], *arrow.T[::-1], color=colour, angles="xy", scale_units="xy", scale=1.0,
+            width=0.004, label=label,
+        )  # fmt: skip
+    panel.set_title(f"longest arrow {most:.2g} N", loc="right", fontsize="medium")
+    legend(figure, panel, 4)
     return figure
 
 
@@ -97,6 +158,7 @@ def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
         panel.plot(predicted[-1:, 1], predicted[-1:, 0], "o", color=colour, ms=4.5)
     panel.plot(measured[:1, 1], measured[:1, 0], ".", color=INK, ms=8.0)
     panel.plot(measured[-1:, 1], measured[-1:, 0], "o", color=INK, ms=4.5, mfc="none")
+    _ships(panel, measured[[0, -1]])
     legend(figure, panel, 3)
     return figure
 
@@ -138,6 +200,14 @@ def _models(e: Evaluation, learned: bool) -> list[tuple[PredictionError, str, st
     if not learned:
         return [(e.before, BEFORE, "predicted")]
     return [(e.before, BEFORE, "before"), (e.after, AFTER, "after")]
+
+
+def _ships(panel: "Axes", poses: np.ndarray) -> None:
+    """The ship in its own length at some poses, if that leaves something of the track to see."""
+    room = max(np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim()))
+    for corners in hulls(poses):
+        if np.ptp(corners, axis=0).max() < SHIP * room:
+            panel.fill(*corners.T, fc="none", ec=INK, lw=0.5, alpha=0.4)
 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
