@@ -154,3 +154,48 @@ def test_pareto_set_is_what_nothing_beats(table):
     assert list(found["e_pos_rms"]) == [1.5, 2.0]
     table.loc[0, "status"] = "failed"
     assert list(pareto(table, ["c", "seed"], ["e_pos_rms", "W"], ["seed"])["c"]) == ["b"]
+
+
+@pytest.mark.parametrize(("seeds", "title"), [((0, 1, 2), "W, median"), ((0,), "W")])
+def test_pictures_tell_units_and_what_a_cell_is(monkeypatch, tmp_path, seeds, title):
+    """Axes with their units; on a grid cell (i, j) is around the i-th and j-th value, however far apart."""
+    pd = pytest.importorskip("pandas")
+    from cosim.campaign import charts
+
+    gains, stops = (0.1, 0.2, 0.8), (10.0, 20.0)
+    made = pd.DataFrame(
+        [
+            {"K": k, "end": t, "seed": s, "W": 10.0 * k + t + s, "status": "done"}
+            for k in gains for t in stops for s in seeds
+        ]
+    )  # fmt: skip
+    kept = []
+    monkeypatch.setattr(
+        charts.Figure, "savefig", lambda figure, path, **_: (kept.append(figure), path.touch())
+    )
+    charts.draw_campaign(
+        made, ["K", "end", "seed"], ["seed"], ["W"], tmp_path, units={"K": "1/s", "end": "s"}
+    )
+    against, maps = kept
+    assert [panel.get_xlabel() for panel in against.axes] == ["K [1/s]", "end [s]"]
+    panel, bar = maps.axes
+    assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_title()) == ("K [1/s]", "end [s]", title)
+    assert bar.get_ylabel() == "W [J]"
+    (image,) = panel.images
+    assert image.get_extent() == [-0.5, 2.5, -0.5, 1.5]
+    assert [t.get_text() for t in panel.get_xticklabels()] == ["0.1", "0.2", "0.8"]
+    assert image.get_array()[1, 2] == pytest.approx(8.0 + 20.0 + np.median(seeds))
+
+
+def test_units_of_axes_are_those_of_the_parameters(tmp_path):
+    from cosim.campaign.campaign_file import LoadedCampaign
+    from cosim.campaign.charts import axis_units
+
+    axes = {
+        "K": {"set": "fmus.controller.parameters.K_p_x", "values": [0.1, 0.2]},
+        "m": {"set": "vessel.m", "values": [14.0, 15.0]},
+        "end": {"set": "stop", "values": [10.0, 20.0]},
+        "seed": {"set": "seed", "values": [0, 1]},
+    }
+    loaded = LoadedCampaign({"scenario": "ellipse", "axes": axes, "design": "grid"})
+    assert axis_units(loaded) == {"K": "1/s", "m": "kg", "end": "s"}

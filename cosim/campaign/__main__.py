@@ -100,7 +100,8 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
     from .campaign_file import LoadedCampaign
     from .comparison import differences, pareto
 
-    campaign = LoadedCampaign(options.campaign).campaign
+    loaded = LoadedCampaign(options.campaign)
+    campaign = loaded.campaign
     axes = list(campaign.axes)
     over = [name for name, axis in campaign.axes.items() if axis.paths == ["seed"] and len(axes) > 1]
     metrics = options.metrics or [m for m in USUAL if made[m].notna().any()]
@@ -128,9 +129,10 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
         title = "paired differences with 95 % intervals; of all metrics less is better"
         _print(title, [options.compare, *header], rows)
     if options.plot:
-        from .charts import draw_campaign
+        from .charts import axis_units, draw_campaign
 
-        for path in draw_campaign(made, axes, over, metrics, out, options.compare):
+        units = axis_units(loaded)
+        for path in draw_campaign(made, axes, over, metrics, out, options.compare, units):
             print(path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,10 @@ from .comparison import differences
 if TYPE_CHECKING:
     import pandas
 
+    from .campaign_file import LoadedCampaign
+
+NO_UNITS: Mapping[str, str] = {}
+TIMES = ("step", "stop")  # of a scenario [s]
 UNITS = {metric.name: metric.unit for metric in METRICS}
 # Pairs of axes of which heat maps are drawn; chosen: three axes give three.
 MOST_MAPS = 3
@@ -35,6 +39,7 @@ def draw_campaign(
     metrics: Sequence[str],
     folder: Path,
     compared: str | None = None,
+    units: Mapping[str, str] = NO_UNITS,
 ) -> list[Path]:
     """Draw what the table holds.
 
@@ -45,6 +50,7 @@ def draw_campaign(
         metrics: columns.
         folder: for the pictures.
         compared: axis whose paired differences are drawn.
+        units: of axes, from :func:`axis_units`.
 
     Returns:
         Paths of the pictures.
@@ -59,10 +65,10 @@ def draw_campaign(
     choices = [name for name in axes if name not in over and len(set(done[name])) > 1]
     figures: dict[str, Figure] = {}
     if choices:
-        figures["metrics"] = _against_axes(done, choices, metrics)
+        figures["metrics"] = _against_axes(done, choices, metrics, units)
     numbers = [name for name in choices if _is_number(done, name)]
     for a, b in list(combinations(numbers, 2))[:MOST_MAPS]:
-        figures[f"map_{a}_{b}"] = _maps(done, a, b, metrics)
+        figures[f"map_{a}_{b}"] = _maps(done, a, b, metrics, units)
     if compared is not None:
         figures[f"differences_{compared}"] = _differences(
             differences(made, axes, compared, metrics), compared, metrics
@@ -86,12 +92,37 @@ def _panels(rows: int, columns: int) -> tuple[Figure, np.ndarray]:
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
+def axis_units(loaded: LoadedCampaign) -> dict[str, str]:
+    """Axis -> unit, of those that set a parameter or a time of the scenario."""
+    from ..system.preparation import prepare
+
+    try:
+        system = prepare(loaded.base)
+    except InputError:  # only with values of the axes it can be run
+        return {}
+    found = {}
+    for name, axis in loaded.campaign.axes.items():
+        part, _, inside = axis.paths[0].removeprefix("fmus.").partition(".")
+        variables = system.models[part].variables if part in system.models else {}
+        variable = variables.get(inside.removeprefix("parameters."))
+        if variable is not None and variable.unit is not None:
+            found[name] = variable.unit.name
+    system.close()
+    return found | {n: "s" for n, axis in loaded.campaign.axes.items() if axis.paths[0] in TIMES}
+
+
+def _labelled(name: str, unit: str | None) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
 def _named(axes: Axes, x: str, metric: str) -> None:
-    axes.set(xlabel=x, ylabel=f"{metric} [{UNITS.get(metric, '')}]")
+    axes.set(xlabel=x, ylabel=_labelled(metric, UNITS.get(metric)))
     axes.grid(alpha=0.3)
 
 
-def _against_axes(done: pandas.DataFrame, choices: Sequence[str], metrics: Sequence[str]) -> Figure:
+def _against_axes(
+    done: pandas.DataFrame, choices: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
+) -> Figure:
     """A row for each metric, a column for each axis: points over numbers, boxes over categories."""
     figure, panels = _panels(len(metrics), len(choices))
     for k, metric in enumerate(metrics):
@@ -109,21 +140,31 @@ def _against_axes(done: pandas.DataFrame, choices: Sequence[str], metrics: Seque
                 }
                 panel.boxplot(list(groups.values()))
                 panel.set_xticks(range(1, 1 + len(groups)), list(groups), fontsize=7, rotation=20)
-            _named(panel, name, metric)
+            _named(panel, _labelled(name, units.get(name)), metric)
     return figure
 
 
-def _maps(done: pandas.DataFrame, a: str, b: str, metrics: Sequence[str]) -> Figure:
-    """Each metric over two axes of numbers: a map of medians where they form a grid, else points."""
+def _maps(
+    done: pandas.DataFrame, a: str, b: str, metrics: Sequence[str], units: Mapping[str, str]
+) -> Figure:
+    """Each metric over two axes of numbers: a map of medians where they form a grid, else points.
+
+    On a grid the place of a value is its number, so that each cell is around its value.
+    """
     figure, panels = _panels(1, len(metrics))
     for panel, metric in zip(panels[0], metrics, strict=True):
         grid = done.pivot_table(index=b, columns=a, values=metric, aggfunc="median")
         if grid.notna().to_numpy().all():
-            shown = panel.pcolormesh(grid.columns, grid.index, grid.to_numpy(), shading="nearest")
+            shown = panel.imshow(grid.to_numpy(), origin="lower", aspect="auto")
+            panel.set_xticks(range(len(grid.columns)), [f"{x:.4g}" for x in grid.columns])
+            panel.set_yticks(range(len(grid.index)), [f"{y:.4g}" for y in grid.index])
+            several = len(done) > grid.size
+            title = f"{metric}, median" if several else metric
         else:
             shown = panel.scatter(done[a], done[b], c=done[metric])
-        panel.set(xlabel=a, ylabel=b, title=f"{metric} [{UNITS.get(metric, '')}]")
-        figure.colorbar(shown, ax=panel)
+            title = metric
+        panel.set(xlabel=_labelled(a, units.get(a)), ylabel=_labelled(b, units.get(b)), title=title)
+        figure.colorbar(shown, ax=panel, label=_labelled(metric, UNITS.get(metric)))
     return figure
 
 
@@ -137,7 +178,7 @@ def _differences(found: pandas.DataFrame, axis: str, metrics: Sequence[str]) -> 
         panel.axvline(0.0, color="k", lw=0.8)
         panel.set_yticks(places, list(part["value"]), fontsize=7)
         panel.set(title=f"{axis}: less {part['against'].iloc[0]}", ylim=(-0.5, len(part) - 0.5))
-        panel.set_xlabel(f"difference of {metric} [{UNITS.get(metric, '')}]")
+        panel.set_xlabel(_labelled(f"mean difference of {metric}", UNITS.get(metric)))
         panel.grid(alpha=0.3)
     return figure
 
