@@ -9,10 +9,12 @@ import time
 
 import pandas
 import pytest
+from rich.console import Console
 from support.command import command
 from support.project import ROOT
 
 import cosim
+from cosim.campaign import shown_progress
 from cosim.campaign.__main__ import main
 from cosim.campaign.campaign_file import LoadedCampaign
 from cosim.campaign.design import cases
@@ -364,3 +366,23 @@ def test_a_run_that_ends_its_process_is_a_failed_row_and_no_other(base, chain, p
     assert made["message"][0].startswith("it ended every process")
     lines = (base / "out" / JOURNAL).read_text().splitlines()
     assert sorted(json.loads(line)["status"] for line in lines) == [*["done"] * 5, "lost"]
+
+
+def test_progress_in_a_file_is_a_line_now_and_then(monkeypatch, capsys):
+    """Four runs in a minute: the other four take another one."""
+    clock = iter([0.0, 1.0, 60.0, 61.0, 121.0])
+    monkeypatch.setattr(shown_progress.time, "monotonic", lambda: next(clock))
+    with shown_progress.shown_progress(Console(), quiet=False) as progress:
+        progress(1, 0, 9)
+        progress(5, 0, 9)
+        progress(6, 1, 9)
+        progress(7, 1, 9)
+    assert capsys.readouterr().out.splitlines() == [
+        "5 of 9 runs, about 60 s left",
+        "7 of 9 runs (1 failed), about 40 s left",
+    ]
+    clock = iter([0.0, 40.0, 80.0])
+    with shown_progress.shown_progress(Console(), quiet=True) as progress:
+        progress(1, 0, 9)
+        progress(2, 0, 9)
+    assert capsys.readouterr().out == ""

@@ -8,7 +8,9 @@ from support.project import ROOT
 
 import cosim
 from cosim.errors import InputError
+from cosim.formats.imported import Unpacked
 from cosim.scenario import json_schema, load_scenario
+from cosim.scenario.load import cut_short
 from cosim.system import prepare
 
 
@@ -344,3 +346,25 @@ def test_public_names_are_there():
         assert getattr(cosim, name) is not None
     with pytest.raises(AttributeError):
         _ = cosim.nothing
+
+
+def test_metrics_of_a_run_that_is_cut_short_are_from_its_start(ellipse, tmp_path):
+    scenario = load_scenario(ellipse | {"stop": 2.0, "metrics": {"from": 5.0}})
+    scenario.set_origin(tmp_path, ["read elsewhere"], Unpacked())
+    changed = cut_short(scenario)
+    assert changed.metrics.start == 0.0
+    assert changed.notes == [
+        "read elsewhere",
+        "metrics are from 0 s on: the run ends before their window begins, at 5 s",
+    ]
+    assert changed.folder == tmp_path
+    assert changed.unpacked is scenario.unpacked, "whose files would go with the last reference"
+
+
+@pytest.mark.parametrize(
+    ("window", "short"),
+    [({}, False), ({"from": 1.0}, False), ({"from": 2.0}, True), ({"from": 2.0, "to": 3.0}, True)],
+)
+def test_a_run_is_cut_short_that_ends_where_its_window_begins(ellipse, window, short):
+    scenario = load_scenario(ellipse | {"stop": 2.0, "metrics": window})
+    assert (cut_short(scenario) is scenario) == (not short)

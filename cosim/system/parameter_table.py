@@ -26,7 +26,7 @@ def read_table(path: Path) -> dict[str, list[float]]:
             reader = csv.reader(file, skipinitialspace=True)
             lines = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
     except FileNotFoundError:
-        near = [p.name for p in path.parent.glob("*.csv")] if path.parent.is_dir() else []
+        near = [p.name for p in path.parent.glob("*.csv")]
         raise InputError(f"no such table: '{path}'{nearest(path.name, near)}") from None
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"'{path}' cannot be read as a table: {error}") from None
