@@ -31,8 +31,8 @@ def follow(name, seconds, h=0.01, **parameters):
 # What makes a path show all that it has.
 LIVELY = {
     "guidance_setpoint": {"psi_s": 2.5},
-    "guidance_ellipse": {"pulse": 1.0},
-    "guidance_eight": {"pulse": 0.7, "pulse_rise": 100.0},
+    "guidance_ellipse": {"a_x": 1.5, "a_y": 0.6, "pulse": 1.0},
+    "guidance_eight": {"a_x": 1.5, "a_y": 0.6, "pulse": 0.7, "pulse_rise": 100.0},
     "guidance_zigzag": {"length": 1.0, "psi_c": 2.0, "pulse": 0.5},
     "guidance_waypoints": {
         "x_2": 6.0, "loop": 0.0, "psi_given": 1.0, "psi_2": 1.0, "psi_3": 3.0, "psi_4": -3.0,

@@ -16,6 +16,7 @@ from support.project import ROOT
 
 import cosim
 from cosim import metrics, plots, run
+from cosim.master import real_time
 from cosim.scenario import Roles
 
 PICTURES = {"trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png"}
@@ -266,6 +267,32 @@ def test_real_time_is_kept(scenario, tmp_path):
     assert "missed deadlines" in done.stdout
     pace = json.loads((tmp_path / "out" / "log.json").read_text())["realtime"]
     assert pace["factor"] == 2.0
+
+
+def test_pace_waits_in_short_sleeps_and_measures_how_late_it_is(monkeypatch):
+    """Two simulated seconds a second; a sleep takes 10 ms more than it was asked for."""
+    now, slept = [100.0], []
+
+    def sleep(seconds):
+        slept.append(seconds)
+        now[0] += seconds + 0.01
+
+    monkeypatch.setattr(real_time.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(real_time.time, "sleep", sleep)
+    pace = real_time.Pace(2.0, 0.1, lambda: False, started=100.0)
+    pace.wait(0.3)
+    assert max(slept) == real_time.LONGEST_SLEEP
+    assert now[0] == pytest.approx(100.15 + 0.01)
+    now[0] = 101.0  # 0.8 s later than it should: 2 s of the simulation are due
+    pace.wait(0.4)
+    found = pace.summary()
+    assert found["factor"] == 2.0
+    assert found["deadline_misses"] == 1, "more than half of 0.1 s late"
+    assert found["lateness_max"] == pytest.approx(0.8)
+    assert found["jitter_rms"] == pytest.approx(0.5 * (0.8 - 0.01))
+    stopped = real_time.Pace(1.0, 0.1, lambda: True, started=100.0)
+    stopped.wait(1000.0)
+    assert now[0] == 101.0, "who has stopped a run does not wait"
 
 
 def test_parquet_holds_what_csv_holds(scenario, tmp_path):
