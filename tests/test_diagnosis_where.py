@@ -1,6 +1,7 @@
 """Uncertainty of the model error, and regions where the model fails: only significant ones are reported."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from support.measured import NOISE, sail, smoothed
 
 from diagnosis import Model, omega_std
 from diagnosis.assessment.clusters import cluster_mean, welch_p_value
-from diagnosis.assessment.covariates import HEADING, SPEED, THRUST, TIME
-from diagnosis.assessment.regions import find_regions
+from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME
+from diagnosis.assessment.regions import _Design, find_regions
 from diagnosis.model import integrals, omega
 
 
@@ -133,3 +134,23 @@ def test_cluster_mean_of_independent_values_has_the_usual_standard_error():
     # The same values five times are no more than once.
     five = cluster_mean(5.0 * x, np.full(50, 5))
     assert five.variance == pytest.approx(m.variance)
+
+
+@pytest.mark.parametrize(
+    ("covariate", "count"),
+    [
+        (SPEED, 6),  # three bins from below, three from above
+        (EAST, 9),  # 10 intervals of four bins, less the whole
+        (NORTH, 9),
+        (TIME, 9),
+        (HEADING, 12),  # from each of the four bins one, two or three
+    ],
+)
+def test_which_intervals_a_region_may_be(covariate, count):
+    cells = np.zeros((4, 1))
+    tried = list(_Design(SimpleNamespace(covariate=covariate), cells, cells, cells).intervals())
+    assert len(set(tried)) == len(tried) == count
+    assert all(1 <= after - first < 4 for first, after in tried)
+    if covariate is SPEED:
+        assert all(first == 0 or after == 4 for first, after in tried)
+    assert any(after > 4 for _, after in tried) == (covariate is HEADING)
