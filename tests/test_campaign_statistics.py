@@ -187,6 +187,30 @@ def test_pictures_tell_units_and_what_a_cell_is(monkeypatch, tmp_path, seeds, ti
     assert image.get_array()[1, 2] == pytest.approx(8.0 + 20.0 + np.median(seeds))
 
 
+def test_bands_of_an_ensemble_are_about_the_mean_and_headings_in_degrees():
+    pd = pytest.importorskip("pandas")
+    from cosim.campaign.charts import draw_bands
+
+    t = np.linspace(0.0, 10.0, 11)
+    poses = np.array([[0.1 * t + k, 0.2 * t, 0.01 * k * t] for k in (-1.0, 0.0, 1.0)])
+    found = pd.DataFrame({"time": t})
+    for name, mean in (("x", 0.1 * t), ("y", 0.2 * t), ("psi", 0.0 * t)):
+        for q in ("mean", 5, 25, 75, 95):
+            found[f"{name}_{q}"] = mean + (0.0 if q == "mean" else (q - 50) / 100.0)
+    track, *channels = draw_bands(found, poses).axes
+    assert track.get_title() == "3 members"
+    *members, mean = track.lines
+    assert [m.get_ydata().tolist() for m in members] == poses[:, 0].tolist(), "north is up"
+    assert [m.get_xdata().tolist() for m in members] == poses[:, 1].tolist()
+    assert mean.get_xdata().tolist() == (0.2 * t).tolist()
+    assert [p.get_ylabel() for p in channels] == ["north [m]", "east [m]", "heading [°]"]
+    for panel, scale in zip(channels, (1.0, 1.0, 180.0 / np.pi), strict=True):
+        widths = [np.ptp(c.get_paths()[0].vertices[:, 1]) for c in panel.collections]
+        assert widths == pytest.approx([0.9 * scale, 0.5 * scale])
+    assert [t.get_text() for t in channels[0].get_legend().get_texts()] == ["90 %", "50 %", "mean"]
+    assert channels[2].get_xlabel() == "time [s]"
+
+
 def test_units_of_axes_are_those_of_the_parameters(tmp_path):
     from cosim.campaign.campaign_file import LoadedCampaign
     from cosim.campaign.charts import axis_units

@@ -102,6 +102,17 @@ def test_whose_times_are_used_is_told_in_one_line(ellipse, tmp_path):
         assert read_starts(path).runs == [*runs], "which fmus.build tells"
 
 
+def test_values_of_a_run_without_a_name_are_refused(tmp_path):
+    path = tmp_path / "model.ssv"
+    write_model(path, Model(thrusters={"lag": 0.3}, runs={"a": {"bow_failure_time": 40.0}}))
+    text = path.read_text(encoding="utf-8")
+    assert text.count('name="a"') == 1
+    for name in ("", 'name=""'):
+        path.write_text(text.replace('name="a"', name), encoding="utf-8")
+        with pytest.raises(InputError, match="has values of a run without a name"):
+            read_parameters(path)
+
+
 def test_what_is_nominal_is_left_out(tmp_path):
     write_model(tmp_path / "a.ssv", Model({"delta_X_u": 0.0, "m": 14.79}, {"lag": 0.0}))
     write_model(tmp_path / "b.ssv", Model())
