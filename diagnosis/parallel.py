@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from io import BytesIO
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from pickle import Pickler, Unpickler
 from typing import Any, TypeVar
 
@@ -38,8 +38,9 @@ def for_each(
         items: what it is called with.
         common: objects that results may contain and that are not sent, as both processes have them.
     """
-    main = threading.current_thread() is threading.main_thread()  # others might hold what a fork needs
-    if _alone or not main or len(items) < 2:
+    # Another thread might hold what a fork needs, and a process of a pool may have none of its own.
+    main = threading.current_thread() is threading.main_thread()
+    if _alone or not main or current_process().daemon or len(items) < 2:
         return [function(item) for item in items]
     context, parent = get_context("fork"), os.getpid()
     receiver, sender = context.Pipe(duplex=False)

@@ -3,6 +3,8 @@
 import os
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import get_context
 
 import pytest
 
@@ -64,6 +66,19 @@ def test_no_process_and_no_open_file_is_left():
     assert len(os.listdir("/proc/self/fd")) == before
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)
+
+
+def in_a_pool(k):
+    return for_each(patient, range(k))
+
+
+@forked
+def test_a_process_of_a_pool_and_a_thread_work_alone():
+    with get_context("fork").Pool(1) as pool:
+        assert pool.apply(in_a_pool, (3,)) == [0, 1, 2]
+    with ThreadPoolExecutor(1) as threads:
+        pids = threads.submit(for_each, lambda k: (patient(k), os.getpid()), range(4)).result()
+    assert {pid for _, pid in pids} == {os.getpid()}
 
 
 HERE = os.getpid()
