@@ -1,8 +1,8 @@
 """The mission in one command: ``cybership demo``.
 
-A ship with more drag than its model sails two paths. From the one the diagnosis finds what the model
-lacks, the other puts that to the test. What was found goes into the belief of the controller, and the
-ship sails again.
+A ship with more drag than its model sails an ellipse and an eight. From the ellipse the diagnosis finds
+what the model lacks, the eight puts that to the test. Then the ship sails with a controller that
+believes the nominal model, and with one that believes what was found.
 """
 
 if __name__ == "__main__":
@@ -22,7 +22,7 @@ from cosim.results import draw
 NEEDED = ("scipy", "jinja2", "pandas")
 # What the plant has and its model does not: scenarios/hidden.ssv.
 HIDDEN = "hidden.ssv"
-SECONDS = 150.0  # of each run; chosen: more than a round of the ellipse, and the demo stays short
+SECONDS = 150.0  # on the ellipse; chosen: three rounds, and the demo stays short
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -57,9 +57,9 @@ def demonstrate(out: Path) -> None:
     import diagnosis
 
     hidden = cosim.shipped_folder() / HIDDEN
-    print("1. A ship with more drag than its model believes sails an ellipse and an eight.")
-    for name in ("ellipse", "eight"):
-        _sail(name, out / name, hidden)
+    print("1. A ship with 2 N.s/m more drag than its model sails an ellipse and an eight.")
+    _sail("ellipse", out / "ellipse", hidden, stop=SECONDS)
+    _sail("eight", out / "eight", hidden)
     print("2. What does the model lack? Poses and commands alone tell:\n")
     runs = diagnosis.load([out / "ellipse", out / "eight"])
     found = diagnosis.diagnose(runs[:1], held_out=runs[1:])
@@ -67,23 +67,31 @@ def demonstrate(out: Path) -> None:
     found.to_ssv(out / "model.ssv")
     found.write_report(out / "report.html")
     found.plot.where().save(out / "where.png")
-    print("\n3. The same controller with its own belief, and with the learned model; neither adapts.")
-    beliefs = {"own belief": [], "learned model": [out / "model.ssv"]}
+    print(
+        "\n3. The same controller with the nominal model, and with the learned one; it does not adapt."
+    )
+    nominal = out / "nominal.ssv"
+    # One nominal value is enough: of all others the plant's own start values are believed.
+    drag = cosim.Parameter(found.start.value("X_u"))
+    cosim.write_parameters(nominal, cosim.ParameterSet({"vessel": {"X_u": drag}}))
+    beliefs = {"nominal model": nominal, "learned model": out / "model.ssv"}
     folders = {label: out / f"ellipse_{label.replace(' ', '_')}" for label in beliefs}
     for label, believe in beliefs.items():
-        metrics = _sail("ellipse_bs", folders[label], hidden, believe).metrics
+        metrics = _sail("ellipse_bs", folders[label], hidden, believe, SECONDS).metrics
         print(f"   {label}: distance to the target {1e3 * metrics['e_pos_rms']:.0f} mm RMS")
     draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out)
 
 
-def _sail(name: str, folder: Path, hidden: Path, believe: list[Path] | None = None) -> cosim.Result:
-    """A run of a shipped scenario with the hidden drag, with the signals that pictures need.
+def _sail(
+    name: str, folder: Path, hidden: Path, believe: Path | None = None, stop: float | None = None
+) -> cosim.Result:
+    """A run of a shipped scenario with the hidden drag, to its end or to another one [s].
 
     Raises:
         InputError: it did not go through.
     """
-    settings = {"log.signals": "compact", "stop": SECONDS}
-    result = cosim.simulate(name, folder, [hidden], set=settings, believe=believe or [])
+    beliefs = [] if believe is None else [believe]
+    result = cosim.simulate(name, folder, [hidden], stop=stop, log="compact", believe=beliefs)
     if result.status != "done":
         raise cosim.InputError(f"the run in '{folder}' {result.status}: {result.message}")
     return result

@@ -10,6 +10,8 @@ copyright = "2026, the cybership developers"  # noqa: A001 - the name that Sphin
 release = version = installed("cybership")
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]  # pages as wide as lines of code
 html_title = f"cybership {release}"
 exclude_patterns = ["studies/**/results.json"]
 source_suffix = {".md": "myst-nb"}

@@ -227,3 +227,17 @@ def test_shell_of_the_pages_runs(page, reason, text, place):
             module = importlib.import_module(f"{name}.__main__")
         done = command(module.main, *arguments, cwd=place)
         assert done.returncode == 0, done.stderr
+
+
+def test_the_site_begins_with_picture_line_and_how_to_contribute():
+    front = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    before = front.partition("```{toctree}")[0]
+    assert before.count("![") == before.count("pip install") == 1
+    assert "\ncontributing\n" in front
+    assert "../CONTRIBUTING.md" in (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
+
+
+def test_no_two_pages_of_the_site_have_the_same_title():
+    pages = [p for p in (ROOT / "docs").rglob("*.md") if p.name != "contributing.md"]
+    titles = [re.search(r"^# (.+)$", p.read_text(encoding="utf-8"), re.MULTILINE)[1] for p in pages]
+    assert len(titles) == len(set(titles))
