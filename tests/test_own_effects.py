@@ -252,3 +252,7 @@ def test_a_wrong_file_of_a_method_is_told(tmp_path, text, told):
         file.write_text(text)
     with pytest.raises(InputError, match=told):
         method(str(file))
+
+
+def test_a_ship_has_all_thrusters_unless_it_is_told_otherwise():
+    assert ship().devices == {"vsp", "bow", "each vsp"}

@@ -99,7 +99,9 @@ def test_table_of_weights_says_which_settings_have_the_order(tmp_path):
             found |= {f"{c}|{form}|{w:g}": runs[c] for c in FOUR for w in WEIGHTS}
         report = Report(tmp_path, "t")
         tables(report, "eight", found)
-        assert f"{count} of 24 settings" in report.write().read_text()
+        text = report.write().read_text()
+        assert f"{count} of 24 settings" in text
+        assert "## Eight\n" in text
 
 
 @pytest.mark.parametrize(
@@ -188,6 +190,7 @@ def test_condition_1_is_counted_where_it_is_met():
     met = full_rank(by_path(rank=lambda p, c, n: 0.5 if p == "eight" and n == "svd_z2" else 0.0))
     assert met.here == f"σ_min above 0.01 at some time in {len(CONDITIONS)} of {8 * len(CONDITIONS)}"
     assert "at some time in 0 of" in full_rank(by_path()).here
+    assert met.thesis.startswith("Condition 1")
 
 
 def test_richer_path_and_store():
