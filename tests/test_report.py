@@ -517,3 +517,9 @@ def test_ships_have_their_own_length_where_they_fit(data):
             assert np.linalg.norm(corners[:, None] - corners, axis=2).max() == pytest.approx(
                 1.105, rel=0.01
             )
+
+
+def test_a_fall_stands_below_its_numbers_and_not_in_a_column_of_its_own(report):
+    """Eleven columns of long numbers are wider than a page of 1,300 px; six are not."""
+    head = report.read_text(encoding="utf-8").partition("<thead>")[2].partition("</thead>")[0]
+    assert head.count("<th ") == 6
