@@ -190,7 +190,7 @@ def place(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> Place:
 
 
 def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ranked]:
-    """Every candidate in order, those of the shortlist as refined, without those at a limit.
+    """Every candidate in order, those of the shortlist as refined.
 
     Args:
         ranking: all candidates.
@@ -198,8 +198,7 @@ def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ran
         nothing: the score of the nominal coefficients alone.
     """
     refined = [(best.ids[s.candidate], s) for s in best.scored]
-    every = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order]
-    rest = [(name, s) for name, s in every if name not in best.ids]
+    rest = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order[len(refined) :]]
     in_order = sorted(refined + rest, key=lambda named: named[1].score)
     first, alone = in_order[0][1], float(nothing.blocks.sum())
 

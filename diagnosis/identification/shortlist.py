@@ -21,7 +21,6 @@ from .refinement import (
     Start,
     TrainingSet,
     as_shape,
-    at_limit,
     nuisance,
     refine,
     timed,
@@ -44,7 +43,6 @@ class Ranking:
     Attributes:
         base: (K, 3), the model's error.
         nuisance: parameters that are fitted along.
-        least: (3,), what even all candidates together leave of the error [N, N, N m].
         table: all candidates.
         candidates: in the table's order.
         order: the candidates scored, best first.
@@ -52,7 +50,6 @@ class Ranking:
 
     base: np.ndarray
     nuisance: Nuisance
-    least: np.ndarray
     table: GramTable
     candidates: Sequence[Candidate]
     order: Sequence[Scored]
@@ -70,9 +67,8 @@ def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
     found = candidates(t.data, model, base, known)
     along = nuisance(t, at, base)
     linear = [s.columns for c in found for s in c.shapes[:1]]
-    least = noise(base, np.concatenate([*linear, along.columns], axis=2), FLOOR)
-    sigma = least if t.sigma is None else np.maximum(least, t.sigma)
-    return weighted(t, sigma, base, along, least, found)
+    sigma = noise(base, np.concatenate([*linear, along.columns], axis=2), FLOOR)
+    return weighted(t, sigma, base, along, found)
 
 
 def weighted(
@@ -80,7 +76,6 @@ def weighted(
     sigma: np.ndarray,
     base: np.ndarray,
     along: Nuisance,
-    least: np.ndarray,
     found: Sequence[Candidate],
 ) -> Ranking:
     """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
@@ -89,7 +84,7 @@ def weighted(
     size = float(table.total[0, 0])
     new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
     order = in_order(for_each(lambda k: score(table, k, len(found[k].shapes)), new))
-    return Ranking(base, along, least, table, found, order)
+    return Ranking(base, along, table, found, order)
 
 
 def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
@@ -166,8 +161,7 @@ def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
     shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
     found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
     table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
-    chosen = [k for k, e in enumerate(effects) if not at_limit(at.start, e.id, refined[k].own(at))]
-    scored = in_order([score(table, k, 1) for k in chosen or range(len(best))])
+    scored = in_order([score(table, k, 1) for k in range(len(best))])
     return Shortlist([e.id for e in effects], starts, refined, table, scored)
 
 
@@ -186,7 +180,8 @@ def reweighted(
     Args:
         t, at, ranking: all candidates beside a model.
     """
-    t = replace(t, sigma=ranking.table.sigma)
+    least = ranking.table.sigma
+    t = replace(t, sigma=least)
     most = np.sqrt(np.mean(ranking.base**2, axis=0))
     if not ranking.order:
         return None
@@ -195,13 +190,12 @@ def reweighted(
         left = found.refined[found.scored[0].candidate].left
         spoiled = np.sqrt(np.mean(left**2, axis=0))
         lasting = np.exp(np.mean(np.log(independent(t.data, left))))
-        sigma = np.maximum(ranking.least, np.minimum(spoiled, most)) * np.sqrt(lasting)
+        sigma = np.maximum(least, np.minimum(spoiled, most)) * np.sqrt(lasting)
         change = sigma / ranking.table.sigma
         if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
             break
         t = replace(t, sigma=sigma)
-        of = ranking.base, ranking.nuisance, ranking.least, ranking.candidates
-        ranking = weighted(t, sigma, *of)
+        ranking = weighted(t, sigma, ranking.base, ranking.nuisance, ranking.candidates)
         if not ranking.order:
             return None
         found = shortlist(t, at, ranking)

@@ -29,7 +29,6 @@ FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes 
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, width of the spectrum around
 SEGMENT = 25.0  # s; six periods of the slowest wave
-LINES = 5  # of the spectrum of noise, in which it hardly changes: 0.2 Hz
 NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
 REPLICATES = 200  # of the bootstrap over segments
 RATE = 10.0  # Hz; half of it is far above the band
@@ -75,8 +74,7 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     if not left or not noise:
         return None
     frequency, segments = segments_of(left)
-    # Of one drawing of noise a line is off by a fifth or more; neighbours are off by chance.
-    floor = median_filter(segments_of(noise)[1].mean(axis=-1), size=(LINES, 1), mode="nearest")
+    floor = segments_of(noise)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
     band = inside(frequency, floor, np.mean(white, axis=0), model.reference_mass)
     level, found = peak(frequency, power, floor, band)
@@ -135,7 +133,7 @@ def followed(
     """
     level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
     whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
-    share = median_filter(noise[1:] / whole[1:], size=(LINES, 1), mode="nearest")
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
     low = share < 0.25  # half of a motion is a quarter of its power
     corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
     return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
