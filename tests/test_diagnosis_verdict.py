@@ -206,6 +206,27 @@ def test_effect_that_spoils_unseen_runs_is_withdrawn_and_another_kept():
     assert withdraw(kept, unseen, start, lambda a, b: False) == (kept, [])
 
 
+@pytest.mark.parametrize(
+    ("values", "hidden", "stays"),
+    [
+        ({"mass": 3.0}, {"ship": {"mass": 3.0}}, True),
+        ({"mass": 99.0}, {"ship": {"mass": 99.0}}, False),  # as true as it may be, nobody looked further
+        ({"loss_surge": 0.97}, {"thrusters": {"loss_surge": 0.97}}, True),  # nearly all there is
+    ],
+)
+def test_what_is_at_the_limit_of_what_was_looked_for_is_withdrawn_and_a_whole_share_is_not(
+    values, hidden, stays
+):
+    runs, start = voyages(**SHORT, **hidden), Model()
+    found = Findings([finding(start, **values)], model=start.plus(values), sigma=np.full(3, 0.01))
+    kept, gone = withdraw(
+        found, Unseen(runs[:1], runs[1:], start, found.sigma), start, lambda a, b: False
+    )
+    assert bool(kept.effects) == stays
+    assert [w.id for w in gone] == ([] if stays else ["mass"])
+    assert stays or "limit of what was looked for" in gone[0].reason
+
+
 def test_less_dissipation_needs_unseen_data_that_show_it():
     runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
     start = Model()
