@@ -13,7 +13,7 @@ from cosim import InputError, Result
 from . import session
 from .data import Run, read_frame
 from .gathering import gather
-from .identification import DEFAULT, Method, Prior
+from .identification import DEFAULT, Method, Prior, shares
 from .model import Integrals, Model, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
@@ -168,6 +168,7 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
+    shares((model or Model()).ship, prior)  # before any work
     none = isinstance(held_out, (list, tuple)) and not held_out
     train, test = _loaded(runs, model), () if none else _loaded(held_out, model)
     found = session.diagnose(train, test, prior, model, advance, seed, by)
