@@ -20,6 +20,7 @@ from ..smoothing import Smoothed
 
 # s. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s (docs/stability.md).
 LENGTH = 8.0
+FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
 LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
 MIN_COVERAGE = 0.5  # of a window's samples; chosen
 
@@ -187,7 +188,8 @@ def free_run(smoothed: Smoothed, model: Model) -> np.ndarray:
         (n, 3), pose [m, m, rad] at equal distances in time; not finite where the model runs away.
     """
     first = np.flatnonzero(smoothed.used)[:1]
-    h, five = RunWindows(smoothed, first, first, first).step_and_commands
+    step, five = RunWindows(smoothed, first, first, first).step_and_commands
+    h = max(step, FREE_STEP)
     seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), LONGEST_FREE)
     starts = Starts(((smoothed, first),), h, int(seconds / h), five)
     return predict(starts, model)[:, :, 0, 0]
