@@ -1,4 +1,4 @@
-"""From files to runs that can be judged: read all, then clean and smooth, two at a time if it pays."""
+"""From files to runs that can be judged: read all, then clean and smooth, two at a time."""
 
 from collections import Counter
 from collections.abc import Sequence
