@@ -8,6 +8,7 @@ from typing import get_args
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
+from .scale import Scale
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -20,12 +21,14 @@ class Ship:
         effects: what it may have beyond its nominal model.
         vessel, thrusters: its components, which have these effects.
         devices: thrusters that it has.
+        scale: its size.
     """
 
     effects: EffectSet
     vessel: Component
     thrusters: Component
     devices: frozenset[str] = frozenset(get_args(Device))
+    scale: Scale = Scale()
 
     @cached_property
     def parameters(self) -> Mapping[str, Mapping[str, Variable]]:

@@ -1,0 +1,52 @@
+"""Froude's law: what a time, a length or a force of CyberShip Enterprise 1 is at the size of another ship."""
+
+from dataclasses import dataclass
+from functools import cache
+
+from .base_units import base_exponents
+
+REFERENCE_LENGTH = 1.105  # between perpendiculars of CyberShip Enterprise 1 [m]
+
+# Powers of the ratio of lengths: in water of the same density and under the same gravity, a mass goes with the volume,
+# a time with the root of the length.
+_POWERS = {"kg": 3.0, "m": 1.0, "s": 0.5, "rad": 0.0}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The size of a ship.
+
+    Attributes:
+        length: length between perpendiculars over that of CyberShip Enterprise 1.
+    """
+
+    length: float = 1.0
+
+    def factor(self, unit: str) -> float:
+        """Factor of a quantity of this unit from CyberShip Enterprise 1 to this ship."""
+        return _factor(self.length, unit)
+
+    @property
+    def time(self) -> float:
+        return self.factor("s")
+
+    @property
+    def speed(self) -> float:
+        return self.factor("m/s")
+
+    @property
+    def rate(self) -> float:
+        return self.factor("rad/s")
+
+    @property
+    def force(self) -> float:
+        return self.factor("N")
+
+    @property
+    def moment(self) -> float:
+        return self.factor("N.m")
+
+
+@cache
+def _factor(length: float, unit: str) -> float:
+    return length ** sum(_POWERS[base] * n for base, n in base_exponents(unit).items())
