@@ -1,4 +1,4 @@
-"""Froude's law: what a time, a length or a force of CyberShip Enterprise 1 is at the size of another ship."""
+"""Froude's law: from CyberShip Enterprise 1 to another ship's size, for the quantity of any unit."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -7,8 +7,8 @@ from .base_units import base_exponents
 
 REFERENCE_LENGTH = 1.105  # between perpendiculars of CyberShip Enterprise 1 [m]
 
-# Powers of the ratio of lengths: in water of the same density and under the same gravity, a mass goes with the volume,
-# a time with the root of the length.
+# Powers of the ratio of lengths: in the same water and under the same gravity, a mass goes with the
+# volume, a time with the root of the length.
 _POWERS = {"kg": 3.0, "m": 1.0, "s": 0.5, "rad": 0.0}
 
 
@@ -45,6 +45,9 @@ class Scale:
     @property
     def moment(self) -> float:
         return self.factor("N.m")
+
+
+CSE1 = Scale()
 
 
 @cache

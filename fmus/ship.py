@@ -8,7 +8,7 @@ from typing import get_args
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
-from .scale import Scale
+from .scale import CSE1, Scale
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -28,7 +28,7 @@ class Ship:
     vessel: Component
     thrusters: Component
     devices: frozenset[str] = frozenset(get_args(Device))
-    scale: Scale = Scale()
+    scale: Scale = CSE1
 
     @cached_property
     def parameters(self) -> Mapping[str, Mapping[str, Variable]]:
