@@ -55,6 +55,7 @@ DIAGNOSIS_LAYERS = (
 # the tools.
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
+    ("scale",),
     ("frames", "hull"),
     ("effects",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),
