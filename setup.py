@@ -1,9 +1,13 @@
-"""What pyproject.toml cannot say: the scenarios, which lie beside the packages, go into one of them."""
+"""What pyproject.toml cannot say: the scenarios and ships beside the packages go into two of them."""
 
 from setuptools import find_packages, setup
 
 PACKAGES = ("cybership*", "fmus*", "cosim*", "diagnosis*", "studies*")
-SHIPPED = {"cosim.shipped": "scenarios", "cosim.shipped.campaigns": "scenarios/campaigns"}
+SHIPPED = {
+    "cosim.shipped": "scenarios",
+    "cosim.shipped.campaigns": "scenarios/campaigns",
+    "fmus.shipped": "ships",
+}
 
 setup(
     packages=[*find_packages(include=PACKAGES), *SHIPPED],

@@ -4,7 +4,7 @@ import argparse
 import io
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,9 +13,6 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, complain, folder_name, program
 from cosim.interrupts import Held
-from fmus.declare import DeclarationError
-from fmus.effects import STANDARD
-from fmus.ship import Ship, ship
 
 from .identification import Prior
 from .progress import Advance, progress
@@ -73,6 +70,11 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         action="append",
         default=[],
         help="a file of model effects of your own; may be repeated",
+    )
+    made.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="the ship that was measured: a shipped one, or a description of your own (cse1)",
     )
     made.add_argument(
         "--anyway",
@@ -172,21 +174,6 @@ def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
     inputs = inputs_of(options)
     options.out = default_folder(options.usual, inputs, options.overwrite)
     return inputs
-
-
-def ship_with(files: Sequence[Path]) -> Ship:
-    """The ship with the effects of a user's files.
-
-    Raises:
-        InputError: a file has none, or fails.
-    """
-    effects = STANDARD
-    try:
-        for file in files:
-            effects = effects.plus_file(file)
-        return ship(effects)
-    except DeclarationError as error:
-        raise InputError(" ".join(str(error).split())) from None
 
 
 def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cosim.command import run_command
 
-from .command_line import Done, command_of, inputs_of, out_options, parser, run, ship_with
+from .command_line import Done, command_of, inputs_of, out_options, parser, run
 from .progress import Advance
 from .result_folder import together
 
@@ -27,11 +27,11 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
     from .gathering import gather
-    from .model import Model, read_model
+    from .model import Model, read_model, ship_with
     from .report import comparison_content, show_comparison, write_report
 
     with together(options.out, FILES) as new:
-        craft = ship_with(options.effects)
+        craft = ship_with(options.effects, options.ship)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
         runs = gather(options.runs, advance, options.anyway, model)
         comparison = session.evaluate(runs, model, advance=advance)

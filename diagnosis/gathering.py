@@ -49,14 +49,15 @@ def gather(
     if not paths:
         raise InputError("there is no run to read")
     advance("reading")
-    runs = [path if isinstance(path, Run) else read(path) for path in paths]
+    model = model or Model()
+    runs = [path if isinstance(path, Run) else read(path, of=model.ship) for path in paths]
     names = [path.name if isinstance(path, Run) else path for path in paths]
     _refuse_twice(runs, names)
     advance(f"smoothing {', '.join(run.name for run in runs)}")
     smoothed = for_each(lambda run: _smoothed(run, anyway), _distinct(runs, names))
     windows = [_windows(s, anyway) for s in smoothed]
     if not anyway:
-        refuse_implausible(windows, model or Model())
+        refuse_implausible(windows, model)
     return windows
 
 

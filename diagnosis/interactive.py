@@ -14,7 +14,7 @@ from . import session
 from .data import Run, read_frame
 from .gathering import gather
 from .identification import DEFAULT, Method, Prior, shares
-from .model import Integrals, Model, write_model
+from .model import Integrals, Model, ship_with, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
 from .report.notebook import Plots, as_html
@@ -37,6 +37,7 @@ def load(
     anyway: bool = False,
     advance: Advance = silent,
     model: Model | None = None,
+    ship: str | Path | None = None,
 ) -> list[Integrals]:
     """Read and smooth measured runs.
 
@@ -47,6 +48,7 @@ def load(
         anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
         advance: receives the name of each step when it begins.
         model: the initial one, by which that is judged; the nominal one by default.
+        ship: whose nominal model that is: the name of a shipped ship, or the path of a description.
 
     Returns:
         The runs, for :func:`diagnose`, :func:`diagnosis.evaluate` and :class:`diagnosis.Windows`.
@@ -56,11 +58,12 @@ def load(
     """
     import pandas
 
+    model = _model_of(model, ship)
     every = sources if isinstance(sources, (list, tuple)) else [sources]
     found: list[str | Path | Run] = []
     for k, source in enumerate(every, 1):
         if isinstance(source, pandas.DataFrame):
-            found.append(read_frame(source, f"table {k}"))
+            found.append(read_frame(source, f"table {k}", model.ship))
         elif isinstance(source, Result):
             found.append(source.folder)
         elif isinstance(source, (str, Path)):
@@ -69,6 +72,19 @@ def load(
             kind = type(source).__name__
             raise InputError(f"a run is a file, a folder, a result or a table, not of type {kind}")
     return gather(found, advance, anyway, model)
+
+
+def _model_of(model: Model | None, name: str | Path | None) -> Model:
+    """The initial model: a given one, or the nominal one of a ship.
+
+    Raises:
+        InputError: no such ship, or both are given.
+    """
+    if model is None:
+        return Model(ship=ship_with((), name))
+    if name is not None:
+        raise InputError("a model has its ship: give model or ship, not both")
+    return model
 
 
 def _loaded(runs: Any, model: Model | None) -> Sequence[Integrals]:
@@ -152,6 +168,7 @@ def diagnose(
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
+    ship: str | Path | None = None,
 ) -> ShownDiagnosis:
     """Learn what a model lacks.
 
@@ -164,11 +181,13 @@ def diagnose(
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
+        ship: whose nominal model is the initial one, as :func:`load` has it.
 
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    shares((model or Model()).ship, prior)  # before any work
+    model = _model_of(model, ship)
+    shares(model.ship, prior)  # before any work
     none = isinstance(held_out, (list, tuple)) and not held_out
     train, test = _loaded(runs, model), () if none else _loaded(held_out, model)
     found = session.diagnose(train, test, prior, model, advance, seed, by)

@@ -12,7 +12,7 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command_line import Done, command_of, inputs_of, out_options, parser, prior, run, ship_with
+from .command_line import Done, command_of, inputs_of, out_options, parser, prior, run
 from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
@@ -37,12 +37,12 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from . import session  # only now: it takes a second to import
     from .gathering import gather
     from .identification import shares
-    from .model import Model, read_model, write_model
+    from .model import Model, read_model, ship_with, write_model
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
     with together(options.out, FILES) as new:
-        craft = ship_with(options.effects)
+        craft = ship_with(options.effects, options.ship)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
         shares(craft, options.prior)
         by = method(options.method)

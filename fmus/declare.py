@@ -13,6 +13,7 @@ from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from inspect import signature
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 
@@ -65,8 +66,8 @@ class Variable:
     unit: str
     description: str
     start: float
-    range: Range
-    fixed: bool
+    range: Range = Range()
+    fixed: bool = False
     known: Known | None = None
 
 
@@ -102,6 +103,68 @@ def bundle(typename: str, base: type[Any] | None = None, **groups: Any) -> type[
     made = namedtuple(typename, list(starts), defaults=list(starts.values()))
     made.__annotations__ = {**(base.__annotations__ if base else {}), **dict.fromkeys(groups, Any)}
     return made
+
+
+def group_of(typename: str, fields: Iterable[Variable]) -> type[Any]:
+    """A NamedTuple class of scalars, declared by what :func:`variables` gives of such a class."""
+    fields = list(fields)
+    made = namedtuple(typename, [v.name for v in fields], defaults=[v.start for v in fields])
+    made.__annotations__ = {v.name: _annotation(v) for v in fields}
+    return made
+
+
+def _annotation(v: Variable) -> Any:
+    known = () if v.known is None else (v.known,)
+    fixed = (FIXED,) if v.fixed else ()
+    return Annotated[(float, v.unit, v.description, v.range, *known, *fixed)]
+
+
+def redeclared(cls: type[Any], change: Callable[[Variable], Variable]) -> type[Any]:
+    """A NamedTuple class with the same fields, each declared as ``change`` makes it of its declaration.
+
+    Args:
+        cls: a declared NamedTuple class, nested or not.
+        change: gives a variable of the same name, with another start value, range or origin.
+    """
+    nested = _shape(cls)
+    if not any(nested):
+        return group_of(cls.__name__, map(change, variables(cls)))
+    own = iter(change(v) for v in variables(cls) if v.name in cls._fields)
+    groups: dict[str, Any] = {}
+    annotations: dict[str, Any] = {}
+    for name, inner in zip(cls._fields, nested, strict=True):
+        if inner is None:
+            v = next(own)
+            groups[name], annotations[name] = v.start, _annotation(v)
+        else:
+            groups[name], annotations[name] = redeclared(inner, change)(), Any
+    made = namedtuple(cls.__name__, list(groups), defaults=list(groups.values()))
+    made.__annotations__ = annotations
+    return made
+
+
+def parameters_of(name: str, leading: int, function: Callable[..., Any]) -> tuple[Variable, ...]:
+    """The parameters that a function declares in its signature.
+
+    Args:
+        name: of what the function is, for messages.
+        leading: how many arguments stand before the parameters.
+        function: further arguments read ``name: Annotated[float, unit, description, ...] = start``.
+
+    Raises:
+        DeclarationError: a parameter without unit, description or start value.
+    """
+    arguments = list(signature(function).parameters.values())[leading:]
+    hints = get_type_hints(function, include_extras=True)
+    group = type(
+        name,
+        (),
+        {
+            "__annotations__": {a.name: hints.get(a.name, Any) for a in arguments},
+            "_field_defaults": {a.name: a.default for a in arguments if a.default is not a.empty},
+        },
+    )
+    return variables(group)
 
 
 @cache
@@ -226,6 +289,7 @@ class Component:
             anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
+        any_ship: whether it serves every ship; False where it names the parts of one.
     """
 
     name: str
@@ -243,6 +307,7 @@ class Component:
     prepare: Callable[[Any], Any] | None = None
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
+    any_ship: bool = True
 
     def starting(self, starts: Mapping[str, float]) -> "Component":
         """The same component with other start values of some parameters or inputs."""
@@ -284,12 +349,12 @@ class Component:
 KINDS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 
 
-def discover(effects: Any = None) -> Iterator[tuple[str, Component]]:
+def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
     """Every (module name, component) of this project, found by importing the modules of all kinds.
 
     Args:
-        effects: an :class:`~fmus.effects.EffectSet` that the components of the ship are to have; by
-            default that of this project.
+        ship: a :class:`~fmus.ship.Ship` that the components are to be made for; by default CyberShip
+            Enterprise 1 with the effects of this project.
     """
     root = __package__ or "fmus"
     for kind in KINDS:
@@ -298,7 +363,7 @@ def discover(effects: Any = None) -> Iterator[tuple[str, Component]]:
             name = f"{root}.{kind}.{info.name}"
             module = importlib.import_module(name)
             component = getattr(module, "COMPONENT", None)
-            if not isinstance(component, Component):
-                continue
-            make = getattr(module, "make", None)
-            yield name, component if effects is None or make is None else make(effects)
+            if isinstance(component, Component):
+                made = component if ship is None else ship.component(component, module)
+                if made is not None:
+                    yield name, made

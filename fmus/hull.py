@@ -5,9 +5,12 @@ on traced symbols. The values are those of CyberShip Enterprise 1 (Table 2.1, co
 and a controller's belief about it are two separate sets of these parameters.
 """
 
+import re
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
-from .declare import POSITIVE, Known
+from .declare import POSITIVE, Known, Variable
+from .hull_functions import FUNCTIONS
 from .ops import Number
 from .signals import Force
 
@@ -83,12 +86,22 @@ class ExtraDamping(NamedTuple):
     N_uv: Annotated[float, "N.s2/m", "yaw moment, u v", UNKNOWN] = 0.0
 
 
+class FurtherDamping(NamedTuple):
+    """Coefficients of other products of u, v, r, |u|, |v| and |r|, which a ship's description adds."""
+
+
+class HullFunctions(NamedTuple):
+    """Parameters of damping that is no product of speeds, which a ship's description adds."""
+
+
 class Damping(NamedTuple):
     """All damping coefficients."""
 
     towed: TowedDamping = TowedDamping()
     rotational: RotationalDamping = RotationalDamping()
     extra: ExtraDamping = ExtraDamping()
+    further: FurtherDamping = FurtherDamping()
+    functions: HullFunctions = HullFunctions()
 
 
 def mass_matrix(p: Inertia) -> tuple[Triple, Triple, Triple]:
@@ -163,16 +176,75 @@ def extra_damping_force(u: Number, v: Number, r: Number, c: ExtraDamping) -> Tri
     )
 
 
+@cache
+def term(name: str) -> tuple[int, tuple[tuple[bool, int], ...]]:
+    """What the name of a coefficient says: its axis, and for each factor whether of its size, and which.
+
+    Args:
+        name: such as ``Y_absu_v`` for Y = c |u| v.
+
+    Raises:
+        ValueError: it is no such name.
+    """
+    found = re.fullmatch(r"([XYN])_((?:abs[uvr]_?)*[uvr]*)", name)
+    factors = re.findall(r"(abs)?([uvr])_?", found[2]) if found else ()
+    if found is None or not factors:
+        raise ValueError(f"'{name}' is no product of u, v, r and their absolute values")
+    return "XYN".index(found[1]), tuple([(bool(sign), "uvr".index(speed)) for sign, speed in factors])
+
+
+def term_variable(name: str) -> Variable:
+    """The declaration of the coefficient of a product of speeds."""
+    axis, factors = term(name)
+    speeds = [("rad/s" if k == 2 else "m/s") for _, k in factors]
+    metres, radians = speeds.count("m/s"), speeds.count("rad/s")
+    below = ".".join(
+        [f"m{metres if metres > 1 else ''}"] * bool(metres)
+        + [f"rad{radians if radians > 1 else ''}"] * bool(radians)
+    )
+    seconds = len(factors)
+    force = "N.m" if axis == 2 else "N"
+    unit = f"{force}.s{seconds if seconds > 1 else ''}/{f'({below})' if '.' in below else below}"
+    words = "".join([f"|{'uvr'[k]}|" if sign else "uvr"[k] for sign, k in factors])
+    what = ("surge force", "sway force", "yaw moment")[axis]
+    return Variable(name, unit, f"{what}, {words}", 0.0)
+
+
+def term_force(name: str, value: Number, u: Number, v: Number, r: Number) -> Triple:
+    """Force [N, N, N m] of a coefficient times the product of speeds that its name tells."""
+    axis, factors = term(name)
+    for sign, k in factors:
+        speed = (u, v, r)[k]
+        value = value * (abs(speed) if sign else speed)
+    return value if axis == 0 else 0.0, value if axis == 1 else 0.0, value if axis == 2 else 0.0
+
+
+def described_damping_force(u: Number, v: Number, r: Number, further: Any, functions: Any) -> Triple:
+    """Force on the hull [N, N, N m] by further products and by functions, of a ship's description."""
+    forces = [term_force(name, c, u, v, r) for name, c in zip(further._fields, further, strict=True)]
+    forces += [
+        FUNCTIONS[name](u, v, r, *p) for name, p in zip(functions._fields, functions, strict=True)
+    ]
+    X, Y, N = forces[0]
+    for dX, dY, dN in forces[1:]:
+        X, Y, N = X + dX, Y + dY, N + dN
+    return X, Y, N
+
+
 def damping_force(u: Number, v: Number, r: Number, c: Any) -> Triple:
     """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected.
 
-    The coefficients c are a Damping, or a tuple of three groups in the same order.
+    The coefficients c are a Damping, or a tuple of groups in the same order.
     """
-    towed, rotational, extra = c
+    towed, rotational, extra, further, functions = c
     X1, Y1, N1 = towed_damping_force(u, v, towed)
     _, Y2, N2 = rotational_damping_force(v, r, rotational)
     X3, Y3, N3 = extra_damping_force(u, v, r, extra)
-    return X1 + X3, Y1 + Y2 + Y3, N1 + N2 + N3
+    X, Y, N = X1 + X3, Y1 + Y2 + Y3, N1 + N2 + N3
+    if not further and not functions:
+        return X, Y, N
+    X4, Y4, N4 = described_damping_force(u, v, r, further, functions)
+    return X + X4, Y + Y4, N + N4
 
 
 class Hull(NamedTuple):

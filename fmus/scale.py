@@ -1,9 +1,10 @@
 """Froude's law: from CyberShip Enterprise 1 to another ship's size, for the quantity of any unit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from .base_units import base_exponents
+from .declare import Range, Variable
 
 REFERENCE_LENGTH = 1.105  # between perpendiculars of CyberShip Enterprise 1 [m]
 
@@ -25,6 +26,16 @@ class Scale:
     def factor(self, unit: str) -> float:
         """Factor of a quantity of this unit from CyberShip Enterprise 1 to this ship."""
         return _factor(self.length, unit)
+
+    def limits(self, unit: str, reference: Range) -> Range:
+        """The range of a quantity of this unit, for its range at the size of the reference ship."""
+        at = self.factor(unit)
+        return Range(*(None if end is None else at * end for end in (reference.min, reference.max)))
+
+    def of(self, v: Variable) -> Variable:
+        """A parameter whose start value and range are those of this size."""
+        start = self.factor(v.unit) * v.start
+        return replace(v, start=start, range=self.limits(v.unit, v.range))
 
     @property
     def time(self) -> float:

@@ -3,12 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import get_args
+from inspect import signature
+from types import ModuleType
+from typing import Any, get_args
 
+from .actuators.actuation import command_units
+from .actuators.response import Layout, Prepared
 from .declare import Component, Known, Variable, variables
+from .description import Description
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
 from .scale import CSE1, Scale
+from .ships.expansion import effects_of_ship
+from .ships.sizing import sized
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -22,6 +29,7 @@ class Ship:
         vessel, thrusters: its components, which have these effects.
         devices: thrusters that it has.
         scale: its size.
+        description: that it is made from; None: CyberShip Enterprise 1.
     """
 
     effects: EffectSet
@@ -29,6 +37,7 @@ class Ship:
     thrusters: Component
     devices: frozenset[str] = frozenset(get_args(Device))
     scale: Scale = CSE1
+    description: Description | None = None
 
     @cached_property
     def parameters(self) -> Mapping[str, Mapping[str, Variable]]:
@@ -45,10 +54,48 @@ class Ship:
         }
 
     @cached_property
+    def nominal_drive(self) -> Prepared:
+        """The thrusters, nothing wrong with them."""
+        return self.thrusters.prepared(self.thrusters.params())
+
+    @property
+    def layout(self) -> Layout:
+        """What commands the thrusters get, and how these become a force."""
+        return self.nominal_drive.effects.layout
+
+    @property
+    def commands(self) -> Mapping[str, str] | None:
+        """``ACTUATOR.COMMAND`` and unit of each command of a described ship."""
+        return None if self.description is None else command_units(self.description)
+
+    def commanded_force(self, commands: Any) -> Any:
+        """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands (n, k) at rest."""
+        import numpy as np
+
+        force = self.layout.believed(tuple(commands.T), self.nominal_drive.params)
+        return np.column_stack(np.broadcast_arrays(*force, commands[:, 0]))[:, :3]
+
+    @cached_property
     def coefficients(self) -> Mapping[str, Known]:
         """Coefficients of the nominal hull and thrusters -> where their value comes from."""
         parts = (self.vessel.params, self.thrusters.params)
         return {v.name: v.known for part in parts for v in variables(part) if v.known is not None}
+
+    def component(self, component: Component, module: ModuleType) -> Component | None:
+        """A component of this project, made for this ship; None: it is of another ship's kind.
+
+        Args:
+            component: as its module declares it.
+            module: that declares it; one that makes components of effects and of a ship has ``make``.
+        """
+        make = getattr(module, "make", None)
+        if self.description is None:
+            return component if make is None else make(self.effects)
+        if not component.any_ship:
+            return None
+        if make is None:
+            return sized(component, self.description)
+        return make(self.effects, self.description) if "ship" in signature(make).parameters else None
 
     @property
     def candidates(self) -> list[str]:
@@ -57,6 +104,16 @@ class Ship:
 
 
 @cache
-def ship(effects: EffectSet = STANDARD) -> Ship:
-    """CyberShip Enterprise 1 with a set of effects."""
-    return Ship(effects, make_vessel(effects), make_thrusters(effects))
+def ship(effects: EffectSet = STANDARD, description: Description | None = None) -> Ship:
+    """A ship that may have some effects: a described one, or CyberShip Enterprise 1."""
+    if description is None:
+        return Ship(effects, make_vessel(effects), make_thrusters(effects))
+    own = effects_of_ship(description, effects)
+    return Ship(
+        own,
+        make_vessel(own, description),
+        make_thrusters(own, description),
+        frozenset(),
+        description.scale,
+        description,
+    )

@@ -53,14 +53,14 @@ def test_what_was_written_is_read(tmp_path, kind):
     np.testing.assert_allclose(run.time, TIME, rtol=1e-15)
     np.testing.assert_allclose(run.pose, POSE, rtol=1e-15)
     np.testing.assert_allclose(run.tau_cmd, TAU_CMD, rtol=1e-15)
-    assert run.u is None
+    assert run.commands is None
     assert run.five is None
 
 
 def test_commands_become_the_force_that_they_mean(tmp_path):
     table(**dict(zip(THREE, SHARES[:, :3].T, strict=True))).to_csv(tmp_path / "a.csv", index=False)
     run = diagnosis.read(tmp_path / "a.csv")
-    np.testing.assert_allclose(run.u, SHARES[:, :3], rtol=1e-15)
+    np.testing.assert_allclose(run.commands, SHARES[:, :3], rtol=1e-15)
     np.testing.assert_allclose(run.tau_cmd, TAU_CMD, rtol=1e-15)
 
 
@@ -158,7 +158,7 @@ def test_of_a_log_only_what_a_ship_would_tell_is_read(ellipse, tmp_path):
     for k, name in enumerate(("x_m", "y_m", "psi_m")):
         np.testing.assert_allclose(run.pose[:, k], log[f"observer.{name}"], rtol=1e-15)
     np.testing.assert_allclose(run.tau_cmd[:, 2], log["thrusters.tau_cmd_N"], rtol=1e-15)
-    np.testing.assert_allclose(run.u[:, 0], log["thrusters.u_vsp_x"], rtol=1e-15)
+    np.testing.assert_allclose(run.commands[:, 0], log["thrusters.u_vsp_x"], rtol=1e-15)
     assert np.abs(run.pose[:, 0] - log["vessel.x"]).max() > 1e-4, "noise is part of the measurement"
     told = pd.DataFrame(log)
     for name in told.columns:

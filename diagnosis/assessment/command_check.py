@@ -31,7 +31,7 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
         run: with its commands.
         model: its thrusters.
     """
-    if run.u is not None or run.five is not None:
+    if run.commands is not None or run.five is not None:
         return None  # shares of the full thrust, see :func:`diagnosis.read`
     full, size = full_thrust(model), np.abs(run.tau_cmd)
     beyond = size > MOST_THRUST * full

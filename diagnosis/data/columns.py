@@ -19,7 +19,7 @@ Columns that it does not name keep their names and SI units.
 import codecs
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,10 @@ UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
     "command": {"1": 1.0, "%": 1e-2},
+    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.15915494309189535},
 }
+# Quantity of a described ship's command, by the unit that its law has for it.
+OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
 QUANTITY = {
     "time": "time",
     "x": "length",
@@ -124,11 +127,13 @@ class Layout(BaseModel):
     @classmethod
     def _known(cls, value: dict[str, Column]) -> dict[str, Column]:
         for key, column in value.items():
-            if key not in QUANTITY:
+            of_ship = "." in key  # ACTUATOR.COMMAND: which there are is known with the ship
+            if key not in QUANTITY and not of_ship:
                 raise ValueError(f"'{key[:SHOWN]}' is not a signal of a run{nearest(key, QUANTITY)}")
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is not zero")
-            units = UNITS[QUANTITY[key]]
+            every = [UNITS[q] for q in OF_UNIT.values()] if of_ship else [UNITS[QUANTITY[key]]]
+            units = [unit for table in every for unit in table]
             if column.unit is not None and column.unit not in units:
                 raise ValueError(
                     f"'{column.unit[:SHOWN]}' is no unit of {key}{nearest(column.unit, units)}"
@@ -140,29 +145,36 @@ class Layout(BaseModel):
         return self.columns.get(signal, Column(name=signal))
 
 
-def _log() -> Layout:
-    """Our own log: the pose after all faults, and the force after clipping."""
+def log_of(commands: Iterable[str]) -> Layout:
+    """Our own log: the pose after all faults, the force after clipping, and the commands.
+
+    Args:
+        commands: of the ship, ``ACTUATOR.COMMAND`` or the names of variables.
+    """
     names = {"x": "observer.x_m", "y": "observer.y_m", "psi": "observer.psi_m"}
     names |= {f"tau_{axis}": f"thrusters.tau_cmd_{axis}" for axis in "XYN"}
-    names |= {name: f"thrusters.{name}" for name in THREE}
+    names |= {name: f"thrusters.{name.replace('.', '_')}" for name in commands}
     return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
 
 
-LOG = _log()
+LOG = log_of(THREE)
 
 
-def log_layout(folder: Path, names: Sequence[str]) -> Layout | None:
+def log_layout(
+    folder: Path, names: Sequence[str], commands: Mapping[str, str] | None = None
+) -> Layout | None:
     """The layout of the log of a run: by the roles that its scenario states, else by the usual names.
 
     Args:
         folder: of the run.
         names: columns of its log.
+        commands: of a described ship, see :func:`signals`.
 
     Returns:
         None if it is no log of a ship.
     """
     if LOG.column("x").name in names:
-        return LOG
+        return LOG if not commands else log_of(commands)
     roles = read_options(folder).roles
     named = dict(zip((*POSE, *TAU), roles.of("pose", "force"), strict=True))
     if not set(named.values()) <= set(names):
@@ -173,20 +185,24 @@ def log_layout(folder: Path, names: Sequence[str]) -> Layout | None:
 WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+)\s*[\])]")
 
 
-def layout_of(names: Sequence[str], units: Mapping[str, str], where: str) -> Layout:
+def layout_of(
+    names: Sequence[str], units: Mapping[str, str], where: str, commands: Iterable[str] = ()
+) -> Layout:
     """The layout of a table that says itself in which units it is.
 
     Args:
         names: of its columns, which may end in a unit, as ``x [mm]``.
         units: column -> unit, where that is known otherwise; those of no signal do not count.
         where: what messages call the table.
+        commands: of a described ship.
 
     Raises:
         InputError: no unit of that signal.
     """
-    told = {name: (name, unit) for name, unit in units.items() if name in QUANTITY and name in names}
+    known = {*QUANTITY, *commands}
+    told = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
-    told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in QUANTITY}
+    told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
     try:
         return Layout.model_validate(
             {"columns": {s: {"name": n, "unit": u} for s, (n, u) in told.items()}}
@@ -195,11 +211,18 @@ def layout_of(names: Sequence[str], units: Mapping[str, str], where: str) -> Lay
         raise InputError(f"{where}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
 
 
-def to_si(values: Any, signal: str, column: Column) -> Any:
-    """Numbers of a column as the signal they stand for, in SI."""
+def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
+    """Numbers of a column as the signal they stand for, in SI.
+
+    Raises:
+        InputError: its unit is none of that quantity.
+    """
     factor = -column.factor if column.flip else column.factor
+    units = UNITS[quantity]
+    if column.unit is not None and column.unit not in units:
+        raise InputError(f"'{column.unit[:SHOWN]}' is no unit of {signal}{nearest(column.unit, units)}")
     with np.errstate(over="ignore"):  # an infinite number is no measurement, and counts as dropped
-        return (factor * values + column.offset) * UNITS[QUANTITY[signal]].get(column.unit or "", 1.0)
+        return (factor * values + column.offset) * units.get(column.unit or "", 1.0)
 
 
 def read_layout(path: Path) -> Layout | None:
@@ -226,7 +249,9 @@ def read_layout(path: Path) -> Layout | None:
         raise InputError(f"'{beside}' cannot be read: {error}") from None
 
 
-def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
+def signals(
+    layout: Layout, names: Sequence[str], where: str, commands: Mapping[str, str] | None = None
+) -> list[str]:
     """The signals of a run that a file has: time, pose, and one form of the commands or more.
 
     A force on an axis that is never commanded needs no column, unless one has nearly its name.
@@ -235,23 +260,30 @@ def signals(layout: Layout, names: Sequence[str], where: str) -> list[str]:
         layout: which column is which signal.
         names: columns of the file.
         where: what messages call the file.
+        commands: of a described ship, ``ACTUATOR.COMMAND`` and unit of each, in place of those of
+            CyberShip Enterprise 1.
 
     Raises:
         InputError: a column is missing.
     """
-    groups: list[tuple[str, ...]] = [
-        g for g in COMMANDS if any(layout.column(s).name in names for s in g)
-    ]
+    every = COMMANDS if commands is None else (tuple(commands), TAU)
+    groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
+    if commands is not None:
+        known = {*QUANTITY, *commands}
+        for signal in layout.columns:
+            if signal not in known:
+                raise InputError(f"{where}: '{signal[:SHOWN]}' is no signal{nearest(signal, known)}")
     if not groups:
-        forms = ", or ".join(", ".join(group) for group in COMMANDS)
-        told = '{"columns": {"tau_X": "name of its column", "tau_Y": ...}}'
+        forms = ", or ".join(", ".join(group) for group in every)
+        told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'
         raise InputError(
-            f"{where} has no commands: {forms}{nearest(TAU[0], names)}; "
+            f"{where} has no commands: {forms}{nearest(every[0][0], names)}; "
             f"if they have other names, put {told} into a file of the same name with .json behind it"
         )
     if FIVE in groups and any(layout.column(s).name in names for s in POWER):
         groups.append(POWER)
-    named = [signal for signal in layout.columns if layout is not LOG]
+    ours = layout is LOG or (commands is not None and layout == log_of(commands))
+    named = [signal for signal in layout.columns if not ours]
     wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named])
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):

@@ -15,6 +15,7 @@ import pandas as pd
 from cosim import InputError
 from cosim.errors import nearest
 from fmus.effects.single_propellers import ASIDE
+from fmus.ship import Ship, ship
 from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import decimal_comma, refuse_preamble, refuse_separator, refuse_units
@@ -22,14 +23,17 @@ from .columns import (
     ALL,
     FIVE,
     LOG,
+    OF_UNIT,
     POSE,
     POWER,
+    QUANTITY,
     SHOWN,
     TAU,
     THREE,
     Layout,
     layout_of,
     log_layout,
+    log_of,
     read_layout,
     signals,
     to_si,
@@ -54,7 +58,8 @@ class Run:
         time: (n,) [s].
         pose: (n, 3), measured north, east, heading [m, m, rad]; lost samples are NaN or zeros.
         tau_cmd: (n, 3), commanded force [N, N, N m] after clipping.
-        u: (n, 3), commands of VSP in surge, VSP in sway, bow [1]; None if not known.
+        commands: (n, k), in the order of the ship's; of CyberShip Enterprise 1 those of the VSP in surge
+            and sway and of the bow thruster [1]; None if not known.
         five: (n, 5), commands of VSP 1 surge, sway, VSP 2 surge, sway, bow [1]; None if not known.
         power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
         notes: what was found that is not as it should be, a line each.
@@ -62,13 +67,14 @@ class Run:
         called: signal -> its column in the file, of those with another name; None if there is none.
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
+        signals: names of ``commands``.
     """
 
     name: str
     time: np.ndarray
     pose: np.ndarray
     tau_cmd: np.ndarray
-    u: np.ndarray | None = None
+    commands: np.ndarray | None = None
     five: np.ndarray | None = None
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
@@ -76,6 +82,7 @@ class Run:
     called: Mapping[str, str] | None = None
     file: Path | None = None
     absent: tuple[str, ...] = ()
+    signals: tuple[str, ...] = THREE
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
@@ -97,12 +104,13 @@ def force(five: np.ndarray, power: np.ndarray | None = None) -> np.ndarray:
     return np.sum(both, axis=0).T
 
 
-def read(path: str | Path, layout: Layout | None = None) -> Run:
+def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None) -> Run:
     """A measured run.
 
     Args:
         path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
         layout: in place of what the file beside it says.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
 
     Raises:
         InputError: absent, unreadable, a column missing, or commands in another unit.
@@ -117,12 +125,15 @@ def read(path: str | Path, layout: Layout | None = None) -> Run:
         near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
     name = path.absolute().parent.name if path.name in LOGS else path.stem
-    columns, called = (read_matlab(path), {}) if path.suffix == ".mat" else _tabular(path, layout)
-    return replace(_run(name, columns, f"'{path}'"), called=called or None, file=path)
+    of = of or ship()
+    is_matlab = path.suffix == ".mat" and of.commands is None
+    columns, called = (read_matlab(path), {}) if is_matlab else _tabular(path, layout, of.commands)
+    return replace(_run(name, columns, f"'{path}'", of), called=called or None, file=path)
 
 
-def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
+def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
     """A run of its signals, commands without a gap."""
+    own = THREE if of.commands is None else tuple(of.commands)
 
     absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
     columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
@@ -130,30 +141,41 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str) -> Run:
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
 
-    tau, u, five, power = (_held(stack(group)) for group in (TAU, THREE, FIVE, POWER))
+    tau, commands, five, power = (_held(stack(group)) for group in (TAU, own, FIVE, POWER))
     power = None if power is None else np.maximum(power, 0.0)
-    for commands in (u, five):
-        most = 0.0 if commands is None else float(np.abs(commands).max(initial=0.0))
+    for given in (commands if of.commands is None else None, five):
+        most = 0.0 if given is None else float(np.abs(given).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
     if power is not None and power.max(initial=0.0) > MOST_POWER:
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
     if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
         raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
-    missing = [~np.isfinite(columns[s]) for s in ALL if s in columns]
+    missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*ALL, *own)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)
     if tau is None:
         if five is not None:
             tau = force(five, power)
         else:
-            assert u is not None
-            x, y, bow = u.T
-            tau = np.column_stack(thrust(x, y, bow, Allocation()))
+            assert commands is not None
+            tau = of.commanded_force(commands)
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
     pose = np.column_stack([columns[s] for s in POSE])
     held = np.any(missing, axis=0) if lost else None
-    return Run(name, columns["time"], pose, tau, u, five, power, notes, held, absent=absent)
+    return Run(
+        name,
+        columns["time"],
+        pose,
+        tau,
+        commands,
+        five,
+        power,
+        notes,
+        held,
+        absent=absent,
+        signals=own,
+    )
 
 
 def _held(commands: np.ndarray | None) -> np.ndarray | None:
@@ -164,15 +186,18 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
 
 
-def _tabular(path: Path, layout: Layout | None) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def _tabular(
+    path: Path, layout: Layout | None, commands: Mapping[str, str] | None
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Signals of a CSV or Parquet file, and the names of their columns where these are others."""
     given = layout or read_layout(path)
     try:
         names = column_names(path, given or Layout())
         if given is None and len(names) == 1:
             refuse_separator(path, names[0])
-        layout = given or log_layout(path.parent, names) or layout_of(names, {}, f"'{path}'")
-        wanted = signals(layout, names, f"'{path}'")
+        layout = given or log_layout(path.parent, names, commands)
+        layout = layout or layout_of(names, {}, f"'{path}'", commands or ())
+        wanted = signals(layout, names, f"'{path}'", commands)
         table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
     except ImportError:
         raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
@@ -181,30 +206,38 @@ def _tabular(path: Path, layout: Layout | None) -> tuple[dict[str, np.ndarray], 
     except Exception as error:  # a broken file makes the readers stumble in many ways
         text = " ".join(str(error).split())
         raise InputError(f"'{path}' cannot be read as a table: {text}") from None
-    return _signals(table, layout, wanted, path)
+    return _signals(table, layout, wanted, path, commands or {})
 
 
-def read_frame(frame: pd.DataFrame, name: str = "frame") -> Run:
+def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None) -> Run:
     """A measured run in a table.
 
     Args:
         frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
             log of a run, :func:`cosim.log_frame`.
         name: of the run.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
 
     Raises:
         InputError: a column is missing, or commands are in another unit.
     """
+    of = of or ship()
     where, names = f"the table '{name}'", [str(column) for column in frame.columns]
     frame = frame.set_axis(names, axis=1)
     is_log = LOG.column("x").name in names
-    layout = LOG if is_log else layout_of(names, frame.attrs.get("units", {}), where)
-    columns, called = _signals(frame, layout, signals(layout, names, where), Path(name))
-    return replace(_run(name, columns, where), called=called or None)
+    log = LOG if of.commands is None else log_of(of.commands)
+    layout = log if is_log else layout_of(names, frame.attrs.get("units", {}), where, of.commands or ())
+    wanted = signals(layout, names, where, of.commands)
+    columns, called = _signals(frame, layout, wanted, Path(name), of.commands or {})
+    return replace(_run(name, columns, where, of), called=called or None)
 
 
 def _signals(
-    table: pd.DataFrame, layout: Layout, wanted: Sequence[str], path: Path
+    table: pd.DataFrame,
+    layout: Layout,
+    wanted: Sequence[str],
+    path: Path,
+    commands: Mapping[str, str],
 ) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Signals of a table in SI, and the names of their columns where these are others."""
     columns = {}
@@ -215,7 +248,8 @@ def _signals(
         cells = table[column.name]
         stamps = _seconds(cells, f"'{path}'") if signal == "time" else None
         if stamps is None:
-            columns[signal] = to_si(_numbers(cells, path, layout), signal, column)
+            quantity = OF_UNIT[commands[signal]] if signal in commands else QUANTITY[signal]
+            columns[signal] = to_si(_numbers(cells, path, layout), signal, column, quantity)
         else:
             columns[signal] = stamps
     return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}

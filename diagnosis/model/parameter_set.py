@@ -5,7 +5,7 @@ model.ssv`` makes FMUs that have it, and any tool that knows SSP can bind it to 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim import (
@@ -19,8 +19,10 @@ from cosim import (
 )
 from cosim.errors import nearest
 from fmus.base_units import base_exponents
-from fmus.declare import Variable
+from fmus.declare import DeclarationError, Variable
+from fmus.effects import STANDARD
 from fmus.ship import Ship, ship
+from fmus.ships.naming import described_ship
 
 from .ship_model import Model
 
@@ -70,6 +72,25 @@ def _told(
             text = f"{v.description}; {NO_FMU}" if part == MEASUREMENT else v.description
             told[name] = Parameter(float(value), v.unit, text)
     return told
+
+
+def ship_with(files: Sequence[Path], name: str | Path | None = None) -> Ship:
+    """A ship with the effects of a user's files.
+
+    Args:
+        files: of effects.
+        name: of a shipped ship, or the path of a description; None: CyberShip Enterprise 1.
+
+    Raises:
+        InputError: no such ship, or a file has no effects, or fails.
+    """
+    effects = STANDARD
+    try:
+        for file in files:
+            effects = effects.plus_file(file)
+        return ship(effects, described_ship(name))
+    except DeclarationError as error:
+        raise InputError(" ".join(str(error).split())) from None
 
 
 def read_model(path: Path, of: Ship | None = None) -> Model:

@@ -11,16 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from fmus.effects import Running
 from fmus.frames import rotate_to_body
 from fmus.ops import when, wrap
 from fmus.signals import Force
-from fmus.thrusters import chain
 from fmus.vessel import vessel
 
 from ..smoothing import IDLE, Smoothed
 from .ship_model import Model
-from .thrust import Response, commanded_shares, placed, places
+from .thrust import Response, commanded_shares, places
 
 LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
@@ -93,7 +91,7 @@ def at_rest(smoothed: Smoothed) -> bool:
 
 
 def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
-    """Commanded shares of full force (steps, w, sets, 3) of a run at times (steps, w) [s]."""
+    """Commanded shares of full force (steps, w, sets, k) of a run at times (steps, w) [s]."""
     run = smoothed.track.run
     row = np.searchsorted(run.time, time, side="right") - 1
     found = commanded_shares(run, model)[np.maximum(row, 0)]
@@ -127,7 +125,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
 
 
 def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Commands that arrive and shares of full force that act, each (steps, 3, sets, p or 1, w)."""
+    """Commands that arrive and shares of full force that act, each (steps, k, sets, p or 1, w)."""
     found = [starts.arriving(single) for single in singles(model)]
     given, acting = (np.concatenate(part, axis=3) for part in zip(*found, strict=True))
     return given, acting
@@ -144,18 +142,18 @@ def propagate(
         thrust: commands that arrive and shares that act, from :func:`arriving`.
     """
     body, drive, h = model.hull, model.drive, starts.h
+    layout = drive.effects.layout
     aside = np.array(places(starts.runs[0][0].track.run))[:, None, None]
     power = starts.power(model.clock) if starts.powered else None
-    thrusters = placed(drive, aside, None)
+    thrusters = layout.placed(drive, aside, None)
     s = first_state(starts, body)
     yield s
     for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
         with np.errstate(all="ignore"):
             if power is not None:
-                thrusters = placed(drive, aside, chain.Power(*power[k]))
-            x, y, bow = given
-            now = Running(s.t + h, s.u, s.v, s.r, x, y, bow, aside)
-            forces = chain.act(tuple(shares), now, thrusters)
+                thrusters = layout.placed(drive, aside, power[k])
+            now = layout.running(s.t + h, s.u, s.v, s.r, tuple(given), thrusters)
+            forces = layout.act(tuple(shares), now, thrusters)
             s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
         yield s
 

@@ -1,7 +1,7 @@
 """The force of the thrusters along a measured run, by the very functions of the thrusters' FMU.
 
 What lies between a command and the share of full force that acts (delay, limited rate, lag, and a user's
-effects with a memory) is computed by :mod:`fmus.thrusters.chain` in short steps of a regular grid. A
+effects with a memory) is computed by :mod:`fmus.actuators.response` in short steps of a regular grid. A
 memory lasts only so long: the grid is cut into parts that are stepped side by side, each from the time
 before it that still matters. Weak form and predictions use the same result, :class:`Response`.
 """
@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from fmus.effects import Memory, Running
-from fmus.thrusters import chain
-from fmus.thrusters.allocation import allocate
+from fmus.actuators.response import at_rest, command_response, force_response
+from fmus.effects import Memory
 
 from ..data.reading import ASIDE, Run, propellers
 from .ship_model import Model
@@ -26,17 +25,18 @@ PART = 4.0  # s; about as long as a memory, which costs least
 
 
 def commanded_shares(run: Run, model: Model) -> np.ndarray:
-    """(n, sets, 3), commanded shares of full force of each set of thrusters.
+    """(n, sets, k), what each set of thrusters is commanded, as shares of full force or as it is.
 
     Of the five commands of the real ship each propeller is a set of its own, at ``ASIDE``; elsewhere
     there is one, amidships.
     """
     if run.five is not None:
         return propellers(run.five)
-    if run.u is not None:
-        return run.u[:, None]
+    if run.commands is not None:
+        return run.commands[:, None]
     X, Y, N = run.tau_cmd.T
-    return np.column_stack(allocate(X, Y, N, model.drive.params.allocation))[:, None]
+    shares = model.drive.effects.layout.allocate((X, Y, N), model.drive.params)
+    return np.column_stack(np.broadcast_arrays(*shares))[:, None]
 
 
 def places(run: Run) -> tuple[float, ...]:
@@ -46,18 +46,7 @@ def places(run: Run) -> tuple[float, ...]:
 
 def full_thrust(model: Model) -> np.ndarray:
     """(3,), force and moment [N, N, N m] that the model's thrusters give at the most on each axis."""
-    F_vsp, F_bow, l_vsp, l_bow, p_x, _ = model.drive.params.allocation
-    levers = abs(l_vsp + p_x), abs(l_bow + p_x)
-    return np.array([F_vsp, F_vsp + F_bow, levers[0] * F_vsp + levers[1] * F_bow])
-
-
-def placed(drive: chain.Prepared, aside: Any, power: chain.Power | None) -> chain.Prepared:
-    """Thrusters that sit ``aside`` [m] to starboard of where they are, at a power of the run."""
-    p = drive.params
-    plant = p.plant._replace(plant_p_y=p.plant.plant_p_y + aside)
-    if power is not None:
-        power = chain.Power(p.power.power_vsp * power.power_vsp, p.power.power_bow * power.power_bow)
-    return drive._replace(params=p._replace(plant=plant, power=power or p.power))
+    return np.array(model.drive.effects.layout.full(model.drive.params))
 
 
 def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -66,15 +55,16 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     Args:
         run: its time and power.
         model: whose thrusters act.
-        between: (2 or 1, sets, 3, n), what becomes of the commands, :attr:`Response.between_samples`.
+        between: (2 or 1, sets, k, n), what becomes of the commands, :attr:`Response.between_samples`.
         nu: (n, 3), body-fixed velocity.
     """
-    power = None if run.power is None else chain.Power(*run.power.T)
+    layout = model.drive.effects.layout
+    power = None if run.power is None else run.power.T
     total = np.zeros((3, run.time.size))
     for aside, given, acting in zip(places(run), between[0], between[-1], strict=True):
-        (u, v, r), (x, y, bow) = nu.T, given
-        now = Running(run.time, u, v, r, x, y, bow, aside)
-        force = chain.act(tuple(acting), now, placed(model.drive, aside, power))
+        drive = layout.placed(model.drive, aside, power)
+        now = layout.running(run.time, *nu.T, tuple(given), drive)
+        force = layout.act(tuple(acting), now, drive)
         for axis in range(3):
             total[axis] += force[axis]
     return total.T
@@ -102,7 +92,7 @@ class Response:
             for k, member, memory in drive.effects.remembering[of]
             if (acts := drive.slow[k])
         ]
-        self.slow = bool(self._memories) or drive.params.rate.plant_rate > 0.0
+        self.slow = bool(self._memories) or any(rate > 0.0 for rate in drive.params.rate)
 
     @staticmethod
     def key(model: Model) -> tuple[Any, ...]:
@@ -112,7 +102,7 @@ class Response:
 
     @property
     def between_samples(self) -> np.ndarray:
-        """Means (2, sets, 3, n) from each sample to the next: commands that arrive, shares that act.
+        """Means (2, sets, k, n) from each sample to the next: commands that arrive, shares that act.
 
         Where these are the same there is one of them.
         """
@@ -131,7 +121,7 @@ class Response:
             start, end: (...) [s].
 
         Returns:
-            Two arrays (..., sets, 3).
+            Two arrays (..., sets, k).
         """
         a, b = self._elapsed(start), self._elapsed(end)
         given, acting = ((at(b) - at(a)) / like(b - a, 2) for at in self._integrals)
@@ -186,11 +176,12 @@ class Response:
         return float(memory.lasts(*self.model.drive.params.dynamics[member.parameters]))
 
     def _stepped(self, edges: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Means over each step (K, sets, 3): commands that arrive, and shares that act."""
+        """Means over each step (K, sets, k): commands that arrive, and shares that act."""
         drive = self.model.drive
-        rate = drive.params.rate.plant_rate
         memory = sum(self._lasts(member, m) for _, member, m in self._memories)
-        memory += 2.0 / rate if rate > 0.0 else 0.0
+        largest = np.abs(self._commands.values).max(axis=(0, 1), initial=0.0)
+        rates = np.broadcast_to(drive.params.rate, largest.shape)
+        memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
         before, part = (int(np.ceil(min(x, LONGEST_MEMORY) / h)) + 1 for x in (memory, PART))
         size = edges.size - 1
         parts = -(-size // part)
@@ -198,14 +189,14 @@ class Response:
         rows = np.arange(-before, part)[:, None] + part * np.arange(parts)
         commands = np.diff(self._commands(np.append(edges, edges[-1] + h)), axis=0) / h
         commanded = np.where(like(rows < 0, 2), self._commands.before, commands[np.clip(rows, 0, size)])
-        past = chain.at_rest(drive.effects)
+        past = at_rest(drive.effects)
         given = np.empty_like(commanded)
         acting = np.empty_like(commanded)
         for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
-            past, arriving = chain.command_response(past, tuple(each), drive, h)
-            past, shares = chain.force_response(past, arriving, drive, h)
-            for axis in range(3):
-                given[k, ..., axis], acting[k, ..., axis] = arriving[axis], shares[axis]
+            past, arriving = command_response(past, tuple(each), drive, h)
+            past, shares = force_response(past, arriving, drive, h)
+            for one in range(commanded.shape[-1]):
+                given[k, ..., one], acting[k, ..., one] = arriving[one], shares[one]
         found = []
         for signal in (given, acting):
             parts_first = np.moveaxis(signal[before:], 1, 0)

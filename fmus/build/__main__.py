@@ -13,8 +13,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..declare import DeclarationError, Range, discover, variables
-from ..effects import STANDARD, EffectSet
+from ..effects import STANDARD
 from ..interruption import program, run_interruptible
+from ..ship import Ship
+from ..ship import ship as make_ship
+from ..ships.naming import described_ship
 from . import ledger
 from .building import build, export
 from .cached_fmu import cache_folder
@@ -33,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "           %(prog)s my_controller.py --out fmu\n"
         "           %(prog)s --list vessel\n"
         "           %(prog)s vessel --effects my_effects.py --out fmu\n"
+        "           %(prog)s --ship otter --out fmu\n"
         "           %(prog)s --parameters model.ssv --out fmu\n"
         "           %(prog)s --native --parameters model.ssv --out fmu\n"
         "           %(prog)s --native vessel --target linux64,win64,darwin64 --out fmu\n"
@@ -64,6 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="a file of model effects of your own, for vessel and thrusters; may be repeated",
     )
     parser.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="make the FMUs for this ship: a shipped one, or a description of your own (cse1)",
+    )
+    parser.add_argument(
         "--parameters",
         type=Path,
         metavar="FILE.ssv",
@@ -89,18 +98,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         effects = STANDARD
         for file in options.effects:
             effects = effects.plus_file(file)
+        ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)
         elif options.list:
-            _print_list(options.names, effects)
+            _print_list(options.names, make_ship(effects, ship))
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
             if options.source is not None:
-                made = export(options.names, options.source, starts, _note, effects, options.overwrite)
+                made = export(
+                    options.names, options.source, starts, _note, effects, options.overwrite, ship
+                )
             else:
                 native = native_targets(options.target) if options.native else None
                 made = build(
-                    options.names, options.out, starts, _note, effects, native, options.overwrite
+                    options.names, options.out, starts, _note, effects, native, options.overwrite, ship
                 )
             for path in made:
                 print(path)
@@ -134,13 +146,13 @@ def _verify(names: Sequence[str]) -> None:
             raise BuildError(f"'{name}' was not built here: it holds '{wrong}'")
 
 
-def _print_list(names: Sequence[str], effects: EffectSet) -> None:
+def _print_list(names: Sequence[str], of: Ship) -> None:
     """Print the FMUs there are, or every variable of those that are named."""
     if not names:
-        for _, component in discover():
+        for _, component in discover(of):
             print(f"{component.name:24} {component.description}")
     for name in names:
-        _, component = load(*which(name), effects)
+        _, component = load(*which(name), of)
         print(f"{component.name}: {component.description}")
         kinds = [
             ("parameter", component.params),

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..declare import Component, discover
+from ..description import Description
 from ..effects import STANDARD, EffectSet
+from ..ship import Ship
+from ..ship import ship as make_ship
 from . import ledger
 from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
@@ -28,6 +31,7 @@ def build(
     effects: EffectSet = STANDARD,
     native: Native | None = None,
     overwrite: bool = False,
+    ship: Description | None = None,
 ) -> list[Path]:
     """FMUs that are up to date with the source.
 
@@ -42,6 +46,7 @@ def build(
         effects: that vessel and thrusters are to have.
         native: the platforms to compile for; None means FMUs that run in Python.
         overwrite: whether other files of these names may be replaced in ``out``.
+        ship: that the FMUs are to be made for; None: CyberShip Enterprise 1.
 
     Returns:
         Path of each FMU, in the order of the names.
@@ -54,9 +59,10 @@ def build(
     out = None if out is None else Path(out)
     if out is not None and out.exists() and not out.is_dir():
         raise BuildError(f"'{out}' is a file, not a folder")
-    built = [_cached(name, effects, starts, native, note) for name in _every(_listed(names), starts)]
+    of = make_ship(effects, ship)
+    built = [_cached(name, of, starts, native, note) for name in _every(_listed(names), starts, of)]
     if starts is not None:
-        _tell_unused(starts, [fmu.stem for fmu in built], note)
+        _tell_unused(starts, [fmu.stem for fmu in built], of, note)
     if out is None:
         return built
     return _placed(built, out, overwrite)
@@ -69,6 +75,7 @@ def export(
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
     overwrite: bool = False,
+    ship: Description | None = None,
 ) -> list[Path]:
     """Components as plain C; arguments and errors are those of :func:`build`.
 
@@ -77,10 +84,11 @@ def export(
     """
     from ..native.export_source import exported_source
 
-    found = [load(*which(name), effects)[1] for name in _every(names, starts)]
+    of = make_ship(effects, ship)
+    found = [load(*which(name), of)[1] for name in _every(names, starts, of)]
     if starts is not None:
         found = [starts.baked(component) for component in found]
-        _tell_unused(starts, [component.name for component in found], note)
+        _tell_unused(starts, [component.name for component in found], of, note)
     files = exported_source(found)
     with tempfile.TemporaryDirectory(prefix="source_") as work:
         for name, text in files.items():
@@ -111,14 +119,14 @@ def _listed(names: object) -> list[str]:
     return [str(name) for name in every]
 
 
-def _every(names: Sequence[str], starts: Starts | None) -> Sequence[str]:
-    """The components asked for; without names those of the parameter set, or all."""
+def _every(names: Sequence[str], starts: Starts | None, of: Ship) -> Sequence[str]:
+    """The components asked for; without names those of the parameter set, or all that a ship has."""
     if starts is not None:
         return names or list(starts.values)
-    return names or [component.name for _, component in discover()]
+    return names or [component.name for _, component in discover(of)]
 
 
-def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], None]) -> None:
+def _tell_unused(starts: Starts, built: Sequence[str], of: Ship, note: Callable[[str], None]) -> None:
     """Say what of a parameter set went into no FMU.
 
     Raises:
@@ -126,7 +134,7 @@ def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], Non
     """
     for name in starts.values:
         if name not in built:
-            load(name, None)
+            load(name, None, of)
             note(f"'{starts.path}' has values for {name}, which is not built")
     for text in starts.beside:
         note(f"'{starts.path}' has what no FMU can hold, {text}")
@@ -138,35 +146,35 @@ def _tell_unused(starts: Starts, built: Sequence[str], note: Callable[[str], Non
 
 def _cached(
     name: str,
-    effects: EffectSet,
+    of: Ship,
     starts: Starts | None = None,
     native: Native | None = None,
     note: Callable[[str], None] = lambda _: None,
 ) -> Path:
     """Path of an up-to-date FMU, built now if the cache does not hold it."""
     stem, own_file = which(name)
-    folder = cache_folder() / _source_hash(own_file, effects, {}, native)
+    folder = cache_folder() / _source_hash(own_file, of, {}, native)
     fmu = folder / f"{stem}.fmu"
     if starts is None and is_whole(fmu):
         return fmu
     from filelock import FileLock  # only now: most calls find what they need, and this takes a while
 
-    module, component = load(stem, own_file, effects)
+    module, component = load(stem, own_file, of)
     if starts is not None:
         component = starts.baked(component)
-        folder = cache_folder() / _source_hash(own_file, effects, component.starts, native)
+        folder = cache_folder() / _source_hash(own_file, of, component.starts, native)
     make_folder(folder)
     fmu = folder / f"{component.name}.fmu"
-    python = _cached(name, effects, starts, note=note) if native is not None and native.python else None
+    python = _cached(name, of, starts, note=note) if native is not None and native.python else None
     with FileLock(folder / "lock"):
         if not is_whole(fmu):
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
                 if native is None:
-                    built = pack(component, module, own_file, Path(work), effects)
+                    built = pack(component, module, own_file, Path(work), of)
                 else:
-                    code_hash = hash_of(sources(module, own_file, effects), component.starts)
+                    code_hash = hash_of(sources(module, own_file, of), component.starts, of)
                     built = _compiled(component, code_hash, native, Path(work), python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
@@ -188,12 +196,14 @@ def _compiled(
 
 
 def _source_hash(
-    own_file: Path | None, effects: EffectSet, starts: Mapping[str, float], native: Native | None = None
+    own_file: Path | None, of: Ship, starts: Mapping[str, float], native: Native | None = None
 ) -> str:
-    """Hash of all that a build reads, of the start values that it changes, and of its compilers."""
+    """Hash of all that a build reads, of ship and start values, and of its compilers."""
     digest = _our_source().copy()
-    for path in [*effects.files, *([own_file] if own_file else [])]:
+    for path in [*of.effects.files, *([own_file] if own_file else [])]:
         _read(digest, path)
+    if of.description is not None:
+        digest.update(repr(of.description).encode())
     digest.update(changes(starts).encode())
     if native is not None:
         digest.update(native.key.encode())

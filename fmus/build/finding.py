@@ -8,8 +8,9 @@ from pathlib import Path
 
 from ..base_units import base_exponents
 from ..declare import Component, DeclarationError, discover, nearest, width
-from ..effects import STANDARD, EffectSet
+from ..effects import EffectSet
 from ..fmi.trace import trace_init, trace_step
+from ..ship import Ship, ship
 
 ROOT = Path(__file__).parent.parent
 
@@ -32,16 +33,18 @@ def which(name: str) -> tuple[str, Path | None]:
     return stem, own_file
 
 
-def load(name: str, own_file: Path | None, effects: EffectSet = STANDARD) -> tuple[str, Component]:
-    """Module name and component of an FMU of ours with some effects, or of a user's file."""
+def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str, Component]:
+    """Module name and component of an FMU of ours, made for a ship, or of a user's file."""
     if own_file is None:
-        known = {component.name: (module, component) for module, component in discover(effects)}
+        of = of or ship()
+        known = {component.name: (module, component) for module, component in discover(of)}
         if name in known:
-            if effects.files:
-                _check_effects(known[name][1], effects)
+            if of.effects.files or of.description is not None:
+                _check_effects(known[name][1], of.effects)
             return known[name]
         hint = nearest(name, known) or f"; there are {', '.join(known)}"
-        raise BuildError(f"no FMU '{name}'{hint}")
+        whose = f" for the ship '{of.description.name}'" if of.description is not None else ""
+        raise BuildError(f"no FMU '{name}'{whose}{hint}")
     spec = importlib.util.spec_from_file_location(own_file.stem, own_file)
     if spec is None or spec.loader is None:
         raise BuildError(f"'{own_file}' cannot be read as a Python module")
@@ -80,7 +83,7 @@ def _check_effects(component: Component, effects: EffectSet) -> None:
     try:
         _check(component)
     except Exception as error:
-        places = [_place_of(error, file) for file in effects.files]
+        places = [_place_of(error, file) for file in effects.files] or [component.name]
         named = [place for place in places if ":" in place] or places
         raise BuildError(f"{named[0]}: {error}") from error
 

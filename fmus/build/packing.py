@@ -19,11 +19,13 @@ from functools import cache
 from pathlib import Path
 
 from ..declare import Component
-from ..effects import STANDARD, EffectSet
+from ..ship import Ship
 from .finding import ROOT
 
 FACE = "fmus.fmi.slave"
 EFFECTS = "fmus.effects"
+# What an FMU for a described ship imports beside its component.
+SHIPS = ("fmus.description", "fmus.ships.expansion", "fmus.ships.sizing")
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -48,20 +50,20 @@ def changes(starts: Mapping[str, float]) -> str:
     return repr(dict(sorted(starts.items()))) if starts else ""
 
 
-def sources(module: str, own_file: Path | None, effects: EffectSet = STANDARD) -> dict[str, str]:
+def sources(module: str, own_file: Path | None, of: Ship) -> dict[str, str]:
     """Source of a component's module and of all modules of ours that it and the face import.
 
     Args:
         module: full name of the component's module.
         own_file: file behind that name, where it is not one of ours.
-        effects: those of the component; users' files of effects come with it.
+        of: the ship that it is made for; users' files of effects come with it.
 
     Returns:
         Path inside the package -> source text.
     """
     found: dict[str, str] = {}
-    files = {f"{EFFECTS}.{file.stem}": file for file in effects.files}
-    pending = [module, FACE]
+    files = {f"{EFFECTS}.{file.stem}": file for file in of.effects.files}
+    pending = [module, FACE, *(SHIPS if of.description is not None else ())]
     while pending:
         name = pending.pop()
         relative = Path(*name.split(".")[1:])
@@ -100,9 +102,11 @@ def _imports(source: str, package: str) -> tuple[str, ...]:
     return tuple(name for name in names if name == "fmus" or name.startswith("fmus."))
 
 
-def hash_of(files: Mapping[str, str], starts: Mapping[str, float]) -> str:
-    """What identifies a component, in Python and compiled: hash of its source and its start values."""
+def hash_of(files: Mapping[str, str], starts: Mapping[str, float], of: Ship) -> str:
+    """What identifies a component, in Python and compiled: hash of its source, start values and ship."""
     digest = hashlib.sha256()
+    if of.description is not None:
+        digest.update(repr(of.description).encode())
     for inside in sorted(files):
         digest.update(f"{inside}\0{files[inside]}\0".encode())
     digest.update(changes(starts).encode())
@@ -114,13 +118,13 @@ def pack(
     module: str,
     own_file: Path | None,
     work: Path,
-    effects: EffectSet = STANDARD,
+    of: Ship,
 ) -> Path:
     """Build one FMU in a scratch folder and return its path."""
     from pythonfmu.builder import FmuBuilder
 
-    files, changed = sources(module, own_file, effects), changes(component.starts)
-    code_hash = hash_of(files, component.starts)
+    files, changed = sources(module, own_file, of), changes(component.starts)
+    code_hash = hash_of(files, component.starts, of)
     package = f"{component.name}_{code_hash[:16]}"
     for inside, text in files.items():
         path = work / package / inside
@@ -128,7 +132,7 @@ def pack(
         # A user's file imports fmus by name; inside the FMU the package is called otherwise.
         path.write_text(re.sub(r"^(\s*(?:from|import)\s+)fmus\b", rf"\g<1>{package}", text, flags=re.M))
     script = work / f"{package}_fmu.py"
-    imports, made = _entry(f"{package}.{module.partition('.')[2]}", package, own_file, effects)
+    imports, made = _entry(f"{package}.{module.partition('.')[2]}", package, own_file, of)
     script.write_text(
         SCRIPT.format(
             name=component.name,
@@ -146,21 +150,36 @@ def pack(
     return _repeatable(Path(raw), work / f"{component.name}.fmu")
 
 
-def _entry(module: str, package: str, own_file: Path | None, effects: EffectSet) -> tuple[str, str]:
+def _entry(module: str, package: str, own_file: Path | None, of: Ship) -> tuple[str, str]:
     """How an FMU's script imports its component, and names it.
 
-    A module that makes components of a set of effects has ``make``.
+    A module that makes components of a set of effects, and of a ship, has ``make``.
     """
     has_factory = hasattr(sys.modules.get(f"fmus.{module.partition('.')[2]}"), "make")
-    if own_file is not None or not effects.files or not has_factory:
-        return f"from {module} import COMPONENT", "COMPONENT"
-    stems = [file.stem for file in effects.files]
-    lines = [
-        f"from {package}.effects import STANDARD, effects_of, {', '.join(stems)}",
-        f"from {module} import make",
-    ]
+    plain = f"from {module} import COMPONENT", "COMPONENT"
+    if own_file is not None:
+        return plain
+    stems = [file.stem for file in of.effects.files]
     more = "".join(f".plus(effects_of({stem}))" for stem in stems)
-    return "\n".join(lines), f"make(STANDARD{more})"
+    lines = [f"from {package}.effects import STANDARD, effects_of{''.join(f', {s}' for s in stems)}"]
+    if of.description is not None:
+        names = "Description, Part, Value"
+        lines += [
+            f"from {package}.description import {names}",
+            f"from {package}.ships.{'expansion' if has_factory else 'sizing'} import "
+            f"{'effects_of_ship' if has_factory else 'sized'}",
+            f"from {module} import {'make' if has_factory else 'COMPONENT'}",
+            f"SHIP = {of.description!r}",
+        ]
+        made = (
+            f"make(effects_of_ship(SHIP, STANDARD{more}), SHIP)"
+            if has_factory
+            else "sized(COMPONENT, SHIP)"
+        )
+        return "\n".join(lines), made
+    if not stems or not has_factory:
+        return plain
+    return "\n".join([*lines, f"from {module} import make"]), f"make(STANDARD{more})"
 
 
 @contextmanager

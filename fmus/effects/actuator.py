@@ -172,6 +172,7 @@ def reduced(f: Number, d: Number) -> Number:
     sign="forces below d are lost, the rest is reduced by d",
     source="7.2.5; static tests of the ship",
     linear=False,
+    needs=("vsp", "bow"),
     search=Search(tries=[{"deadband": d} for d in DEADBANDS]),
     wording=Wording(
         lambda f: (
@@ -219,6 +220,7 @@ def saturation_sentence(f: Found) -> str:
     sign="0: no limit",
     source="2.1.1",
     linear=False,
+    needs=("vsp", "bow"),
     search=Search(tries=limits),
     wording=Wording(
         saturation_sentence,

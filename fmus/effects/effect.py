@@ -25,10 +25,9 @@ parameters that start at zero are the effect's coefficients: with all of them ze
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from inspect import signature
-from typing import Any, Literal, NamedTuple, get_args, get_type_hints
+from typing import Any, Literal, NamedTuple, get_args
 
-from ..declare import DeclarationError, Variable, variables
+from ..declare import DeclarationError, Variable, parameters_of
 from ..docstring import docstring
 from ..hull import Damping
 from .families import UNKNOWN, Family
@@ -126,8 +125,9 @@ class Memory(NamedTuple):
     """How an actuator effect depends on the past.
 
     Attributes:
-        initial: the memory before anything was commanded, nested tuples of floats.
-        of: the three signals that it changes: commands on their way to the thrusters, or the shares of
+        initial: the memory before anything was commanded, nested tuples of floats; or a function that
+            makes it for so many signals.
+        of: the signals that it changes: commands on their way to the thrusters, or the shares of
             full force that the thrusters give.
         lasts: ``lasts(*parameters)``: time [s] after which what was commanded before no longer matters.
         keeps: how many steps of the past it holds; None: as many as there are.
@@ -140,6 +140,10 @@ class Memory(NamedTuple):
     lasts: Callable[..., Any]
     keeps: int | None = None
     idle: Callable[[Any, Any], Any] | None = None
+
+    def start(self, width: int) -> Any:
+        """The memory before anything was commanded, of thrusters with ``width`` commands."""
+        return self.initial(width) if callable(self.initial) else self.initial
 
 
 Values = Mapping[str, float]
@@ -328,7 +332,7 @@ def effect(
             raise DeclarationError(f"{id}: the first line of the docstring describes the effect")
         memory = more.get("memory")
         leading = 3 if memory is not None else 2 if kind == "actuator" else 1
-        parameters = more.get("parameters") or _parameters(id, leading, function)
+        parameters = more.get("parameters") or parameters_of(id, leading, function)
         how = frozenset(settings)
         strengths = [p.name for p in parameters if p.start == 0.0 and p.name not in how]
         if not strengths:
@@ -359,18 +363,3 @@ def effect(
         )
 
     return declare
-
-
-def _parameters(name: str, leading: int, function: Callable[..., Any]) -> tuple[Variable, ...]:
-    """The declared parameters of an effect's function."""
-    arguments = list(signature(function).parameters.values())[leading:]
-    hints = get_type_hints(function, include_extras=True)
-    group = type(
-        name,
-        (),
-        {
-            "__annotations__": {a.name: hints.get(a.name, Any) for a in arguments},
-            "_field_defaults": {a.name: a.default for a in arguments if a.default is not a.empty},
-        },
-    )
-    return variables(group)

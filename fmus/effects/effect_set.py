@@ -3,12 +3,14 @@
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from ..declare import DeclarationError, nearest
-from .effect import Effect, Kind, Loaded, Running, Thrust
+from ..scale import Scale
+from .effect import Effect, Kind, Loaded, Running, Thrust, Values
 
 ROOM = Path(__file__).parent
 
@@ -77,6 +79,11 @@ class EffectSet(Mapping[str, Effect]):
                 )
         return EffectSet([*self.values(), *effects], [*self.files, *([] if file is None else [file])])
 
+    def at(self, scale: Scale, devices: Iterable[str]) -> "EffectSet":
+        """The effects that a ship with these thrusters may have, of its size."""
+        has = set(devices)
+        return EffectSet([_resized(e, scale) for e in self.values() if e.needs <= has], self.files)
+
     def plus_file(self, path: Path) -> "EffectSet":
         """The set with the effects of a user's file.
 
@@ -104,6 +111,24 @@ class EffectSet(Mapping[str, Effect]):
             return self.plus(found, path)
         except DeclarationError as error:
             raise DeclarationError(f"'{path}': {error}") from error
+
+
+def _resized(e: Effect, scale: Scale) -> Effect:
+    """An effect whose parameters start, end and are tried where they are for a ship of this size."""
+    units = {p.name: p.unit for p in e.parameters}
+
+    def tried(nominal: Values) -> list[Values]:
+        return [
+            {name: scale.factor(units[name]) * x for name, x in values.items()}
+            for values in e.search.values(nominal)
+        ]
+
+    tries = e.search.tries if callable(e.search.tries) else tried
+    return replace(
+        e,
+        parameters=tuple(scale.of(p) for p in e.parameters),
+        search=replace(e.search, tries=tries if e.search.tries else ()),
+    )
 
 
 def _imported(name: str, path: Path) -> ModuleType:

@@ -1,10 +1,11 @@
 """Forces by the ship's motion: a change of each damping coefficient, and a free curve over speed."""
 
 import re
+from collections.abc import Callable
 from math import degrees
 
 from ..declare import Range, Variable, packer, variables, width
-from ..hull import Damping, Triple, damping_force
+from ..hull import Damping, Triple, damping_force, term_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
 from .effect import Effect, Motion, Search, Wording, effect
@@ -14,6 +15,7 @@ from .families import (
     SWAY_AT_SPEED,
     SWAY_BY_TURNING,
     SWAY_DRAG,
+    UNKNOWN,
     YAW_AT_SPEED,
     YAW_BY_DRIFT,
     YAW_DRAG,
@@ -51,6 +53,7 @@ MOTION = {
     "uv": "Drifting sideways while going ahead",
     "ru": "Turning while going ahead",
     "rv": "Turning while drifting sideways",
+    "ruv": "Turning while going ahead and drifting sideways",
 }
 
 
@@ -64,6 +67,12 @@ def change(k: int, ship: Motion, delta: Number) -> Triple:
     only = [0.0] * _COUNT
     only[k] = delta
     return damping_force(ship.u, ship.v, ship.r, packer(Damping)(only))
+
+
+def further_change(coefficient: Variable) -> Effect:
+    """The effect that changes the coefficient of a further product of speeds."""
+    name = coefficient.name
+    return _change(lambda ship, delta: term_force(name, delta, ship.u, ship.v, ship.r), coefficient)
 
 
 def damping_sentence(f: Found) -> str:
@@ -92,8 +101,8 @@ def _at(moved: str, speeds: tuple[float, float, float], sides: bool = False) -> 
     return " and ".join(" ".join(parts[m][: 1 + sides]) for m in "uvr" if m in moved)
 
 
-def _change(k: int, coefficient: Variable) -> Effect:
-    """The effect that changes one damping coefficient."""
+def _change(function: Callable[[Motion, Number], Triple], coefficient: Variable) -> Effect:
+    """The effect that changes one damping coefficient, by the force of an addition to it."""
     axis, term = coefficient.name[0], product(coefficient.name)
     name = f"{axis}_{term}"
     text = f"addition to {coefficient.name}"
@@ -109,12 +118,15 @@ def _change(k: int, coefficient: Variable) -> Effect:
         description=f"addition to {coefficient.name}: {coefficient.description}",
         parameters=(delta,),
         gives=coefficient.name,
-        wording=Wording(damping_sentence, FAMILY[name], APART.get(name, {})),
-    )(lambda ship, delta: change(k, ship, delta))
+        wording=Wording(damping_sentence, FAMILY.get(name, UNKNOWN), APART.get(name, {})),
+    )(function)
 
 
 # In the order of Damping.
-CHANGES = tuple(_change(k, coefficient) for k, coefficient in enumerate(variables(Damping)))
+CHANGES = tuple(
+    _change(lambda ship, delta, k=k: change(k, ship, delta), coefficient)
+    for k, coefficient in enumerate(variables(Damping))
+)
 
 
 def surge_curve_sentence(f: Found) -> str:

@@ -3,7 +3,6 @@
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
-from ..hull import Triple
 from ..ops import Number, exp, floor, fmax, pick, when, where
 from .effect import Memory, Search, Wording, effect
 from .families import SYNC_PULSE, TIMING
@@ -13,7 +12,6 @@ from .text import number
 SLOTS = 64
 # Values to try [s]: from a sample or two to the longest that a ship of this size could be steered with.
 TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5)
-AT_REST = (0.0, 0.0, 0.0)
 FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier command is left
 LONGEST = Range(0.0, 60.0)  # s
 
@@ -29,7 +27,7 @@ LONGEST = Range(0.0, 60.0)  # s
     linear=False,
     description="first-order lag of all thrusters",
     memory=Memory(
-        AT_REST,
+        lambda width: (0.0,) * width,
         "force",
         lambda lag: FORGOTTEN * lag,
         idle=lambda before, wanted: wanted,
@@ -47,22 +45,22 @@ LONGEST = Range(0.0, 60.0)  # s
     ),
 )
 def lag(
-    before: Triple,
-    wanted: Triple,
+    before: tuple[Any, ...],
+    wanted: tuple[Any, ...],
     h: Number,
     lag: Annotated[float, "s", "first-order lag of all thrusters", LONGEST] = 0.0,
-) -> tuple[Triple, Triple]:
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """First-order lag, exact at the step's end for an input that is held over it."""
     share = 1.0 - exp(-h / fmax(lag, 1e-9))
-    a, b, c = (x + share * (w - x) for x, w in zip(before, wanted, strict=True))
-    return (a, b, c), (a, b, c)
+    after = tuple([x + share * (w - x) for x, w in zip(before, wanted, strict=True)])
+    return after, after
 
 
 class Kept(NamedTuple):
     """Commands that a delay remembers, the latest first, and the time since the latest [s]."""
 
-    since: Any = 0.0
-    commands: tuple[Triple, ...] = (AT_REST,) * SLOTS
+    since: Any
+    commands: tuple[tuple[Any, ...], ...]
 
 
 @effect(
@@ -75,7 +73,9 @@ class Kept(NamedTuple):
     source="6.4.5",
     linear=False,
     description="pure delay of all thrusters",
-    memory=Memory(Kept(), "command", lambda delay: delay, keeps=SLOTS),
+    memory=Memory(
+        lambda width: Kept(0.0, ((0.0,) * width,) * SLOTS), "command", lambda delay: delay, keeps=SLOTS
+    ),
     search=Search(tries=[{"delay": T} for T in TIMES]),
     wording=Wording(
         lambda f: f"The thrusters act {number(f['delay'])} s after they are commanded.",
@@ -85,10 +85,10 @@ class Kept(NamedTuple):
 )
 def delay(
     kept: Kept,
-    command: Triple,
+    command: tuple[Any, ...],
     h: Number,
     delay: Annotated[float, "s", "pure delay of all thrusters", LONGEST] = 0.0,
-) -> tuple[Kept, Triple]:
+) -> tuple[Kept, tuple[Any, ...]]:
     """Pure delay: the mean over the step of held commands of some time ago."""
     since = kept.since + h
     # Time between two remembered commands: a step, or more where the delay is long.

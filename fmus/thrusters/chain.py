@@ -4,18 +4,26 @@ A thruster model is a characteristic: which share of its full force each thruste
 All else is the same for every model and stands here; :func:`thrusters` makes an FMU of a characteristic.
 
 Commands pass the effects with a memory of commands (a delay), the limit of their rate, the
-characteristic, the effects with a memory of forces (a lag), and then the effects without a memory. The
-functions run on floats, step by step in an FMU, and on arrays, which is how a diagnosis computes whole
-series with them.
+characteristic, the effects with a memory of forces (a lag), all in :mod:`fmus.actuators.response`, and
+then the effects without a memory.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
+from ..actuators.response import (
+    Layout,
+    Past,
+    Prepared,
+    ThrusterEffects,
+    at_rest,
+    command_response,
+    force_response,
+    prepared,
+    thruster_effects,
+)
 from ..declare import POSITIVE, Component, Known, bundle
-from ..effects import STANDARD, EffectSet, Memory, Running, Thrust
-from ..effects.group import Group, Member, group
+from ..effects import STANDARD, EffectSet, Running, Thrust
 from ..hull import Triple
 from ..ops import Number, clip, finite, when
 from ..signals import Force, Velocity
@@ -52,50 +60,6 @@ class Rate(NamedTuple):
     plant_rate: Annotated[float, "1/s", "limit of a command's rate; 0: none", POSITIVE] = 0.0
 
 
-class ThrusterEffects(NamedTuple):
-    """The effects of a set that act on thrusters.
-
-    Attributes:
-        dynamics: those with a memory.
-        forces: those without.
-        remembering: of dynamics, those with a memory of commands and those with one of forces, each with
-            its place among the memories.
-    """
-
-    dynamics: Group
-    forces: Group
-    remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
-
-
-@cache
-def thruster_effects(effects: EffectSet) -> ThrusterEffects:
-    """The groups of a set of effects; those with a memory of commands come first."""
-    actuator = [e for e in effects.of_kind("actuator") if e.function is not None]
-    slow = [e for of in ("command", "force") for e in actuator if e.memory and e.memory.of == of]
-    dynamics = group("Dynamics", slow)
-    remembering: dict[str, list[tuple[int, Member, Memory]]] = {"command": [], "force": []}
-    for k, member in enumerate(dynamics.members):
-        memory = member.effect.memory
-        assert memory is not None
-        remembering[memory.of].append((k, member, memory))
-    forces = group("ThrusterEffects", [e for e in actuator if e.memory is None])
-    return ThrusterEffects(dynamics, forces, remembering)
-
-
-class Past(NamedTuple):
-    """What the thrusters remember: time [s], the memory of each slow effect, the last command."""
-
-    t: Any
-    memories: tuple[Any, ...]
-    limited: Triple
-
-
-def at_rest(effects: ThrusterEffects) -> Past:
-    """The past of thrusters that were never at work."""
-    memories = [member.effect.memory for member in effects.dynamics.members]
-    return Past(0.0, tuple([m.initial for m in memories if m is not None]), (0.0, 0.0, 0.0))
-
-
 class Inputs(NamedTuple):
     request: Force = Force()
     velocity: Velocity = Velocity()
@@ -113,77 +77,10 @@ class Outputs(NamedTuple):
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
 
 
-class Prepared(NamedTuple):
-    """What follows from the parameters alone: which effects act.
-
-    Attributes:
-        params: of the thrusters.
-        effects: of the thrusters.
-        slow: for each effect with a memory, whether it acts.
-        acting: for each effect without, whether it acts.
-        any_acts: whether any of these acts.
-    """
-
-    params: Any
-    effects: ThrusterEffects
-    slow: tuple[Any, ...]
-    acting: tuple[Any, ...]
-    any_acts: Any
-
-
-def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
-    """Everything that a step needs of the parameters."""
-    return Prepared(
-        p,
-        effects,
-        effects.dynamics.acting(p.dynamics),
-        effects.forces.acting(p.wrong),
-        effects.forces.any_acts(p.wrong),
-    )
-
-
-def remember(
-    memories: tuple[Any, ...], signals: Triple, of: str, b: Prepared, h: Number
-) -> tuple[tuple[Any, ...], Triple]:
-    """The memories a step later, and what they make of commands or of shares of full force.
-
-    Args:
-        memories: of all effects that have one.
-        signals: three commands, or three shares.
-        of: which of the two, "command" or "force".
-        b: the thrusters.
-        h: step [s].
-    """
-    found = list(memories)
-    for k, member, memory in b.effects.remembering[of]:
-        idle = found[k] if memory.idle is None else memory.idle(found[k], signals)
-        if b.slow[k] is False:
-            found[k] = idle
-            continue
-        otherwise = idle, signals
-        found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
-    return tuple(found), signals
-
-
-def rate_limited(before: Triple, wanted: Triple, rate: Number, h: Number) -> Triple:
-    """Commands that move from ``before`` towards the wanted ones at no more than ``rate`` [1/s]."""
-    most = rate * h
-    a, b, c = (x + clip(w - x, -most, most) for x, w in zip(before, wanted, strict=True))
-    return a, b, c
-
-
-def command_response(s: Past, commands: Triple, b: Prepared, h: Number) -> tuple[Past, Triple]:
-    """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
-    memories, given = remember(s.memories, commands, "command", b, h)
-    rate = b.params.rate.plant_rate
-    given = when(rate > 0.0, lambda: rate_limited(s.limited, given, rate, h), lambda: given)
-    return Past(s.t + h, memories, given), given
-
-
-def force_response(s: Past, shares: Triple, b: Prepared, h: Number) -> tuple[Past, Triple]:
-    """The shares of full force that act after a step of h [s], for those of the characteristic."""
-    memories, shares = remember(s.memories, shares, "force", b, h)
-    return s._replace(memories=memories), shares
+def running(t: Number, u: Number, v: Number, r: Number, commands: Triple, b: Prepared) -> Running:
+    """What the force of this ship's thrusters may depend on."""
+    vsp, bow = b.params.power
+    return Running(t, u, v, r, *commands, b.aside, b.params.plant.plant_l_vsp, vsp, bow)
 
 
 def act(shares: Triple, now: Running, b: Prepared) -> Triple:
@@ -191,19 +88,48 @@ def act(shares: Triple, now: Running, b: Prepared) -> Triple:
 
     Args:
         shares: of the VSP's surge and sway force and of the bow thruster's.
-        now: time, velocity and commands.
+        now: of :func:`running`.
         b: the thrusters.
     """
     p = b.params
     F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
     vsp, bow = p.power
-    now = now._replace(l_vsp=l_vsp, power_vsp=vsp, power_bow=bow)
     f = Thrust(F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2])
     for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
         f = member.apply(acts, p.wrong, f, f, now)
     X, Y, N = moments(vsp * f.vsp_x, vsp * f.vsp_y, bow * f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
     N = N + vsp * f.turn
     return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
+
+
+def believed(commands: Triple, p: Any) -> Triple:
+    """tau [N, N, N m] that the allocation expects of three shares of full force."""
+    return thrust(*commands, p.allocation)
+
+
+def full(p: Any) -> Triple:
+    """The largest force and moment on each axis [N, N, N m]."""
+    F_vsp, F_bow, l_vsp, l_bow, p_x, _ = p.allocation
+    return F_vsp, F_vsp + F_bow, abs(l_vsp + p_x) * F_vsp + abs(l_bow + p_x) * F_bow
+
+
+def placed(b: Prepared, aside: Any, power: Any) -> Prepared:
+    """Thrusters that sit ``aside`` [m] to starboard, at settings of the power (VSP, bow) or None."""
+    p = b.params
+    plant = p.plant._replace(plant_p_y=p.plant.plant_p_y + aside)
+    scaled = p.power if power is None else Power(p.power[0] * power[0], p.power[1] * power[1])
+    return b._replace(params=p._replace(plant=plant, power=scaled), aside=aside)
+
+
+THREE = Layout(
+    ("u_vsp_x", "u_vsp_y", "u_bow"),
+    running,
+    act,
+    believed,
+    lambda tau, p: allocate(tau[0], tau[1], tau[2], p.allocation),
+    full,
+    placed,
+)
 
 
 def thrusters(
@@ -227,7 +153,9 @@ def thrusters(
     """
 
     def make(effects: EffectSet = STANDARD) -> Component:
-        return _thrusters(name, description, model, characteristic, command, thruster_effects(effects))
+        return _thrusters(
+            name, description, model, characteristic, command, thruster_effects(effects, THREE)
+        )
 
     return make
 
@@ -265,7 +193,7 @@ def _thrusters(
         commands = command(s_x), command(s_y), command(s_bow)
         past, given = command_response(s, commands, b, h)
         u, v, r = i.velocity
-        now = Running(s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), *given)
+        now = running(s.t + h, finite(u, 0.0), finite(v, 0.0), finite(r, 0.0), given, b)
         past, shares = force_response(past, characteristic(now, p.model), b, h)
         vsp, bow = p.power
         tau = when(

@@ -2,10 +2,13 @@
 
 from typing import Any, NamedTuple
 
-from ..effects import Running
+from ..declare import Component
+from ..description import Description
+from ..effects import STANDARD, EffectSet, Running
 from ..hull import Triple
 from ..ops import Number
 from .chain import thrusters
+from .described import described
 
 
 class Line(NamedTuple):
@@ -21,11 +24,18 @@ def same(share: Number) -> Number:
     return share
 
 
-make = thrusters(
+_three = thrusters(
     "thrusters",
     "Thrust allocation and thrusters of CyberShip Enterprise 1",
     Line,
     linear,
     same,
 )
+
+
+def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component:
+    """The FMU of the thrusters of CyberShip Enterprise 1, or of a described ship."""
+    return _three(effects) if ship is None else described(effects, ship)
+
+
 COMPONENT = make()

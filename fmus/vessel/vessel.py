@@ -8,7 +8,17 @@ model effect on the hull, from outside, or in the measurement is off until a par
 from operator import add
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, bundle
+from ..declare import (
+    FIXED,
+    Component,
+    Variable,
+    bundle,
+    group_of,
+    parameters_of,
+    redeclared,
+    variables,
+)
+from ..description import Description, Part, Value
 from ..effects import STANDARD, EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
@@ -25,13 +35,16 @@ from ..hull import (
     inverse_mass,
     motion,
     rotational_damping_force,
+    term_variable,
 )
+from ..hull_functions import FUNCTIONS
 from ..ops import Number, finite, when, wrap
 from ..signals import Force, Measurement, Velocity
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 _TOWED = len(TowedDamping._fields)
 _ROTATIONAL = _TOWED + len(RotationalDamping._fields)
+_EXTRA = _ROTATIONAL + len(ExtraDamping._fields)
 
 
 class Start(NamedTuple):
@@ -81,7 +94,9 @@ def hull(p: Any, effects: VesselEffects) -> Hull:
     damping = Damping(
         TowedDamping._make(map(add, nominal.towed, change[:_TOWED])),
         RotationalDamping._make(map(add, nominal.rotational, change[_TOWED:_ROTATIONAL])),
-        ExtraDamping._make(map(add, nominal.extra, change[_ROTATIONAL:])),
+        ExtraDamping._make(map(add, nominal.extra, change[_ROTATIONAL:_EXTRA])),
+        type(nominal.further)._make(map(add, nominal.further, change[_EXTRA:])),
+        nominal.functions,
     )
     return Hull(inertia, inverse_mass(inertia), damping)
 
@@ -221,20 +236,57 @@ def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Tri
     return after, law(after, tau, b)
 
 
-def make(effects: EffectSet = STANDARD) -> Component:
-    """The FMU of the vessel with some effects, each off until a parameter says otherwise."""
-    groups = vessel_effects(effects)
+def described(ship: Description) -> tuple[Any, Any, Any]:
+    """Inertia, damping and start of a described ship, with where their values come from."""
+    given = ship.values()
+
+    def valued(v: Variable) -> Variable:
+        start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
+        return start.of(v, "inertia" if v.name in Inertia._fields else "damping")
+
+    own = [v.name for v in variables(Damping)]
+    further = [v for v in ship.terms if v.name not in own]
+    groups = {
+        name: redeclared(type(group), valued)()
+        for name, group in zip(Damping._fields, Damping(), strict=True)
+    }
+    groups["further"] = group_of("FurtherDamping", [valued(term_variable(v.name)) for v in further])()
+    groups["functions"] = bundle(
+        "HullFunctions", **{part.law: _function(part)() for part in ship.functions}
+    )()
+    start = redeclared(Start, ship.scale.of)()
+    return redeclared(Inertia, valued)(), bundle("Damping", **groups)(), start
+
+
+def _function(part: Part) -> type[Any]:
+    """Parameters of a function of the hull, as a description gives them."""
+    given = {v.name: v for v in part.values}
+    declared = parameters_of(part.law, 3, FUNCTIONS[part.law])
+    return group_of(
+        part.law, [given[v.name].of(v, "damping") if v.name in given else v for v in declared]
+    )
+
+
+def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component:
+    """The FMU of the vessel with some effects, each off until a parameter says otherwise.
+
+    Args:
+        effects: that it has.
+        ship: whose hull it is; None: CyberShip Enterprise 1's.
+    """
+    inertia, damping, start = (Inertia(), Damping(), Start()) if ship is None else described(ship)
+    groups = vessel_effects(effects, type(damping))
     unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
     params = bundle(
         "Params",
-        inertia=Inertia(),
-        damping=Damping(),
+        inertia=inertia,
+        damping=damping,
         change=groups.changes.params(),
         outside=groups.outside.params(),
         water=groups.water.params(),
         heavier=groups.inertia.params(),
         measurement=groups.measurement.params(),
-        start=Start(),
+        start=start,
     )
     outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
@@ -281,7 +333,7 @@ def make(effects: EffectSet = STANDARD) -> Component:
 
     return Component(
         name="vessel",
-        description="Hull of CyberShip Enterprise 1 in surge, sway and yaw",
+        description=f"Hull of {ship.title if ship else 'CyberShip Enterprise 1'} in surge, sway and yaw",
         params=params,
         state=State,
         inputs=Force,

@@ -32,9 +32,9 @@ class VesselEffects(NamedTuple):
 
 
 @cache
-def vessel_effects(effects: EffectSet) -> VesselEffects:
-    """The groups of a set of effects."""
-    order = [v.name for v in variables(Damping)]
+def vessel_effects(effects: EffectSet, damping: type[Any] = Damping) -> VesselEffects:
+    """The groups of a set of effects, for a hull with these damping coefficients."""
+    order = [v.name for v in variables(damping)]
     forces = effects.of_kind("force", "environment")
     changes = sorted((e for e in forces if e.gives in order), key=lambda e: order.index(e.gives))
     outside = [e for e in forces if e.gives == "force"]

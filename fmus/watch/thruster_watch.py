@@ -241,6 +241,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
 
 COMPONENT = Component(
     name="watch_thrusters",
+    any_ship=False,
     description="Detector of thrusters that lose force, by the model error",
     params=Params,
     state=State,

@@ -1,0 +1,286 @@
+"""The actuators of a described ship: their parameters, their force, and what each is asked for."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+from ..declare import Known, Range, Variable, group_of, variables
+from ..description import Description
+from ..hull import Triple
+from ..ops import Number, clip, fmax, where
+from . import laws as laws  # registers the laws
+from .failings import Actuator, Pushing, Working
+from .law import Flow, Law
+from .response import Layout, Prepared
+
+PASSES = 2  # of the allocation: what the first one clips is asked of the others
+TINY = 1e-9  # share by which a matrix that has no inverse gets one
+
+
+@cache
+def actuators(ship: Description) -> tuple[Actuator, ...]:
+    """The actuators of a ship, each with its law and the place of its commands."""
+    found: list[Actuator] = []
+    first = 0
+    for k, part in enumerate(ship.actuators):
+        law = Law.known[part.law]
+        found.append(Actuator(k, first, part, law, ship.scale))
+        first += len(law.commands)
+    return tuple(found)
+
+
+@cache
+def command_units(ship: Description) -> dict[str, str]:
+    """``ACTUATOR.COMMAND`` of every command of a ship, and its unit."""
+    return {f"{a.part.name}.{c.name}": c.unit for a in actuators(ship) for c in a.law.commands}
+
+
+def command_names(ship: Description) -> tuple[str, ...]:
+    """``ACTUATOR.COMMAND`` of every command of a ship."""
+    return tuple(command_units(ship))
+
+
+def variable(command: str) -> str:
+    """The name that a command has among the variables of an FMU."""
+    return command.replace(".", "_")
+
+
+def parameters(a: Actuator, prefix: str, known: bool) -> type[Any]:
+    """Parameters of an actuator: those of its law, and its place.
+
+    Args:
+        a: the actuator.
+        prefix: of their names.
+        known: whether they are of the real ship, with where their values come from.
+    """
+    name, title = a.part.name, a.part.title
+    place = [
+        Variable("x", "m", "place, forward of the body origin", 0.0, Range(), False),
+        Variable("y", "m", "place, to starboard", 0.0, Range(), False),
+    ]
+    given = {v.name: v for v in a.part.values}
+    found: list[Variable] = []
+    for v in [*variables(a.law.Parameters), *place]:
+        start, fit = v.start, None
+        if v.name in given:
+            value = given[v.name]
+            start = value.value
+            fits = start != 0.0 and value.share > 0.0 and v.name not in a.law.limiting
+            if known and fits:
+                fit = Known("place" if v.name in ("x", "y") else "thrust", value.origin, value.share)
+        text = f"{title}: {v.description}"
+        found.append(Variable(f"{prefix}{name}_{v.name}", v.unit, text, start, v.range, False, fit))
+    return group_of(f"{prefix}{name}", found)
+
+
+def law_of(a: Actuator, values: Any) -> tuple[Any, Any, Any]:
+    """Parameters of an actuator's law, and its place x, y [m, m]."""
+    *own, x, y = values
+    return a.law.Parameters._make(own), x, y
+
+
+def within(a: Actuator, commands: Sequence[Any], p: Any) -> tuple[Any, ...]:
+    """Commands brought within their limits."""
+    limits = a.law.limits(p)
+    return tuple([clip(c, low, high) for c, (low, high) in zip(commands, limits, strict=True)])
+
+
+def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
+    """Velocity of a place on the ship."""
+    return Flow(u - y * r, v + x * r)
+
+
+def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) -> Pushing:
+    """The force of each actuator, nothing wrong with it.
+
+    Args:
+        ship: its actuators.
+        commands: of all of them.
+        nu: u, v, r [m/s, m/s, rad/s].
+        values: parameters of each actuator.
+    """
+    X, Y, xs, ys = [], [], [], []
+    for a, own in zip(actuators(ship), values, strict=True):
+        p, x, y = law_of(a, own)
+        f_x, f_y = a.law.force(within(a, commands[a.commands], p), flow_at(*nu, x, y), p)
+        X.append(f_x)
+        Y.append(f_y)
+        xs.append(x)
+        ys.append(y)
+    return Pushing(tuple(X), tuple(Y), tuple(xs), tuple(ys))
+
+
+def total(f: Pushing) -> Triple:
+    """tau [N, N, N m] of the forces of all actuators."""
+    X, Y, N = 0.0, 0.0, 0.0
+    for f_x, f_y, x, y in zip(f.X, f.Y, f.x, f.y, strict=True):
+        X, Y, N = X + f_x, Y + f_y, N + x * f_y - y * f_x
+    N = N + f.dx * Y - f.dy * X
+    return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
+
+
+class Component(NamedTuple):
+    """A force that an actuator can be asked for: whose it is, and along which axis of the ship."""
+
+    actuator: Actuator
+    along: str
+
+
+@cache
+def components(ship: Description) -> tuple[Component, ...]:
+    """The forces that a ship's actuators can be asked for."""
+    return tuple([Component(a, axis) for a in actuators(ship) for axis in a.law.components])
+
+
+@cache
+def axes(ship: Description) -> tuple[int, ...]:
+    """The axes of tau (0: X, 1: Y, 2: N) that a ship can be asked for.
+
+    Sway only where the actuators push in sway at two places, or two ways: else it comes with the turn.
+    """
+    columns = [
+        _column(c, c.actuator.part.number("x"), c.actuator.part.number("y")) for c in components(ship)
+    ]
+    able = [k for k in range(3) if any(column[k] for column in columns)]
+    if len(able) == 3 and _independent(columns) < TINY:
+        able.remove(1)
+    return tuple(able)
+
+
+def _independent(columns: Sequence[Triple]) -> float:
+    """Determinant of B B' with rows of unit length: 0 where one axis follows from the others."""
+    sizes = [sum(column[k] ** 2 for column in columns) ** 0.5 for k in range(3)]
+    rows = [
+        [sum(b[i] * b[j] for b in columns) / (sizes[i] * sizes[j]) for j in range(3)] for i in range(3)
+    ]
+    (a, b, c), (_, e, f), (_, _, i) = rows
+    return a * (e * i - f * f) - b * (b * i - f * c) + c * (b * f - e * c)
+
+
+def _column(c: Component, x: Number, y: Number) -> Triple:
+    """tau [N, N, N m] of one newton along a component."""
+    return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
+
+
+def allocate(ship: Description, tau: Triple, nu: Triple, values: Any) -> tuple[Any, ...]:
+    """Commands that give a force as nearly as the actuators can: weighted least squares within limits.
+
+    Each force is weighed by what its actuator can give; what a limit cuts off is asked of the others
+    (redistributed pseudo-inverse: Johansen and Fossen 2013, Automatica 49, section 2.2). An axis that
+    the ship cannot give is not asked for.
+
+    Args:
+        ship: its actuators.
+        tau: force to give [N, N, N m].
+        nu: u, v, r [m/s, m/s, rad/s], by which a rudder's force goes.
+        values: what the allocation believes of each actuator.
+
+    Returns:
+        The commands, within their limits.
+    """
+    asked, parts = axes(ship), components(ship)
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    columns, spans = [], []
+    for c in parts:
+        p, x, y = every[c.actuator.k]
+        column = _column(c, x, y)
+        columns.append([column[k] for k in asked])
+        span = c.actuator.law.reach(flow_at(*nu, x, y), p)
+        spans.append(span[c.actuator.law.components.index(c.along)])
+    weights = [0.25 * (high - low) * (high - low) for low, high in spans]
+    found: list[Any] = [0.0 * tau[0]] * len(parts)
+    for _ in range(PASSES):
+        left = [tau[k] for k in asked]
+        for f, column in zip(found, columns, strict=True):
+            left = [rest - f * b for rest, b in zip(left, column, strict=True)]
+        more = _least(columns, weights, left)
+        wanted = [f + g for f, g in zip(found, more, strict=True)]
+        found = [clip(w, low, high) for w, (low, high) in zip(wanted, spans, strict=True)]
+        weights = [
+            where(abs(w - f) > 0.0, 0.0, weight)
+            for w, f, weight in zip(wanted, found, weights, strict=True)
+        ]
+    commands: list[Any] = []
+    for a in actuators(ship):
+        p, x, y = every[a.k]
+        own = tuple([f for f, c in zip(found, parts, strict=True) if c.actuator is a])
+        if own:
+            given = a.law.commanded(own, flow_at(*nu, x, y), p)
+        else:
+            given = tuple([0.0 * tau[0]] * len(a.law.commands))
+        commands += within(a, given, p)
+    return tuple(commands)
+
+
+def _least(columns: Sequence[Sequence[Any]], weights: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+    """f = W B' (B W B' + e I)^-1 tau for the columns of B, by elimination."""
+    n = range(len(wanted))
+    rows = [
+        [sum_of([w * b[i] * b[j] for w, b in zip(weights, columns, strict=True)]) for j in n] for i in n
+    ]
+    rows = [
+        [x * (1.0 + TINY) + TINY if i == j else x for j, x in enumerate(row)]
+        for i, row in enumerate(rows)
+    ]
+    right = list(wanted)
+    for k in n:
+        for i in range(k + 1, len(wanted)):
+            share = rows[i][k] / rows[k][k]
+            rows[i] = [x - share * y for x, y in zip(rows[i], rows[k], strict=True)]
+            right[i] = right[i] - share * right[k]
+    for k in reversed(n):
+        known = sum_of([rows[k][j] * right[j] for j in range(k + 1, len(wanted))])
+        right[k] = (right[k] - known) / rows[k][k]
+    return [w * sum_of([b[i] * right[i] for i in n]) for w, b in zip(weights, columns, strict=True)]
+
+
+def sum_of(values: Sequence[Any]) -> Any:
+    """The sum of some numbers, from the first to the last."""
+    found: Any = 0.0
+    for x in values:
+        found = found + x
+    return found
+
+
+def largest(ship: Description, values: Any) -> Triple:
+    """The largest force and moment on each axis [N, N, N m], of all actuators at rest together."""
+    found = [0.0, 0.0, 0.0]
+    for c in components(ship):
+        p, x, y = law_of(c.actuator, values[c.actuator.k])
+        low, high = c.actuator.law.reach(Flow(), p)[c.actuator.law.components.index(c.along)]
+        for axis, part in enumerate(_column(c, x, y)):
+            found[axis] += abs(part) * max(-low, high)
+    return found[0], found[1], found[2]
+
+
+def working(
+    ship: Description, t: Number, u: Number, v: Number, r: Number, commands: Any, values: Any
+) -> Working:
+    """What the force of a ship's actuators may depend on."""
+    part: list[Any] = []
+    for a, own in zip(actuators(ship), values, strict=True):
+        p, _, _ = law_of(a, own)
+        for c, (low, high) in zip(commands[a.commands], a.law.limits(p), strict=True):
+            part.append(clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0))
+    return Working(t, u, v, r, tuple(commands), tuple(part))
+
+
+@cache
+def layout(ship: Description) -> Layout:
+    """How the commands of a ship become a force, with what is wrong with its actuators."""
+
+    def act(acting: Any, now: Working, b: Prepared) -> Triple:
+        f = forces(ship, acting, (now.u, now.v, now.r), b.params.plant)
+        for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
+            f = member.apply(acts, b.params.wrong, f, f, now)
+        return total(f)
+
+    at_rest = (0.0, 0.0, 0.0)
+    return Layout(
+        commands=tuple(map(variable, command_names(ship))),
+        running=lambda t, u, v, r, c, b: working(ship, t, u, v, r, c, b.params.plant),
+        act=act,
+        believed=lambda c, p: total(forces(ship, c, at_rest, p.allocation)),
+        allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
+        full=lambda p: largest(ship, p.allocation),
+    )

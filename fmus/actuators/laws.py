@@ -1,0 +1,299 @@
+"""The laws of actuators that descriptions may name."""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import POSITIVE, Range
+from ..ops import Number, atan2, clip, cos, fmax, fmin, power, sin, sqrt, where
+from .law import Command, Flow, Law, Span
+
+DIVISOR = Range(min=1e-6)
+SMALL = 1e-12  # in place of zero, by which nothing can be divided
+SHAFT_SPEED = Command("n", "1/s", "shaft speed")
+
+
+def signed_root(x: Number) -> Number:
+    """The number whose square with its sign is x."""
+    size = sqrt(abs(x))
+    return where(x < 0.0, -size, size)
+
+
+class Bollard(NamedTuple):
+    """Thrust by the square of the shaft speed, as pulled at a bollard."""
+
+    k_ahead: Annotated[float, "N.s2", "thrust ahead by n^2", DIVISOR] = 1.0
+    k_astern: Annotated[float, "N.s2", "thrust astern by n^2", DIVISOR] = 1.0
+    n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern"] = -1.0
+
+
+def bollard_thrust(n: Number, p: Any) -> Number:
+    """Thrust [N] by the square of the shaft speed n [1/s]."""
+    return where(n > 0.0, p.k_ahead, p.k_astern) * n * abs(n)
+
+
+def bollard_speed(thrust: Number, p: Any) -> Number:
+    """The shaft speed [1/s] that gives a thrust [N]."""
+    return signed_root(thrust / where(thrust > 0.0, p.k_ahead, p.k_astern))
+
+
+class FixedPropeller(Law):
+    """Propeller on a fixed shaft, whose thrust is that at a bollard."""
+
+    name = "fixed_propeller"
+    commands = (SHAFT_SPEED,)
+    components = "X"
+    Parameters = Bollard
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((p.n_min, p.n_max),)
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        (n,) = commands
+        return bollard_thrust(n, p), 0.0 * n
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        return ((bollard_thrust(p.n_min, p), bollard_thrust(p.n_max, p)),)
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        return (bollard_speed(forces[0], p),)
+
+
+class OpenWater(NamedTuple):
+    """K_T = K_T0 + K_T1 J + K_T2 J^2, J = (1 - w) u / (n D)."""
+
+    diameter: Annotated[float, "m", "diameter of the propeller", DIVISOR] = 0.1
+    K_T0: Annotated[float, "1", "thrust coefficient at a bollard", DIVISOR] = 0.4
+    K_T1: Annotated[float, "1", "its slope over the advance ratio"] = 0.0
+    K_T2: Annotated[float, "1", "its curvature over the advance ratio"] = 0.0
+    wake: Annotated[float, "1", "wake fraction w_P", Range(-0.5, 0.9)] = 0.0
+    thrust_deduction: Annotated[float, "1", "thrust deduction fraction t", Range(-0.5, 0.9)] = 0.0
+    astern: Annotated[float, "1", "thrust astern, as a share of that ahead", DIVISOR] = 1.0
+    water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
+    n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern"] = -1.0
+
+
+class OpenWaterPropeller(Law):
+    """Propeller with an open-water curve, wake and thrust deduction (Yasukawa and Yoshimura 2015)."""
+
+    name = "open_water_propeller"
+    commands = (SHAFT_SPEED,)
+    components = "X"
+    Parameters = OpenWater
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((p.n_min, p.n_max),)
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        (n,) = commands
+        advance = (1.0 - p.wake) * flow.u
+        # n |n| K_T(J), multiplied out, so that a propeller at rest needs no J.
+        square = p.K_T0 * n * abs(n)
+        slope = p.K_T1 * advance * abs(n) / p.diameter
+        rest = p.K_T2 * advance * advance / (p.diameter * p.diameter)
+        thrust = where(n < 0.0, p.astern * (square + slope), square + slope + rest)
+        thrust = where(n == 0.0, 0.0 * n, thrust)
+        return (1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0) * thrust, 0.0 * n
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        low, _ = OpenWaterPropeller.force((p.n_min,), flow, p)
+        high, _ = OpenWaterPropeller.force((p.n_max,), flow, p)
+        return ((fmin(0.0, low), fmax(0.0, high)),)
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        wanted = forces[0] / ((1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0))
+        advance = (1.0 - p.wake) * flow.u
+        slope = p.K_T1 * advance / p.diameter
+        rest = p.K_T2 * advance * advance / (p.diameter * p.diameter) - wanted
+        ahead = (-slope + sqrt(fmax(0.0, slope * slope - 4.0 * p.K_T0 * rest))) / (2.0 * p.K_T0)
+        back = fmax(0.0, slope * slope - 4.0 * p.K_T0 * wanted / p.astern)
+        astern = (slope - sqrt(back)) / (2.0 * p.K_T0)
+        return (where(wanted < 0.0, fmin(0.0, astern), fmax(0.0, ahead)),)
+
+
+class Tunnel(NamedTuple):
+    F: Annotated[float, "N", "force to starboard at full command", DIVISOR] = 1.0
+
+
+class TunnelThruster(Law):
+    """Thruster in a tunnel across the ship, whose force is linear in its command."""
+
+    name = "tunnel_thruster"
+    commands = (Command("u", "1", "command, -1...1"),)
+    components = "Y"
+    Parameters = Tunnel
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((-1.0, 1.0),)
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        (u,) = commands
+        return 0.0 * u, p.F * u
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        return ((-p.F, p.F),)
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        return (forces[0] / p.F,)
+
+
+class VoithSchneider(Law):
+    """Voith Schneider propeller: a force in any direction, linear in two commands, (2.10)."""
+
+    name = "voith_schneider"
+    commands = (
+        Command("x", "1", "command in surge, -1...1"),
+        Command("y", "1", "command in sway, -1...1"),
+    )
+    components = "XY"
+    Parameters = Tunnel
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((-1.0, 1.0), (-1.0, 1.0))
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        x, y = commands
+        return p.F * x, p.F * y
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        return ((-p.F, p.F), (-p.F, p.F))
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        return forces[0] / p.F, forces[1] / p.F
+
+
+class Azimuth(NamedTuple):
+    k_ahead: Annotated[float, "N.s2", "thrust by n^2", DIVISOR] = 1.0
+    k_astern: Annotated[float, "N.s2", "thrust by n^2 where it turns backwards", DIVISOR] = 1.0
+    n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns backwards"] = 0.0
+    alpha_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 3.2
+
+
+class AzimuthThruster(Law):
+    """Propeller that turns about a vertical axis: its thrust at a bollard, at an angle from ahead."""
+
+    name = "azimuth"
+    commands = (Command("alpha", "rad", "angle of the thrust, from ahead to starboard"), SHAFT_SPEED)
+    components = "XY"
+    limiting = ("n_max", "n_min", "alpha_max")
+    Parameters = Azimuth
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((-p.alpha_max, p.alpha_max), (p.n_min, p.n_max))
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        alpha, n = commands
+        thrust = bollard_thrust(n, p)
+        return thrust * cos(alpha), thrust * sin(alpha)
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        most = bollard_thrust(p.n_max, p)
+        return ((-most, most), (-most, most))
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        X, Y = forces
+        most = bollard_thrust(p.n_max, p)
+        return atan2(Y, X), bollard_speed(fmin(sqrt(X * X + Y * Y), most), p)
+
+
+class Foil(NamedTuple):
+    area: Annotated[float, "m2", "area of the rudder", DIVISOR] = 0.01
+    lift: Annotated[float, "1/rad", "slope of the normal force's coefficient, f_alpha", DIVISOR] = 2.5
+    delta_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 0.61
+    wake: Annotated[float, "1", "wake fraction at the rudder", Range(-0.5, 0.9)] = 0.0
+    steering_deduction: Annotated[float, "1", "t_R, share of resistance that is not felt"] = 0.0
+    hull_force: Annotated[float, "1", "a_H, force on the hull by the rudder, as a share"] = 0.0
+    water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
+
+
+class Rudder(Law):
+    """Rudder in a free flow: a normal force by the square of the flow (Yasukawa and Yoshimura 2015).
+
+    A positive angle of a rudder aft turns the ship to starboard.
+    """
+
+    name = "rudder"
+    commands = (Command("delta", "rad", "rudder angle"),)
+    components = "Y"
+    limiting = ("delta_max",)
+    Parameters = Foil
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((-p.delta_max, p.delta_max),)
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        (delta,) = commands
+        u = (1.0 - p.wake) * flow.u
+        square = u * u + flow.v * flow.v
+        angle = delta - flow.v / where(abs(u) > SMALL, u, SMALL)
+        normal = 0.5 * p.water_density * p.area * p.lift * square * sin(clip(angle, -1.57, 1.57))
+        along = (1.0 - p.steering_deduction) * normal * sin(delta)
+        return -along, -(1.0 + p.hull_force) * normal * cos(delta)
+
+    @staticmethod
+    def _slope(flow: Flow, p: Any) -> Number:
+        """Sway force [N/rad] by the angle, near amidships and without drift."""
+        u = (1.0 - p.wake) * flow.u
+        return -(1.0 + p.hull_force) * 0.5 * p.water_density * p.area * p.lift * u * u
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        most = -Rudder._slope(flow, p) * p.delta_max
+        return ((-most, most),)
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        return (forces[0] / fmin(Rudder._slope(flow, p), -SMALL),)
+
+
+class Given(NamedTuple):
+    F_X: Annotated[float, "N", "largest force ahead and astern", DIVISOR] = 1.0
+    F_Y: Annotated[float, "N", "largest force to starboard and port", DIVISOR] = 1.0
+
+
+class GivenForce(Law):
+    """A force that is given, as a tug's or a winch's."""
+
+    name = "given_force"
+    commands = (Command("X", "N", "force ahead"), Command("Y", "N", "force to starboard"))
+    components = "XY"
+    Parameters = Given
+
+    @staticmethod
+    def limits(p: Any) -> tuple[Span, ...]:
+        return ((-p.F_X, p.F_X), (-p.F_Y, p.F_Y))
+
+    @staticmethod
+    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        return commands[0], commands[1]
+
+    @staticmethod
+    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+        return GivenForce.limits(p)
+
+    @staticmethod
+    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        return forces

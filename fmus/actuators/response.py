@@ -1,0 +1,169 @@
+"""From commands to what reaches the actuators of any ship: delay, limit of rate, lag.
+
+Commands pass the effects with a memory of commands (a delay), the limit of their rate, the
+characteristic of the thrusters, and the effects with a memory of forces (a lag). What becomes of them
+then is of the ship: see :class:`Layout`. The functions run on floats, step by step in an FMU, and on
+arrays, which is how a diagnosis computes whole series with them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+from ..effects import EffectSet, Memory
+from ..effects.group import Group, Member, group
+from ..hull import Triple
+from ..ops import Number, clip, when
+
+
+class Layout(NamedTuple):
+    """What a ship has for thrusters: how many commands they get, and how these become a force.
+
+    Attributes:
+        commands: names of their variables, in the order of all tuples of commands and shares.
+        running: ``running(t, u, v, r, commands, b)``: what a thruster's force may depend on.
+        act: ``act(shares, running, b)``: tau [N, N, N m], effects included.
+        believed: ``believed(commands, params)``: tau that the allocation expects of commands at rest.
+        allocate: ``allocate(tau, params)``: the commands, or shares of full force, that give a force.
+        full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
+        placed: ``placed(b, aside, power)``: the thrusters where they are one of two sets, ``aside`` [m]
+            to starboard, at a power of the run or None. Only a ship with two sets has it.
+    """
+
+    commands: tuple[str, ...]
+    running: Callable[..., Any]
+    act: Callable[[Any, Any, Any], Triple]
+    believed: Callable[[Any, Any], Triple]
+    allocate: Callable[[Triple, Any], tuple[Any, ...]]
+    full: Callable[[Any], Triple]
+    placed: Callable[[Any, Any, Any], Any] = lambda b, aside, power: b
+
+
+class ThrusterEffects(NamedTuple):
+    """The effects of a set that act on thrusters.
+
+    Attributes:
+        layout: of the thrusters.
+        dynamics: those with a memory.
+        forces: those without.
+        remembering: of dynamics, those with a memory of commands and those with one of forces, each with
+            its place among the memories.
+    """
+
+    layout: Layout
+    dynamics: Group
+    forces: Group
+    remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
+
+
+@cache
+def thruster_effects(effects: EffectSet, layout: Layout) -> ThrusterEffects:
+    """The groups of a set of effects; those with a memory of commands come first."""
+    actuator = [e for e in effects.of_kind("actuator") if e.function is not None]
+    slow = [e for of in ("command", "force") for e in actuator if e.memory and e.memory.of == of]
+    dynamics = group("Dynamics", slow)
+    remembering: dict[str, list[tuple[int, Member, Memory]]] = {"command": [], "force": []}
+    for k, member in enumerate(dynamics.members):
+        memory = member.effect.memory
+        assert memory is not None
+        remembering[memory.of].append((k, member, memory))
+    forces = group("ThrusterEffects", [e for e in actuator if e.memory is None])
+    return ThrusterEffects(layout, dynamics, forces, remembering)
+
+
+class Past(NamedTuple):
+    """What the thrusters remember: time [s], the memory of each slow effect, the last command."""
+
+    t: Any
+    memories: tuple[Any, ...]
+    limited: tuple[Any, ...]
+
+
+def at_rest(effects: ThrusterEffects) -> Past:
+    """The past of thrusters that were never at work."""
+    width = len(effects.layout.commands)
+    memories = [member.effect.memory for member in effects.dynamics.members]
+    return Past(0.0, tuple([m.start(width) for m in memories if m is not None]), (0.0,) * width)
+
+
+class Prepared(NamedTuple):
+    """What follows from the parameters alone: which effects act.
+
+    Attributes:
+        params: of the thrusters.
+        effects: of the thrusters.
+        slow: for each effect with a memory, whether it acts.
+        acting: for each effect without, whether it acts.
+        any_acts: whether any of these acts.
+        aside: how far to starboard [m] of the middle these thrusters sit, where they are one set of two.
+    """
+
+    params: Any
+    effects: ThrusterEffects
+    slow: tuple[Any, ...]
+    acting: tuple[Any, ...]
+    any_acts: Any
+    aside: Any = 0.0
+
+
+def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
+    """Everything that a step needs of the parameters."""
+    return Prepared(
+        p,
+        effects,
+        effects.dynamics.acting(p.dynamics),
+        effects.forces.acting(p.wrong),
+        effects.forces.any_acts(p.wrong),
+    )
+
+
+def remember(
+    memories: tuple[Any, ...], signals: tuple[Any, ...], of: str, b: Prepared, h: Number
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """The memories a step later, and what they make of commands or of shares of full force.
+
+    Args:
+        memories: of all effects that have one.
+        signals: commands, or shares.
+        of: which of the two, "command" or "force".
+        b: the thrusters.
+        h: step [s].
+    """
+    found = list(memories)
+    for k, member, memory in b.effects.remembering[of]:
+        idle = found[k] if memory.idle is None else memory.idle(found[k], signals)
+        if b.slow[k] is False:
+            found[k] = idle
+            continue
+        otherwise = idle, signals
+        found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
+    return tuple(found), signals
+
+
+def rate_limited(before: Number, wanted: Number, rate: Number, h: Number) -> Number:
+    """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second."""
+    most = rate * h
+    return before + clip(wanted - before, -most, most)
+
+
+def command_response(
+    s: Past, commands: tuple[Any, ...], b: Prepared, h: Number
+) -> tuple[Past, tuple[Any, ...]]:
+    """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
+    memories, given = remember(s.memories, commands, "command", b, h)
+    rates = b.params.rate if len(b.params.rate) == len(given) else (b.params.rate[0],) * len(given)
+    given = tuple(
+        [
+            when(rate > 0.0, lambda x=x, w=w, rate=rate: rate_limited(x, w, rate, h), lambda w=w: w)
+            for x, w, rate in zip(s.limited, given, rates, strict=True)
+        ]
+    )
+    return Past(s.t + h, memories, given), given
+
+
+def force_response(
+    s: Past, shares: tuple[Any, ...], b: Prepared, h: Number
+) -> tuple[Past, tuple[Any, ...]]:
+    """The shares of full force that act after a step of h [s], for those of the characteristic."""
+    memories, shares = remember(s.memories, shares, "force", b, h)
+    return s._replace(memories=memories), shares

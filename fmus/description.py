@@ -1,0 +1,92 @@
+"""The description of a ship, as every component reads it: plain nested tuples of texts and numbers.
+
+Its ``repr`` is Python that makes it again, which is how an FMU carries the ship that it was built for.
+Files are read by :mod:`fmus.ships.ship_file`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from .declare import Known, Variable
+from .scale import REFERENCE_LENGTH, Scale
+
+
+class Value(NamedTuple):
+    """A number of a description, and how well it is known.
+
+    Attributes:
+        name: of the parameter.
+        value: in the parameter's unit.
+        origin: where it comes from: weighed, tank test, borrowed, guessed, or a publication.
+        share: standard deviation, as a share of the value.
+    """
+
+    name: str
+    value: float
+    origin: str
+    share: float
+
+    def of(self, v: Variable, group: str) -> Variable:
+        """The declaration of a parameter that starts at this value."""
+        known = None if self.value == 0.0 else Known(group, self.origin, self.share)
+        return replace(v, start=self.value, known=known)
+
+
+class Part(NamedTuple):
+    """What a description names by the law that it follows: an actuator, or a function of the hull.
+
+    Attributes:
+        name: of the actuator; of a function of the hull that of the law.
+        law: see :mod:`fmus.actuators.laws` and :mod:`fmus.hull_functions`.
+        title: what people call it.
+        values: of its parameters; what is not named is as the law declares it.
+    """
+
+    name: str
+    law: str
+    title: str
+    values: tuple[Value, ...]
+
+    def number(self, name: str, otherwise: float = 0.0) -> float:
+        """A number of the part, by its name."""
+        return next((v.value for v in self.values if v.name == name), otherwise)
+
+
+class Description(NamedTuple):
+    """A ship.
+
+    Attributes:
+        name: by which it is called, as ``--ship`` has it.
+        title: its name for people.
+        source: publications that its numbers are from.
+        length: L_pp [m], which sets the scale of the ship.
+        beam: [m].
+        outline: corners (forward, to starboard) [m, m] of the waterline, from the body origin.
+        inertia: parameters of :class:`fmus.hull.Inertia`.
+        terms: damping coefficients, each named by its axis and its product of speeds.
+        functions: damping that is no product of speeds.
+        actuators: what drives it, in the order of its commands.
+        allocates: whether its thrusters get a force to give; else commands of each actuator.
+    """
+
+    name: str
+    title: str
+    source: str
+    length: float
+    beam: float
+    outline: tuple[tuple[float, float], ...]
+    inertia: tuple[Value, ...]
+    terms: tuple[Value, ...]
+    functions: tuple[Part, ...] = ()
+    actuators: tuple[Part, ...] = ()
+    allocates: bool = True
+
+    @property
+    def scale(self) -> Scale:
+        """Its size beside that of CyberShip Enterprise 1."""
+        return Scale(self.length / REFERENCE_LENGTH)
+
+    def values(self) -> Mapping[str, Value]:
+        """Numbers of the hull, by the name of the parameter."""
+        return {v.name: v for v in (*self.inertia, *self.terms)}

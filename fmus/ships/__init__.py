@@ -1,0 +1,1 @@
+"""Described ships: the files that they are read from, and what is made of them."""

@@ -1,0 +1,35 @@
+"""The effects that a described ship may have: those of every ship, and those of its own parts."""
+
+from functools import cache
+
+from ..actuators.actuation import actuators, command_names
+from ..actuators.failings import failings
+from ..declare import variables
+from ..description import Description
+from ..effects import STANDARD, EffectSet
+from ..effects.force import further_change
+from ..hull import Damping, term_variable
+
+
+@cache
+def effects_of_ship(ship: Description, effects: EffectSet = STANDARD) -> EffectSet:
+    """The effects of a ship, made for its size.
+
+    Args:
+        ship: each of its actuators has its failings, each further product of its damping a change.
+        effects: of this project, with or without a user's; those that need thrusters of another ship
+            are left out.
+
+    Raises:
+        DeclarationError: an actuator's effect has the id or a parameter of another one.
+    """
+    own = {v.name for v in variables(Damping)}
+    width = len(command_names(ship))
+    return EffectSet(
+        [
+            *[e for a in actuators(ship) for e in failings(a, width)],
+            *effects.at(ship.scale, ()).values(),
+            *[further_change(term_variable(t.name)) for t in ship.terms if t.name not in own],
+        ],
+        effects.files,
+    )

@@ -1,0 +1,314 @@
+"""Reads the description of a ship: a TOML file, checked as a whole before anything is made of it."""
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
+
+from ..actuators import laws as laws  # registers the laws
+from ..actuators.law import Law
+from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
+from ..description import Description, Part, Value
+from ..hull import Inertia, term
+from ..hull_functions import FUNCTIONS
+
+FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
+MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
+NAME = r"^[a-z][a-z0-9_]*$"
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Strict(BaseModel):
+    """A table in which a key that is not known is an error."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+class Number(Strict):
+    """A number, where it comes from, and its standard deviation."""
+
+    value: Finite = Field(description="in SI units")
+    origin: str = Field("guessed", description="weighed, tank test, borrowed, guessed, or a publication")
+    std: PositiveFloat | None = Field(
+        None, description="standard deviation in the number's unit", allow_inf_nan=False
+    )
+    share: float | None = Field(
+        None, ge=0.0, le=10.0, description="standard deviation as a share of the value; 0: exact"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> "Number":
+        if self.std is not None and self.share is not None:
+            raise ValueError("a number has std or share, not both")
+        if self.std is not None and self.value == 0.0:
+            raise ValueError("a number that is 0 has no std: it stays as it is")
+        return self
+
+    def named(self, name: str) -> Value:
+        """The number as components read it."""
+        share = 0.5 if self.share is None else self.share
+        if self.std is not None:
+            share = self.std / abs(self.value)
+        return Value(name, self.value, self.origin, share)
+
+
+Given = Finite | Number
+
+
+def _value(name: str, given: "float | Number") -> Value:
+    return (given if isinstance(given, Number) else Number.model_validate({"value": given})).named(name)
+
+
+class Term(Number):
+    """A damping force: a coefficient times a product of u, v, r, |u|, |v| and |r|."""
+
+    axis: Annotated[str, Field(pattern="^[XYN]$", description="X, Y or N")]
+    product: Annotated[str, Field(max_length=40, description="such as u, |u|u, uv or |v|r")]
+
+    @property
+    def name(self) -> str:
+        """The name of the coefficient, absolute values first, as in Y_absr_v."""
+        rest = self.product.replace(" ", "")
+        sizes = sorted(rest[i + 1] for i in range(len(rest) - 2) if rest[i] == rest[i + 2] == "|")
+        for one in sizes:
+            rest = rest.replace(f"|{one}|", "", 1)
+        coefficient = f"{self.axis}_{''.join(f'abs{one}_' for one in sizes)}{''.join(sorted(rest))}"
+        return coefficient.removesuffix("_")
+
+    @model_validator(mode="after")
+    def _is_product(self) -> "Term":
+        try:
+            term(self.name)
+        except ValueError:
+            raise ValueError(
+                f"'{self.product}' is no product of u, v, r, |u|, |v| and |r|, as |u|u or uv is"
+            ) from None
+        return self
+
+
+class HullTable(Strict):
+    """What the water does to the hull."""
+
+    terms: list[Term] = []
+    functions: dict[str, dict[str, Given]] = {}
+
+
+class ActuatorTable(BaseModel):
+    """An actuator: its name, law and title, and the numbers of its law."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: Annotated[str, Field(pattern=NAME, max_length=30)]
+    law: str
+    title: Annotated[str, Field(max_length=60)] = ""
+
+
+class ShipTable(Strict):
+    """The description of a ship."""
+
+    name: Annotated[str, Field(pattern=NAME, max_length=40)]
+    title: Annotated[str, Field(min_length=1, max_length=100)]
+    source: str = ""
+    length: Annotated[float, Field(gt=0.01, lt=1000.0, description="L_pp [m]")]
+    beam: Annotated[float, Field(gt=0.001, lt=200.0, description="[m]")]
+    outline: list[tuple[Finite, Finite]] = Field(
+        [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
+    )
+    allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
+    inertia: dict[str, Given]
+    hull: HullTable = HullTable()
+    actuators: list[ActuatorTable] = []
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema of a ship's description (JSON Schema)."""
+    return ShipTable.model_json_schema()
+
+
+def shipped_ships() -> list[str]:
+    """The names of the shipped ships."""
+    return sorted(path.stem for folder in FOLDERS for path in folder.glob("*.toml"))
+
+
+def find_ship(name: str | Path) -> Path:
+    """The file of a ship: a path, or the name of a shipped one.
+
+    Raises:
+        DeclarationError: there is none.
+    """
+    path = Path(name)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise DeclarationError(f"no such description of a ship: '{path}'")
+        return path
+    for folder in FOLDERS:
+        if (folder / f"{name}.toml").is_file() and Path(str(name)).name == str(name):
+            return folder / f"{name}.toml"
+    known = shipped_ships()
+    hint = nearest(str(name), known) or f"; there are {', '.join(known)}, or give a .toml file"
+    raise DeclarationError(f"no ship '{name}'{hint}")
+
+
+def read_ship(name: str | Path) -> Description:
+    """The description of a ship.
+
+    Args:
+        name: of a shipped ship, or the path of a ``.toml`` file.
+
+    Raises:
+        DeclarationError: no such ship, or the file is not as it should be.
+    """
+    path = find_ship(name)
+    return _read(path, path.stat().st_mtime_ns)
+
+
+@cache
+def _read(path: Path, _changed: int) -> Description:
+    if path.stat().st_size > MOST_BYTES:
+        raise DeclarationError(f"'{path}' is too large for the description of a ship")
+    try:
+        table = ShipTable.model_validate(_toml(path))
+    except ValidationError as error:
+        raise DeclarationError(f"'{path}': {_told(error)}") from None
+    try:
+        return _description(table)
+    except DeclarationError as error:
+        raise DeclarationError(f"'{path}': {error}") from None
+
+
+def _toml(path: Path) -> Any:
+    import sys
+
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib  # pyright: ignore[reportMissingImports]
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, OSError) as error:
+        raise DeclarationError(f"'{path}' cannot be read as TOML: {error}") from None
+
+
+def _told(error: ValidationError) -> str:
+    """The first fault of a file in a line, with the nearest right key."""
+    first = error.errors()[0]
+    place = ".".join(str(part)[:40] for part in first["loc"] if part not in ("Number", "float"))
+    hint = ""
+    if first["type"] == "extra_forbidden":
+        inside = first["loc"][:-1]
+        table: type[BaseModel] = ShipTable
+        if inside[:2] == ("hull", "terms"):
+            table = Term
+        elif inside[:1] == ("hull",):
+            table = HullTable
+        elif inside[:1] == ("inertia",):
+            table = Number
+        hint = nearest(str(first["loc"][-1]), table.model_fields)
+        return f"unknown key '{place}'{hint}"
+    return f"{place}: {first['msg'].removeprefix('Value error, ')}"
+
+
+def _description(table: ShipTable) -> Description:
+    actuators = tuple(_actuator(a) for a in table.actuators)
+    _once([a.name for a in actuators], "actuators")
+    terms = tuple(t.named(t.name) for t in table.hull.terms)
+    _once([t.name for t in terms], "hull.terms")
+    return Description(
+        table.name,
+        table.title,
+        table.source,
+        table.length,
+        table.beam,
+        tuple(table.outline) or _box(table.length, table.beam),
+        _values("inertia", table.inertia, variables(Inertia)),
+        terms,
+        tuple(_function(name, given) for name, given in table.hull.functions.items()),
+        actuators,
+        table.allocates,
+    )
+
+
+def _once(names: list[str], where: str) -> None:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DeclarationError(f"{where}: {twice} stands there twice")
+
+
+def _box(length: float, beam: float) -> tuple[tuple[float, float], ...]:
+    """The outline of a ship that is not described: a box with a pointed bow."""
+    half, side = 0.5 * length, 0.5 * beam
+    return ((half, 0.0), (0.6 * half, side), (-half, side), (-half, -side), (0.6 * half, -side))
+
+
+def _values(where: str, given: Mapping[str, Any], declared: tuple[Variable, ...]) -> tuple[Value, ...]:
+    """Numbers by the names of parameters, each within its range.
+
+    Raises:
+        DeclarationError: there is no such parameter, or a number is out of its range.
+    """
+    known = {v.name: v for v in declared}
+    found = []
+    for name, value in given.items():
+        if name not in known:
+            raise DeclarationError(f"{where}: unknown key '{name}'{nearest(name, known)}")
+        found.append(_value(name, value))
+        limits: Range = known[name].range
+        x = found[-1].value
+        if (limits.min is not None and x < limits.min) or (limits.max is not None and x > limits.max):
+            raise DeclarationError(f"{where}: {name} = {x:g} {known[name].unit} is out of its range")
+    return tuple(found)
+
+
+def _function(name: str, given: Mapping[str, Given]) -> Part:
+    if name not in FUNCTIONS:
+        raise DeclarationError(f"hull.functions: there is no '{name}'{_among(name, FUNCTIONS)}")
+    declared = parameters_of(name, 3, FUNCTIONS[name])
+    return Part(name, name, name, _values(f"hull.functions.{name}", given, declared))
+
+
+def _among(name: str, known: Mapping[str, Any]) -> str:
+    return nearest(name, known) or f"; there are {', '.join(known)}"
+
+
+def _actuator(a: ActuatorTable) -> Part:
+    where = f"actuator '{a.name}'"
+    if a.law not in Law.known:
+        raise DeclarationError(f"{where}: there is no law '{a.law}'{_among(a.law, Law.known)}")
+    law = Law.known[a.law]
+    rates = [
+        Variable(f"{c.name}_rate", f"{c.unit}/s", "limit of a command's rate", 0.0, Range(0.0))
+        for c in law.commands
+    ]
+    declared = (
+        *variables(law.Parameters),
+        Variable("x", "m", "place", 0.0),
+        Variable("y", "m", "place", 0.0),
+        Variable("lag", "s", "first-order lag", 0.0, Range(0.0)),
+        *rates,
+    )
+    numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
+    return Part(a.name, a.law, a.title or a.name.replace("_", " "), _values(where, numbers, declared))
+
+
+def _checked(where: str, name: str, given: Any) -> "float | Number":
+    """A number of an actuator, whose names depend on its law.
+
+    Raises:
+        DeclarationError: it is no number, nor a table with one.
+    """
+    if isinstance(given, (int, float)) and not isinstance(given, bool) and math.isfinite(given):
+        return float(given)
+    try:
+        return Number.model_validate(given)
+    except ValidationError as error:
+        raise DeclarationError(f"{where}: {name}: {_told(error)}") from None
+
+
+def schema_text() -> str:
+    """The published schema of a ship's description."""
+    return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,126 @@
+"""The thrusters of a described ship: from a request, or from commands, to the force that acts."""
+
+from dataclasses import replace
+from typing import Annotated, Any, NamedTuple
+
+from ..actuators.actuation import actuators, allocate, forces, layout, parameters, total, variable
+from ..actuators.response import (
+    Past,
+    Prepared,
+    at_rest,
+    command_response,
+    force_response,
+    prepared,
+    thruster_effects,
+)
+from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclared
+from ..description import Description
+from ..effects import EffectSet
+from ..ops import Number, finite, when
+from ..signals import Force, Velocity
+
+
+class Applied(NamedTuple):
+    """Forces of a thrusters' FMU."""
+
+    tau_cmd_X: Annotated[float, "N", "commanded surge force, as the allocation believes"] = 0.0
+    tau_cmd_Y: Annotated[float, "N", "commanded sway force, as the allocation believes"] = 0.0
+    tau_cmd_N: Annotated[float, "N.m", "commanded yaw moment, as the allocation believes"] = 0.0
+    tau_act_X: Annotated[float, "N", "surge force that acts"] = 0.0
+    tau_act_Y: Annotated[float, "N", "sway force that acts"] = 0.0
+    tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
+
+
+def commands_of(ship: Description) -> type[Any]:
+    """The commands of a ship as a group of variables."""
+    return group_of(
+        "Commands",
+        [
+            Variable(
+                variable(f"{a.part.name}.{c.name}"), c.unit, f"{a.part.title}: {c.description}", 0.0
+            )
+            for a in actuators(ship)
+            for c in a.law.commands
+        ],
+    )
+
+
+def rates_of(ship: Description) -> type[Any]:
+    """The limit of each command's rate."""
+    return group_of(
+        "Rate",
+        [
+            Variable(
+                f"plant_{a.part.name}_{c.name}_rate",
+                "1/s" if c.unit == "1" else f"{c.unit}2" if c.unit == "1/s" else f"{c.unit}/s",
+                f"{a.part.title}: limit of the rate of {c.name}; 0: none",
+                a.part.number(f"{c.name}_rate"),
+                POSITIVE,
+            )
+            for a in actuators(ship)
+            for c in a.law.commands
+        ],
+    )
+
+
+def described(effects: EffectSet, ship: Description) -> Component:
+    """The FMU of a described ship's thrusters, with the effects that it may have."""
+    shape = layout(ship)
+    groups = thruster_effects(effects, shape)
+    lags = {f"lag_{part.name}": part.number("lag") for part in ship.actuators}
+    slow = redeclared(groups.dynamics.params, lambda v: replace(v, start=lags.get(v.name, v.start)))
+    parts = actuators(ship)
+    params = bundle(
+        "Params",
+        allocation=bundle("Allocation", **{a.part.name: parameters(a, "", False)() for a in parts})(),
+        plant=bundle("Plant", **{a.part.name: parameters(a, "plant_", True)() for a in parts})(),
+        rate=rates_of(ship)(),
+        dynamics=slow(),
+        wrong=groups.forces.params(),
+    )
+    commands: Any = commands_of(ship)
+    if ship.allocates:
+        inputs = bundle("Inputs", request=Force(), velocity=Velocity())
+        outputs: Any = bundle("Outputs", commands=commands(), applied=Applied())
+    else:
+        inputs = bundle("Inputs", request=commands(), velocity=Velocity())
+        outputs = Applied
+
+    def prepare(p: Any) -> Prepared:
+        return prepared(p, groups)
+
+    def init(i: Any, p: Any) -> Past:
+        return at_rest(groups)
+
+    def prepared_step(s: Past, i: Any, b: Prepared, h: Number) -> tuple[Past, Any]:
+        p = b.params
+        u, v, r = (finite(x, 0.0) for x in i.velocity)
+        asked = tuple([finite(x, 0.0) for x in i.request])
+        given = allocate(ship, asked, (u, v, r), p.allocation) if ship.allocates else asked
+        past, arriving = command_response(s, given, b, h)
+        past, acting = force_response(past, arriving, b, h)
+        tau = shape.act(acting, shape.running(s.t + h, u, v, r, arriving, b), b)
+        possible = total(forces(ship, given, (u, v, r), p.allocation))
+        after = when(h > 0.0, lambda: past, lambda: s)
+        applied = Applied(*possible, *tau)
+        return after, outputs(commands(*given), applied) if ship.allocates else applied
+
+    def step(s: Past, i: Any, p: Any, h: Number) -> tuple[Past, Any]:
+        return prepared_step(s, i, prepare(p), h)
+
+    return Component(
+        name="thrusters",
+        description=f"Thrust allocation and thrusters of {ship.title}"
+        if ship.allocates
+        else f"Thrusters of {ship.title}",
+        params=params,
+        state=Past,
+        inputs=inputs,
+        outputs=outputs,
+        init=init,
+        step=step,
+        sampled=True,
+        hold_nonfinite=False,
+        prepare=prepare,
+        prepared_step=prepared_step,
+    )
