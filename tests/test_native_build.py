@@ -6,8 +6,9 @@ import pytest
 from support import ccode
 from support.command import command
 
-from fmus.build import build, platforms
+from fmus.build import build, building, platforms, shipped
 from fmus.build.__main__ import main
+from fmus.build.building import own_source
 from fmus.build.platforms import native_targets
 from fmus.effects import STANDARD
 from fmus.native import compilers
@@ -109,3 +110,41 @@ def test_machines_of_a_universal_library_are_found_where_its_header_says():
         )
         assert whole[offset : offset + size] == part
         assert offset % 16384 == 0
+
+
+@pytest.fixture
+def came_along(native, tmp_path, monkeypatch):
+    """A package with a compiled FMU of this source, a computer without a compiler, and an empty cache."""
+    shipped.ship([native["observer_mdf"]], own_source(), tmp_path / "shipped")
+    monkeypatch.setattr(shipped, "FOLDER", tmp_path / "shipped")
+    monkeypatch.setattr(compilers.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compilers.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "shipped" / compilers.this_platform()
+
+
+def test_compiled_fmu_of_the_package_is_taken_where_it_fits(native, came_along, opened_here):
+    assert command(main, "--list", "--native").stdout.split()[:1] == ["observer_mdf"]
+    (path,) = build(["observer_mdf"], native=native_targets())
+    assert path.read_bytes() == native["observer_mdf"].read_bytes()
+    assert command(main, "--verify", path).returncode == 0
+    assert opened_here(path).initialise().play(0) == opened_here(native[path.stem]).initialise().play(0)
+
+
+def test_compiled_fmu_of_the_package_is_left_alone_elsewhere(came_along, tmp_path, monkeypatch):
+    (tmp_path / "model.ssv").write_text(SET.replace("vessel.delta_X_u", "observer_mdf.x_m"))
+    parameters = ["--parameters", tmp_path / "model.ssv"]
+    for other in (
+        ["vessel"],
+        ["observer_mdf", *parameters],
+        ["observer_mdf", "--target", "linux64,python"],
+    ):
+        assert "there is no C compiler" in command(main, "--native", *other).stderr
+    fmu = came_along / "observer_mdf.fmu"
+    content = fmu.read_bytes()
+    fmu.write_bytes(content[:-1])
+    assert command(main, "--list", "--native").stdout == ""
+    fmu.write_bytes(content)
+    monkeypatch.setattr(building, "own_source", lambda: "of a changed source")
+    assert command(main, "--list", "--native").stdout == ""
+    assert command(main, "--native", "observer_mdf").returncode == 2
