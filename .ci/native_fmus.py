@@ -12,11 +12,11 @@ from fmpy import simulate_fmu
 
 from fmus.build import build, native_targets
 from fmus.build.building import own_source
-from fmus.build.shipped import ship
+from fmus.build.released import release
 
 fmus = build([], native=native_targets())
 for compiled, python in zip(fmus, build([]), strict=True):
     rows = [simulate_fmu(str(f), stop_time=1.0, output_interval=0.01) for f in (compiled, python)]
     if not np.array_equal(*(np.array(r.tolist()) for r in rows), equal_nan=True):
         sys.exit(f"{compiled.name}: compiled and in Python it gives different numbers")
-ship(fmus, own_source(), Path(sys.argv[1]))
+release(fmus, own_source(), Path(sys.argv[1]))

@@ -6,7 +6,7 @@ import pytest
 from support import ccode
 from support.command import command
 
-from fmus.build import build, building, platforms, shipped
+from fmus.build import build, building, platforms, released
 from fmus.build.__main__ import main
 from fmus.build.building import own_source
 from fmus.build.platforms import native_targets
@@ -115,12 +115,12 @@ def test_machines_of_a_universal_library_are_found_where_its_header_says():
 @pytest.fixture
 def came_along(native, tmp_path, monkeypatch):
     """A package with a compiled FMU of this source, a computer without a compiler, and an empty cache."""
-    shipped.ship([native["observer_mdf"]], own_source(), tmp_path / "shipped")
-    monkeypatch.setattr(shipped, "FOLDER", tmp_path / "shipped")
+    released.release([native["observer_mdf"]], own_source(), tmp_path / "released")
+    monkeypatch.setattr(released, "FOLDER", tmp_path / "released")
     monkeypatch.setattr(compilers.shutil, "which", lambda name: None)
     monkeypatch.setattr(compilers.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "shipped" / compilers.this_platform()
+    return tmp_path / "released" / compilers.this_platform()
 
 
 def test_compiled_fmu_of_the_package_is_taken_where_it_fits(native, came_along, opened_here):

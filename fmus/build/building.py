@@ -15,7 +15,7 @@ from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, hash_of, pack, sources
 from .platforms import Native, native_targets
-from .shipped import shipped
+from .released import released
 from .start_values_file import Starts
 
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
@@ -92,7 +92,7 @@ def export(
 def came_compiled(name: str) -> bool:
     """Whether a compiled FMU of a component came with the package, for this source and computer."""
     with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-        return shipped(name, own_source(), native_targets(), Path(work)) is not None
+        return released(name, own_source(), native_targets(), Path(work)) is not None
 
 
 def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
@@ -170,10 +170,10 @@ def _cached(
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-                as_shipped = starts is None and own_file is None and not effects.files
+                as_released = starts is None and own_file is None and not effects.files
                 if native is None:
                     built = pack(component, module, own_file, Path(work), effects)
-                elif as_shipped and (fits := shipped(stem, own_source(), native, Path(work))):
+                elif as_released and (fits := released(stem, own_source(), native, Path(work))):
                     built = fits
                 else:
                     code_hash = hash_of(sources(module, own_file, effects), component.starts)

@@ -16,11 +16,11 @@ from ..native.compilers import TARGETS, this_platform
 from .finding import ROOT
 from .platforms import Native
 
-FOLDER = ROOT / "native" / "shipped"  # a folder for each platform in it
+FOLDER = ROOT / "native" / "released"  # a folder for each platform in it
 MANIFEST = "manifest.json"  # hash of the source of all of them, and SHA-256 of each
 
 
-def ship(fmus: Sequence[Path], source: str, folder: Path) -> None:
+def release(fmus: Sequence[Path], source: str, folder: Path) -> None:
     """Write FMUs of this platform, which have been loaded and stepped, for a release.
 
     Args:
@@ -36,7 +36,7 @@ def ship(fmus: Sequence[Path], source: str, folder: Path) -> None:
     (there / MANIFEST).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
-def shipped(name: str, source: str, native: Native, work: Path) -> Path | None:
+def released(name: str, source: str, native: Native, work: Path) -> Path | None:
     """Copy of an FMU that came with the package; None if there is none that fits and loads.
 
     Args:
