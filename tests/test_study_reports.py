@@ -28,6 +28,7 @@ from studies import (
     pictures,
     realtime,
     ship_tables,
+    store_contents,
     sysid4,
     trials,
 )
@@ -219,6 +220,28 @@ def test_report_of_chapter_6_without_experiments(tmp_path, monkeypatch, read):
     assert chapter6.LEFT_OUT in text
     assert len(results["lessons"]) == 5
     assert results["spiked"] == results["stores"] == {}
+
+
+def test_store_of_a_run_with_spikes():
+    log = MadeUp(40.0)
+    log["observer.x_m"] = 0.05 * log["time"]
+    log["observer.x_m"][[100, 250]] += 0.1
+    content = {"fmus": {"controller": {"path": "controller_cl_win_z2.fmu"}}}
+    for name in store_contents.logged("controller_cl_win_z2.fmu"):
+        log[name]
+    held = store_contents.store_contents(FinishedRun(content, log=log))
+    assert held.spikes == 2.0
+    assert held.time == pytest.approx(20 / 399)
+    sigma, state = store_contents.replayed(
+        store_contents.controller("controller_cl_win_z2.fmu"), log, {}
+    )
+    taken = np.array([row.time for row in state.store.rows if row.filled > 0.5])
+    assert taken.size > 5
+    near = store_contents.echo(taken, np.array([10.0, 25.0]))
+    assert held.stored == pytest.approx(near.mean())
+    assert held.oldest == pytest.approx((log["time"][-1] - taken[near]).max(initial=0.0))
+    assert 0.0 <= held.gained <= 1.0
+    assert sigma.size == 400
 
 
 # Chapter 7 and 7.5
