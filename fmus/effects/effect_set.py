@@ -3,11 +3,13 @@
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..declare import DeclarationError, nearest
+from ..declare import DeclarationError, Range, Variable, nearest
+from ..scale import Scale
 from .effect import Effect, Kind, Loaded, Running, Thrust
 
 ROOM = Path(__file__).parent
@@ -54,6 +56,10 @@ class EffectSet(Mapping[str, Effect]):
 
     def __hash__(self) -> int:
         return id(self)
+
+    def at(self, scale: Scale) -> "EffectSet":
+        """The set for a ship of another size: starts, ranges and values to try by Froude's law."""
+        return EffectSet([_scaled(e, scale) for e in self.values()], self.files)
 
     def of_kind(self, *kinds: Kind) -> list[Effect]:
         """The effects of some kinds: kind by kind, in the order of declaration."""
@@ -104,6 +110,21 @@ class EffectSet(Mapping[str, Effect]):
             return self.plus(found, path)
         except DeclarationError as error:
             raise DeclarationError(f"'{path}': {error}") from error
+
+
+def _scaled(e: Effect, scale: Scale) -> Effect:
+    factors = {p.name: scale.factor(p.unit) for p in e.parameters}
+
+    def parameter(p: Variable) -> Variable:
+        low, high = (None if x is None else factors[p.name] * x for x in (p.range.min, p.range.max))
+        return replace(p, start=factors[p.name] * p.start, range=Range(low, high))
+
+    # Values that are made of the model in use have its size.
+    tries = e.search.tries
+    if not callable(tries):
+        tries = [{name: factors[name] * x for name, x in values.items()} for values in tries]
+    parameters = tuple(parameter(p) for p in e.parameters)
+    return replace(e, parameters=parameters, search=replace(e.search, tries=tries))
 
 
 def _imported(name: str, path: Path) -> ModuleType:
