@@ -1,6 +1,7 @@
 """Building native FMUs: learned values, users' effects, the cache, and what is refused."""
 
 import math
+import struct
 
 import pytest
 from support import ccode
@@ -33,6 +34,31 @@ def test_learned_vessel_starts_with_what_was_learned(tmp_path, opened_here):
     ]
     assert rows[0] == rows[1]
     assert opened_here(tmp_path / "native" / "vessel.fmu").get("delta_X_u") == [-3.5]
+
+
+def test_universal_library_has_each_machine_at_a_page_of_its_own():
+    """As Apple's mach-o/fat.h says: big-endian, magic number, count, then five words for each machine."""
+    made = [
+        struct.pack("<III", 0xFEEDFACF, kind, kind + 1) + bytes([kind]) * size
+        for kind, size in ((7, 20001), (12, 5))
+    ]
+    whole = compilers.universal(made)
+    assert struct.unpack_from(">II", whole) == (0xCAFEBABE, 2)
+    for k, library in enumerate(made):
+        kind, subkind, offset, size, low_bits = struct.unpack_from(">IIIII", whole, 8 + 20 * k)
+        assert (kind, subkind) == struct.unpack_from("<II", library, 4)
+        assert low_bits == 14
+        assert offset % 2**14 == 0
+        assert whole[offset : offset + size] == library
+    assert offset + size == len(whole)
+
+
+def test_compiler_tells_its_version_and_what_it_misses(tmp_path):
+    target = platforms.this_platform()
+    assert any(letter.isdigit() for letter in compilers.compiler_for(target).version)
+    (tmp_path / "wrong.c").write_text("int f(void) { return missing; }")
+    with pytest.raises(compilers.CompilerError, match=r"error.*missing"):
+        compilers.compiled(tmp_path / "wrong.c", target, tmp_path)
 
 
 EFFECT = '''
