@@ -6,7 +6,7 @@ A measured run goes through three steps, each model-free, before it is compared 
 
     track = diagnosis.clean(diagnosis.read("run.csv"))  # what is missing, frozen, out of order
     smoothed = diagnosis.smooth(track)  # pose, velocity, acceleration, and how sure they are
-    windows = diagnosis.Windows([smoothed])  # of 8 s, in which models are compared with the run
+    windows = diagnosis.Windows([smoothed])  # of some seconds, in which models are compared with the run
     nominal = windows.errors()
     slower = windows.errors(diagnosis.Model(vessel={"delta_X_u": -4.0}))
 

@@ -81,6 +81,12 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         action="store_true",
         help="go on though a run's units, signs or columns seem to be other ones than said",
     )
+    made.add_argument(
+        "--horizon",
+        type=float,
+        metavar="SECONDS",
+        help="length of the windows in which models predict the runs (8 s, times the scale of the ship)",
+    )
     return made
 
 

@@ -33,7 +33,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     with together(options.out, FILES) as new:
         craft = ship_with(options.effects, options.ship)
         model = read_model(options.model, craft) if options.model else Model(ship=craft)
-        runs = gather(options.runs, advance, options.anyway, model)
+        runs = gather(options.runs, advance, options.anyway, model, options.horizon)
         comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")
         content = comparison_content(comparison, options.model, FILES)

@@ -143,4 +143,4 @@ def remainder_of(
     how = recurrence(data, np.concatenate(left)) if _any(axes) else None
     effects = learned.model.ship.effects
     waves = any(effects[f.id].search.by == "spectrum" for f in learned.effects)
-    return Remainder(axes, remainder_sentence(axes, how, regions, waves))
+    return Remainder(axes, remainder_sentence(axes, how, regions, waves, data[0].scale))

@@ -3,11 +3,13 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
 
 from cosim import InputError
+from fmus.scale import Scale
 
 from .assessment.plausibility import refuse_implausible
 from .data import Run, Track, clean, read, thinned
@@ -29,6 +31,7 @@ def gather(
     advance: Advance = silent,
     anyway: bool = False,
     model: Model | None = None,
+    horizon: float | None = None,
 ) -> list[Integrals]:
     """Read and smooth measured runs, and refuse those whose files say something else than was meant.
 
@@ -38,24 +41,30 @@ def gather(
         paths: files or folders of logs, see :func:`diagnosis.read`, or runs that were read.
         advance: progress callback.
         anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
-        model: the initial one, by which that is judged; the nominal one by default.
+        model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
+            default.
+        horizon: length of the windows in which models predict the runs [s]; by default that of the ship.
 
     Returns:
         For each run its windows of the weak form; names are unique.
 
     Raises:
-        InputError: a run cannot be used, is given twice by whatever name, or seems to be misread.
+        InputError: no positive horizon, or a run that cannot be used, is given twice by whatever name,
+            or seems to be misread.
     """
     if not paths:
         raise InputError("there is no run to read")
-    advance("reading")
+    if horizon is not None and not 0.0 < horizon < inf:
+        raise InputError(f"the horizon must be a positive time, not {horizon:g} s")
     model = model or Model()
+    scale = model.ship.scale
+    advance("reading")
     runs = [path if isinstance(path, Run) else read(path, of=model.ship) for path in paths]
     names = [path.name if isinstance(path, Run) else path for path in paths]
     _refuse_twice(runs, names)
     advance(f"smoothing {', '.join(run.name for run in runs)}")
-    smoothed = for_each(lambda run: _smoothed(run, anyway), _distinct(runs, names))
-    windows = [_windows(s, anyway) for s in smoothed]
+    smoothed = for_each(lambda run: _smoothed(run, anyway, scale), _distinct(runs, names))
+    windows = [_windows(s, anyway, horizon) for s in smoothed]
     if not anyway:
         refuse_implausible(windows, model)
     return windows
@@ -82,14 +91,14 @@ def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
     ]
 
 
-def _smoothed(run: Run, anyway: bool) -> Smoothed:
-    track = clean(run, anyway)
+def _smoothed(run: Run, anyway: bool, scale: Scale) -> Smoothed:
+    track = clean(run, anyway, scale)
     if not anyway:
         _refuse_rare(track)
     return smooth(thinned(track))
 
 
-def _windows(smoothed: Smoothed, anyway: bool) -> Integrals:
+def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> Integrals:
     """Windows of a run, at least one.
 
     Raises:
@@ -100,7 +109,7 @@ def _windows(smoothed: Smoothed, anyway: bool) -> Integrals:
         _refuse_spikes(smoothed)
     if not np.abs(run.tau_cmd).max() > 1e-6:
         raise InputError(f"run '{run.name}': its commands are zero throughout, which tells nothing")
-    w = integrals(smoothed)
+    w = integrals(smoothed, horizon)
     if not w.middle.size:
         raise InputError(f"run '{run.name}': too much is missing while the thrusters are at work")
     return w
@@ -112,10 +121,12 @@ def _refuse_rare(track: Track) -> None:
     Raises:
         InputError: they are.
     """
-    if track.period > WIDTH / (FEWEST - 0.5):  # up to rounding
+    width = WIDTH * track.scale.time
+    if track.period > width / (FEWEST - 0.5):  # up to rounding
         raise InputError(
             f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare where forces "
-            f"are averaged over {WIDTH:g} s; log one every {WIDTH / FEWEST:g} s or more often; {GO_ON}"
+            f"are averaged over {width:.3g} s; log one every {width / FEWEST:.3g} s or "
+            f"more often; {GO_ON}"
         )
 
 

@@ -38,6 +38,7 @@ def load(
     advance: Advance = silent,
     model: Model | None = None,
     ship: str | Path | None = None,
+    horizon: float | None = None,
 ) -> list[Integrals]:
     """Read and smooth measured runs.
 
@@ -47,8 +48,10 @@ def load(
             (``x [mm]``) or in ``attrs["units"]``.
         anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
         advance: receives the name of each step when it begins.
-        model: the initial one, by which that is judged; the nominal one by default.
+        model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
+            default.
         ship: whose nominal model that is: the name of a shipped ship, or the path of a description.
+        horizon: length of the windows in which models predict the runs [s]; by default that of the ship.
 
     Returns:
         The runs, for :func:`diagnose`, :func:`diagnosis.evaluate` and :class:`diagnosis.Windows`.
@@ -71,7 +74,7 @@ def load(
         else:
             kind = type(source).__name__
             raise InputError(f"a run is a file, a folder, a result or a table, not of type {kind}")
-    return gather(found, advance, anyway, model)
+    return gather(found, advance, anyway, model, horizon)
 
 
 def _model_of(model: Model | None, name: str | Path | None) -> Model:
@@ -110,7 +113,7 @@ class ShownDiagnosis(session.Diagnosis):
 
     @property
     def residual(self) -> pandas.DataFrame:
-        """What the learned model leaves: one row a window of 3 s.
+        """What the learned model leaves: one row a window of the weak form.
 
         Columns ``run``, ``held_out``, ``time`` (of the middle) [s], ``X``, ``Y`` [N], ``N`` [N m], and
         their standard deviations ``X_std``, ...; ``attrs["units"]`` has the units.

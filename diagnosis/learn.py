@@ -47,7 +47,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         shares(craft, options.prior)
         by = method(options.method)
         paths = [*options.train, *options.test]
-        runs = gather(paths, advance, options.anyway, model)
+        runs = gather(paths, advance, options.anyway, model, options.horizon)
         train = len(options.train)
         diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
         refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND

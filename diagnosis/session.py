@@ -186,15 +186,16 @@ def diagnose(
     prior_shares(start.ship, prior)  # before any work
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
+        block = BLOCK * train[0].scale.time
         raise InputError(
-            f"too little to learn from: {blocks * BLOCK:g} s with thrusters at work, "
-            f"at least {MIN_BLOCKS * BLOCK:g} s are needed"
+            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
+            f"at least {MIN_BLOCKS * block:.3g} s are needed"
         )
     runs = told_apart([*train, *held_out])
     train, held_out = runs[: len(train)], runs[len(train) :]
     chosen = method(by) if isinstance(by, str) else by
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
-    region = OperatingRegion.of(nu)
+    region = OperatingRegion.of(nu, start.ship.scale)
     found = chosen.fit(train, start, prior, advance, seed)
     advance("what unseen data say")
     unseen = Unseen(train, held_out, start, found.sigma)

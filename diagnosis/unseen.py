@@ -52,7 +52,7 @@ class Part:
         self._span = (-np.inf, np.inf) if blocks is None else (first, last)
         self._windows: Windows | None = None
         with suppress(InputError):  # no window has enough samples
-            self._windows = Windows([w.smoothed])
+            self._windows = Windows([w.smoothed], w.horizon)
 
     def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
         """What each of some models misses here, sigma (3,) being what an error is divided by."""

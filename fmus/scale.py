@@ -57,6 +57,16 @@ class Scale:
     def moment(self) -> float:
         return self.factor("N.m")
 
+    @property
+    def speeds(self) -> tuple[float, float, float]:
+        """Of surge, sway and yaw."""
+        return self.speed, self.speed, self.rate
+
+    @property
+    def forces(self) -> tuple[float, float, float]:
+        """Of X, Y and N."""
+        return self.force, self.force, self.moment
+
 
 CSE1 = Scale()
 

@@ -18,7 +18,7 @@ from support.project import COMPONENTS, ROOT
 from fmus.build.packing import sources
 from fmus.check import source
 from fmus.check.api import Library
-from fmus.check.bench import Bench, other
+from fmus.check.bench import Bench, near, other
 from fmus.check.checking import main
 from fmus.check.description import Description
 from fmus.check.examine import examine
@@ -255,6 +255,40 @@ def test_another_value_is_one_the_variable_may_have(xml, values):
         assert v.limits[0] <= changed <= v.limits[1]
         assert changed in (v.items or [changed])
         assert changed * value >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("xml", "share", "value"),
+    [
+        ('<Real start="2"/>', 0.5, 2.1),
+        ('<Real start="-2"/>', 0.5, -1.9),
+        ("<Real/>", 1.0, 0.1),
+        ('<Real nominal="50"/>', -0.5, -2.5),
+        ('<Real start="2" max="2.05"/>', 1.0, 1.8),
+        ('<Real start="2" min="1.99" max="2.01"/>', 1.0, 1.99),
+    ],
+)
+def test_a_value_nearby_is_a_tenth_of_the_start_or_of_the_nominal_away(xml, share, value):
+    text = f"<m><ModelVariables><ScalarVariable>{xml}</ScalarVariable></ModelVariables></m>"
+    (v,) = Description(ElementTree.fromstring(text)).variables
+    assert near(v, share) == pytest.approx(value)
+    if xml == '<Real start="2"/>':
+        assert other(v, near(v, 1.0)) == pytest.approx(1.9), "half as far to the other side"
+
+
+@pytest.mark.parametrize(
+    ("attributes", "time"),
+    [
+        ('startTime="2" stopTime="5" stepSize="0.25"', (2.0, 0.25)),
+        ('startTime="2" stopTime="5"', (2.0, 0.03)),
+        ('startTime="2" stopTime="5" stepSize="-1"', (2.0, 0.03)),
+        ('stepSize="inf"', (0.0, 0.01)),
+        ("", (0.0, 0.01)),
+    ],
+)
+def test_step_is_that_of_the_default_experiment_or_a_hundredth_of_it(attributes, time):
+    text = f"<m><DefaultExperiment {attributes}/></m>"
+    assert Description(ElementTree.fromstring(text)).time() == pytest.approx(time)
 
 
 @compiled

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from support.measured import commands, sail, smoothed
 
-from diagnosis.assessment.windows import LENGTH, Windows
+from diagnosis.assessment.windows import Windows
 from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, integrals
-from diagnosis.model.weak_form import EVERY
+from diagnosis.model.weak_form import EVERY, HORIZON
 from diagnosis.prediction_error import push as pushes
 from diagnosis.prediction_error.fit import fit_predictions, shootings
 from diagnosis.prediction_error.joint_posterior import Posterior
@@ -60,7 +60,7 @@ def jolted(t, seed):
 
 @cache
 def windows():
-    return Shooting([smoothed(sail()[0])], LENGTH)
+    return Shooting([smoothed(sail()[0])], HORIZON)
 
 
 @cache
@@ -93,7 +93,7 @@ def test_slopes_are_those_of_one_model_after_the_other():
 
 def test_coarse_steps_predict_what_fine_ones_do():
     run = smoothed(sail(noise=0.0)[0])
-    coarse = Shooting([run], LENGTH).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
+    coarse = Shooting([run], HORIZON).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
     fine = Windows([run])
     last = np.flatnonzero(np.diff(fine.sample_window, append=-1))
     exact = fine.residuals(Model(vessel={"N_r": -0.6}))[last]

@@ -16,7 +16,8 @@ K, NOISE = 100 * SPAN, 0.02
 def windows(count=K, first=0.0, command=0.1):
     tau = np.full((count, 3), command)
     middle = first + EVERY * np.arange(count)
-    return SimpleNamespace(middle=middle, held=np.eye(count), run=SimpleNamespace(tau_cmd=tau))
+    run = SimpleNamespace(tau_cmd=tau)
+    return SimpleNamespace(middle=middle, every=EVERY, held=np.eye(count), run=run)
 
 
 def noise(count=K, seed=0):

@@ -188,7 +188,14 @@ def test_smoothness_has_the_largest_likelihood():
     time = 0.02 * np.arange(1000)
     z = 1e3 + np.sin(time)[:, None] + 1e-3 * np.random.default_rng(0).standard_normal((1000, 3))
     p = Problem(
-        np.arange(1000), z, basis(grid, time), grid, roughness(grid), np.ones((3, 400)), np.full(3, 1e-3)
+        np.arange(1000),
+        z,
+        basis(grid, time),
+        grid,
+        roughness(grid),
+        np.ones((3, 400)),
+        np.full(3, 1e-3),
+        160,
     )
     best, cost = likeliest(p, np.ones(1000))
     again, same = likeliest(p, np.ones(1000), 30.0 * best)

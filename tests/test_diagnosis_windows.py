@@ -11,9 +11,9 @@ from support.cases import in_part
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, clean, read, smooth
-from diagnosis.assessment.windows import LENGTH
 from diagnosis.data.reading import ASIDE
 from diagnosis.model.ship_model import parameters
+from diagnosis.model.weak_form import HORIZON
 from fmus.thrusters.allocation import Allocation, allocate
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 
@@ -121,7 +121,7 @@ def test_no_sample_is_further_than_a_window_from_its_start():
         - windows_of(base()).start[windows_of(base()).sample_window]
     )
     assert since.min() == 0.0
-    assert since.max() < LENGTH
+    assert since.max() < HORIZON
 
 
 def test_remainder_is_dropped():

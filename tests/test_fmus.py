@@ -428,11 +428,11 @@ def test_cache_is_used_and_follows_the_source(tmp_path, monkeypatch):
     (copy / "hull.py").write_text((copy / "hull.py").read_text() + "\n# changed\n")
     for module in (building, packing):
         monkeypatch.setattr(module, "ROOT", copy)
-    building._our_source.cache_clear()  # a new process reads anew
+    building.own_source.cache_clear()  # a new process reads anew
     try:
         (second,) = build(["vessel"])
     finally:
-        building._our_source.cache_clear()
+        building.own_source.cache_clear()
     assert second != first
     assert second.read_bytes() != first.read_bytes()
 

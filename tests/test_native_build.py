@@ -1,13 +1,15 @@
 """Building native FMUs: learned values, users' effects, the cache, and what is refused."""
 
 import math
+import struct
 
 import pytest
 from support import ccode
 from support.command import command
 
-from fmus.build import build, platforms
+from fmus.build import build, building, platforms, released
 from fmus.build.__main__ import main
+from fmus.build.building import own_source
 from fmus.build.platforms import native_targets
 from fmus.effects import STANDARD
 from fmus.native import compilers
@@ -32,6 +34,31 @@ def test_learned_vessel_starts_with_what_was_learned(tmp_path, opened_here):
     ]
     assert rows[0] == rows[1]
     assert opened_here(tmp_path / "native" / "vessel.fmu").get("delta_X_u") == [-3.5]
+
+
+def test_universal_library_has_each_machine_at_a_page_of_its_own():
+    """As Apple's mach-o/fat.h says: big-endian, magic number, count, then five words for each machine."""
+    made = [
+        struct.pack("<III", 0xFEEDFACF, kind, kind + 1) + bytes([kind]) * size
+        for kind, size in ((7, 20001), (12, 5))
+    ]
+    whole = compilers.universal(made)
+    assert struct.unpack_from(">II", whole) == (0xCAFEBABE, 2)
+    for k, library in enumerate(made):
+        kind, subkind, offset, size, low_bits = struct.unpack_from(">IIIII", whole, 8 + 20 * k)
+        assert (kind, subkind) == struct.unpack_from("<II", library, 4)
+        assert low_bits == 14
+        assert offset % 2**14 == 0
+        assert whole[offset : offset + size] == library
+    assert offset + size == len(whole)
+
+
+def test_compiler_tells_its_version_and_what_it_misses(tmp_path):
+    target = platforms.this_platform()
+    assert any(letter.isdigit() for letter in compilers.compiler_for(target).version)
+    (tmp_path / "wrong.c").write_text("int f(void) { return missing; }")
+    with pytest.raises(compilers.CompilerError, match=r"error.*missing"):
+        compilers.compiled(tmp_path / "wrong.c", target, tmp_path)
 
 
 EFFECT = '''
@@ -109,3 +136,41 @@ def test_machines_of_a_universal_library_are_found_where_its_header_says():
         )
         assert whole[offset : offset + size] == part
         assert offset % 16384 == 0
+
+
+@pytest.fixture
+def came_along(native, tmp_path, monkeypatch):
+    """A package with a compiled FMU of this source, a computer without a compiler, and an empty cache."""
+    released.release([native["observer_mdf"]], own_source(), tmp_path / "released")
+    monkeypatch.setattr(released, "FOLDER", tmp_path / "released")
+    monkeypatch.setattr(compilers.shutil, "which", lambda name: None)
+    monkeypatch.setattr(compilers.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "released" / compilers.this_platform()
+
+
+def test_compiled_fmu_of_the_package_is_taken_where_it_fits(native, came_along, opened_here):
+    assert command(main, "--list", "--native").stdout.split()[:1] == ["observer_mdf"]
+    (path,) = build(["observer_mdf"], native=native_targets())
+    assert path.read_bytes() == native["observer_mdf"].read_bytes()
+    assert command(main, "--verify", path).returncode == 0
+    assert opened_here(path).initialise().play(0) == opened_here(native[path.stem]).initialise().play(0)
+
+
+def test_compiled_fmu_of_the_package_is_left_alone_elsewhere(came_along, tmp_path, monkeypatch):
+    (tmp_path / "model.ssv").write_text(SET.replace("vessel.delta_X_u", "observer_mdf.x_m"))
+    parameters = ["--parameters", tmp_path / "model.ssv"]
+    for other in (
+        ["vessel"],
+        ["observer_mdf", *parameters],
+        ["observer_mdf", "--target", "linux64,python"],
+    ):
+        assert "there is no C compiler" in command(main, "--native", *other).stderr
+    fmu = came_along / "observer_mdf.fmu"
+    content = fmu.read_bytes()
+    fmu.write_bytes(content[:-1])
+    assert command(main, "--list", "--native").stdout == ""
+    fmu.write_bytes(content)
+    monkeypatch.setattr(building, "own_source", lambda: "of a changed source")
+    assert command(main, "--list", "--native").stdout == ""
+    assert command(main, "--native", "observer_mdf").returncode == 2

@@ -75,6 +75,7 @@ def comparison(evaluations, where=NO_REGION):
     """Content of comparison.json, as keywords."""
     return {
         "data": {**COUNTS, "runs": []},
+        "windows": {"prediction": 8.0, "model_error": 3.0},
         "errors": errors(evaluations),
         "where": where,
         "runs": [e.name for e in evaluations],

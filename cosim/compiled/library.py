@@ -93,7 +93,8 @@ def compiles(native: bool | str) -> bool:
     """Whether the project's own FMUs are compiled.
 
     Args:
-        native: of a scenario; ``"auto"`` where a compiler of the system has made the library.
+        native: of a scenario; ``"auto"`` where a compiler of the system has made the library, or where
+            the FMUs came compiled.
     """
     return _compiles_itself() if native == "auto" else bool(native)
 
@@ -101,8 +102,13 @@ def compiles(native: bool | str) -> bool:
 @cache
 def _compiles_itself() -> bool:
     """Asked once in a process, so that its runs have FMUs of one kind."""
-    there = fmpy.platform in PLATFORMS and any(map(shutil.which, SYSTEM))
-    return there and _found(False).library is not None
+    if fmpy.platform not in PLATFORMS:
+        return False
+    if any(map(shutil.which, SYSTEM)):
+        return _found(False).library is not None
+    listing = [sys.executable, "-m", "fmus.build", "--list", "--native"]
+    done = subprocess.run(listing, capture_output=True, text=True, check=False)
+    return done.returncode == 0 and done.stdout.strip() != ""
 
 
 class Found(NamedTuple):

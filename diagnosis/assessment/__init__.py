@@ -1,7 +1,7 @@
 """How wrong a model is, and where.
 
-Prediction errors over windows of 8 s, regions in which the model error is larger than elsewhere, and
-whether a learned model is stable.
+Prediction errors over windows of some seconds, regions in which the model error is larger than
+elsewhere, and whether a learned model is stable.
 """
 
 from ..model.uncertainty import omega_std

@@ -1,5 +1,8 @@
 """Closed-loop simulation of a model on the reference paths, in one process and without files.
 
+A ship of another size sails the paths of its size, held by the same controller with gains of its size:
+what observer, controller and path get and give is scaled by Froude's law (:mod:`fmus.scale`).
+
 Vessel and thrusters have the parameters of a model; observer, controller and paths are those of
 ``scenarios/ellipse.json`` and ``scenarios/eight.json``, without noise and freezes.
 """
@@ -23,6 +26,7 @@ from fmus.thrusters.chain import Inputs as ThrusterInputs
 from ..model import Model
 from ..model.ship_model import parameters
 
+# Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 STEP = 0.04  # s; chosen, distances agree with those at 0.01 s to about a millimetre
 # m. Chosen: some four ship lengths, most of the basin's width; a good loop stays within a tenth of it.
 BOUND = 5.0
@@ -73,32 +77,41 @@ def closed_loop(
 ) -> tuple[Loop, Callable[[Loop, float], tuple[Loop, Number]]]:
     """A closed loop at its start, and the function that advances it by STEP.
 
-    That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
-    between the ship and its target as well.
+    That function gets the time [s] since controller and thrusters acted last, as CyberShip Enterprise 1
+    would count it, and gives the distance [m] between the ship and its target as well.
     """
-    ship = _Part(model.ship.vessel, {**model.vessel, **reference.start})
+    scale = model.ship.scale
+    length, time = scale.length, scale.time
+    start = {name: length * x for name, x in reference.start.items()}
+    ship = _Part(model.ship.vessel, {**model.vessel, **start})
     path, observer = _Part(reference.guidance, {}), _Part(mdf.COMPONENT, OBSERVER_WEIGHTS)
     controller, drive = _Part(adaptive.COMPONENT, {}), _Part(model.ship.thrusters, model.thrusters)
     s, vessel = ship.begin(Force())
     g, target = path.begin(Nothing())
-    measured = ObserverInputs(vessel.measured, Force())
+
+    def seen(pose: Measurement) -> Measurement:
+        return Measurement(pose.x_m / length, pose.y_m / length, pose.psi_m)
+
+    pose = seen(vessel.measured)
+    measured = ObserverInputs(pose, Force())
     o, estimate = observer.begin(measured)
     c, _ = controller.begin(ControllerInputs(estimate, target))
     t, _ = drive.begin(ThrusterInputs())
-    late = max(1, 1 + round(model.clock / STEP))
-    first = Loop(
-        (s, g, o, c, t), Velocity(*vessel.velocity), target, estimate, (vessel.measured,) * late
-    )
+    late = max(1, 1 + round(model.clock / (STEP * time)))
+    first = Loop((s, g, o, c, t), Velocity(*vessel.velocity), target, estimate, (pose,) * late)
 
     def step(now: Loop, h: float) -> tuple[Loop, Number]:
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
-        t, thrust = drive.advance(t, ThrusterInputs(demand.tau, now.velocity), h)
-        s, vessel = ship.advance(s, Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N), STEP)
+        wanted = Force(*(x * f for x, f in zip(demand.tau, scale.forces, strict=True)))
+        t, thrust = drive.advance(t, ThrusterInputs(wanted, now.velocity), h * time)
+        acting = Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
+        s, vessel = ship.advance(s, acting, STEP * time)
         g, target = path.advance(g, Nothing(), STEP)
-        x, y = vessel.pose.x - target.x_t, vessel.pose.y - target.y_t
-        poses = (*now.poses[1:], vessel.measured)
-        commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
+        x, y = vessel.pose.x - length * target.x_t, vessel.pose.y - length * target.y_t
+        poses = (*now.poses[1:], seen(vessel.measured))
+        given = thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N
+        commanded = Force(*(x / f for x, f in zip(given, scale.forces, strict=True)))
         o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), STEP)
         velocity = Velocity(*vessel.velocity)
         return Loop((s, g, o, c, t), velocity, target, estimate, poses), sqrt(x * x + y * y)
@@ -139,12 +152,17 @@ def distances(reference: Reference, model: Model) -> Iterator[float]:
         yield distance
 
 
+def bound_of(model: Model) -> float:
+    """Distance [m] from its target beyond which a ship is lost."""
+    return BOUND * model.ship.scale.length
+
+
 def largest_distance(reference: Reference, model: Model) -> float:
-    """Largest distance [m] between the ship and its target; infinite as soon as it is beyond BOUND."""
-    largest = 0.0
+    """Largest distance [m] between the ship and its target; infinite as soon as the ship is lost."""
+    largest, bound = 0.0, bound_of(model)
     try:
         for distance in distances(reference, model):
-            if not distance < BOUND:
+            if not distance < bound:
                 return inf
             largest = max(largest, distance)
     except (OverflowError, ValueError, ZeroDivisionError):  # numbers beyond what a float holds

@@ -21,7 +21,7 @@ SILENT = 1e-6  # of the largest command; less is none, and varies no more than r
 UNBALANCED = 0.2
 # Of the force that the motion needs elsewhere: so much without any command was not logged. Chosen.
 MOVES_ON = 0.5
-LONG = 20  # windows without any command, 10 s: the ship has forgotten the thrust before
+LONG = 20  # windows without any command: the ship has forgotten the thrust before
 
 
 def beyond_thrusters(run: Run, model: Model) -> str | None:
@@ -95,7 +95,7 @@ def _moves_on(w: Integrals, model: Model, size: np.ndarray) -> str | None:
     if (still < MOVES_ON * size).any():
         return None
     return (
-        f"all commands are zero for {0.5 * idle.sum():.0f} s, and the motion needs "
+        f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "
         f"{still[0]:.3g} N, {still[1]:.3g} N, {still[2]:.3g} N.m there, as before: "
         "leave the cells of commands that were not logged empty"
     )

@@ -1,7 +1,8 @@
 """Covariates of the model error: time, place, speed, yaw rate, thruster level and heading of windows."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,8 @@ AXES = "XYN"
 QUANTILE_BINS = 8  # bins of equal numbers of windows; chosen
 SECTORS = 8  # of heading, 45 degrees each; chosen
 MAX_TIME_BINS = 16  # chosen, so that a profile of a long run stays short
-MIN_TIME_BIN = 15.0  # s, a block of the cross-validation: shorter bins are not independent
+# s, times the scale of the ship: a block of the cross-validation: shorter bins are not independent
+MIN_TIME_BIN = 15.0
 SMALLEST_LEVEL = 1e-9  # N or N m, keeps the relative level defined where an axis is never commanded
 
 
@@ -44,8 +46,8 @@ def _quantiles(x: np.ndarray) -> np.ndarray:
     return np.unique(np.quantile(x, np.linspace(0.0, 1.0, QUANTILE_BINS + 1)))
 
 
-def _intervals(t: np.ndarray) -> np.ndarray:
-    bins = int(np.clip((t.max() - t.min()) // MIN_TIME_BIN, 1, MAX_TIME_BINS))
+def _intervals(t: np.ndarray, least: float = MIN_TIME_BIN) -> np.ndarray:
+    bins = int(np.clip((t.max() - t.min()) // least, 1, MAX_TIME_BINS))
     return np.linspace(t.min(), t.max(), bins + 1)
 
 
@@ -140,8 +142,12 @@ def covariates_by_axis(data: Sequence[Integrals]) -> list[list[CovariateValues]]
         CovariateValues(NORTH, every, place[:, 0]),
         CovariateValues(EAST, every, place[:, 1]),
     ]
+    least = MIN_TIME_BIN * data[0].scale.time
+    by_time = (
+        TIME if least == MIN_TIME_BIN else replace(TIME, bin_edges=partial(_intervals, least=least))
+    )
     times = [
-        CovariateValues(TIME, np.arange(a, a + w.middle.size), w.middle, w.run.name)
+        CovariateValues(by_time, np.arange(a, a + w.middle.size), w.middle, w.run.name)
         for a, w in zip(first, data, strict=False)
     ]
     most = np.maximum(level.max(axis=0), SMALLEST_LEVEL)

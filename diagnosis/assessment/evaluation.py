@@ -19,8 +19,8 @@ class PredictionError:
 
     Attributes:
         omega: (K, 3), model error in each window of the weak form [N, N, N m].
-        residuals: (samples, 3), measured minus predicted pose [m, m, rad] in the windows of 8 s; empty
-            if none has enough samples.
+        residuals: (samples, 3), measured minus predicted pose [m, m, rad] in the windows of prediction;
+            empty if none has enough samples.
         errors: of those windows; None if none has enough samples.
     """
 
@@ -51,7 +51,7 @@ class Evaluation:
     Attributes:
         model: the initial model.
         integrals: the run, in windows of the weak form.
-        windows: the run, in windows of 8 s; None if none has enough samples.
+        windows: the run, in windows of prediction; None if none has enough samples.
         held_out: whether nothing was learned from it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
@@ -88,15 +88,15 @@ def evaluate_run(
         after: the learned model; None: nothing was learned.
         held_out: whether nothing was learned from the run.
     """
-    windows = _windows([w.smoothed])
+    windows = _windows([w.smoothed], w.horizon)
     first = _prediction_error(w, windows, before)
     last = first if after is None else _prediction_error(w, windows, after)
     return Evaluation(before, w, windows, held_out, first, last, learned=after)
 
 
-def _windows(runs: Sequence[Smoothed]) -> Windows | None:
+def _windows(runs: Sequence[Smoothed], length: float) -> Windows | None:
     try:
-        return Windows(runs)
+        return Windows(runs, length)
     except InputError:
         return None
 

@@ -14,15 +14,14 @@ from scipy.spatial import KDTree
 
 from ..model import Integrals
 from ..model.correlation import correlated_windows
-from ..model.weak_form import EVERY
 
 NEIGHBOURS = 5  # windows of a prediction; chosen
 SEARCHED = 160  # nearest windows among which these are: a pass of APART to both sides holds 120
-APART = 30.0  # s; two blocks, as what counts as independent elsewhere
+APART = 30.0  # s, times the scale of the ship; two blocks, as what counts as independent elsewhere
 SHIFTS = 199  # series shifted at random; a share above all of them is beyond chance by 0.5 %
 REPEATS = 0.25  # share from which on an error is said to repeat; chosen
 CLEARER = 0.1  # share by which commands must give more than a force that comes and goes; chosen
-STRETCH = 15  # windows, 7.5 s, of one amplitude: half of a block
+STRETCH = 15  # windows, of one amplitude: half of a block
 SPACES = ("place", "motion", "command", "time")
 
 
@@ -57,15 +56,16 @@ def recurrence(data: Sequence[Integrals], left: np.ndarray, seed: int = 0) -> li
     run = np.repeat(np.arange(len(data)), [w.middle.size for w in data])
     time = np.concatenate([w.middle for w in data])
     place, motion, command = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
+    apart = APART * data[0].scale.time
     neighbours = {
-        "place": _neighbours(place, run, time),
-        "motion": _neighbours(_scaled(motion), run, time),
-        "command": _neighbours(_scaled(command), run, time),
-        "time": _neighbours(time[:, None], run, time, other_runs=True),
+        "place": _neighbours(place, run, time, apart),
+        "motion": _neighbours(_scaled(motion), run, time, apart),
+        "command": _neighbours(_scaled(command), run, time, apart),
+        "time": _neighbours(time[:, None], run, time, np.inf),
     }
     rng = np.random.default_rng(seed)
     offsets = rng.integers(SEARCHED, max(len(left) - SEARCHED, SEARCHED + 1), SHIFTS)
-    lasts = EVERY * correlated_windows(data, left)
+    lasts = data[0].every * correlated_windows(data, left)
     found = []
     for k in range(3):
         error = left[:, k]
@@ -87,13 +87,18 @@ def _scaled(x: np.ndarray) -> np.ndarray:
 
 
 def _neighbours(
-    x: np.ndarray, run: np.ndarray, time: np.ndarray, other_runs: bool = False
+    x: np.ndarray, run: np.ndarray, time: np.ndarray, least: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (K, n) of the nearest windows of another time, and which of them there are."""
+    """Rows (K, n) of the nearest windows of another run or time, and which of them there are.
+
+    Args:
+        x: (K, k), where windows are.
+        run, time: (K,), of each.
+        least: apart [s]; infinite: only those of other runs.
+    """
     count = min(SEARCHED, len(x))
     rows = KDTree(x).query(x, count)[1].reshape(len(x), -1)
-    other = run[rows] != run[:, None]
-    apart = other if other_runs else other | (np.abs(time[rows] - time[:, None]) >= APART)
+    apart = (run[rows] != run[:, None]) | (np.abs(time[rows] - time[:, None]) >= least)
     order = np.argsort(~apart, axis=1, kind="stable")[:, :NEIGHBOURS]
     return np.take_along_axis(rows, order, axis=1), np.take_along_axis(apart, order, axis=1)
 

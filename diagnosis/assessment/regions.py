@@ -1,9 +1,9 @@
 """Where the model fails: regions of a covariate in which the model error is larger than elsewhere.
 
-Windows overlap and the model error is correlated in time, so that clusters of 30 s count as independent
-and means have cluster-robust standard errors. A region is reported only if the mean logarithm of its
-clusters' mean squares is above that of the rest at level 1 %: Welch's test, with Bonferroni's correction
-for the number of regions that were tried.
+Windows overlap and the model error is correlated in time, so that clusters of two blocks count as
+independent and means have cluster-robust standard errors. A region is reported only if the mean
+logarithm of its clusters' mean squares is above that of the rest at level 1 %: Welch's test, with
+Bonferroni's correction for the number of regions that were tried.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,8 +18,8 @@ from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 NAMES = {"X": "Surge", "Y": "Sway", "N": "Yaw"}
 UNITS = {"X": "N", "Y": "N", "N": "N m"}
 SIGNIFICANCE = 0.01  # level of the test after Bonferroni's correction; chosen
-# Blocks of 15 s in a cluster. Calibrated by tests/test_diagnosis_where.py on model error that is
-# correlated over 3 s and depends on no covariate: with one block three times as many regions were found.
+# Calibrated by tests/test_diagnosis_where.py on model error that is correlated over a window and depends
+# on no covariate: with one block three times as many regions were found.
 BLOCKS_PER_CLUSTER = 2
 # Ratio of the model error to its uncertainty, above which there is an error at all. Chosen: that
 # uncertainty is right within 30 % (tests/test_diagnosis_where.py).

@@ -18,12 +18,12 @@ from scipy import stats
 
 from ..model import Integrals, Model
 from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
-from ..model.weak_form import EVERY, OVERLAP, commanded
+from ..model.weak_form import OVERLAP, commanded
 from .covariates import AXES
 
 CHANCE = 0.01  # level of the test, all axes and both statistics together; contract
 SHARE_OF_FIRST = 0.05  # of an axis' first model error, from which a remainder matters; contract
-SPAN = 12  # windows: 6 s, twice their width, so that what is left is slower than a window; chosen
+SPAN = 12  # windows: twice their width, so that what is left is slower than a window; chosen
 # Variance of a mean of SPAN windows by noise alone, as a share of that of independent windows: measured
 # 0.04 to 0.13 on runs without a hidden cause, and doubled.
 SLOW_NOISE = 0.25
@@ -97,7 +97,7 @@ def spans(data: Sequence[Integrals]) -> np.ndarray:
     """(K,), number of the span that each window of some runs lies in, over all runs."""
     numbers, first = [], 0
     for w in data:
-        number = np.floor((w.middle - w.middle[0]) / (SPAN * EVERY) + 1e-9).astype(int)
+        number = np.floor((w.middle - w.middle[0]) / (SPAN * w.every) + 1e-9).astype(int)
         numbers.append(first + number)
         first += int(number[-1]) + 1
     return np.unique(np.concatenate(numbers), return_inverse=True)[1]

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from fmus.scale import CSE1, Scale
+
 from .recurrence import Recurrence
 from .regions import NAMES, UNITS, Region
 from .remainder import AxisRemainder
@@ -41,10 +43,10 @@ LASTS = (
     "something that comes and goes, such as gusts, a changing current, or a towed cable",
 )
 BRIEF = (
-    "repeats with neither place, motion, command nor time, and is over within seconds",
+    "repeats with neither place, motion, command nor time, and is soon over",
     "waves, a disturbance of the measurement, or commands other than those recorded",
 )
-BRIEFLY = 3.0  # s: a window makes what is brief last for 2 s; chosen
+BRIEFLY = 3.0  # s, times the scale of the ship: a window makes what is brief last for 2 s; chosen
 
 
 def remainder_sentence(
@@ -52,6 +54,7 @@ def remainder_sentence(
     how: Sequence[Recurrence] | None,
     regions: Sequence[Region],
     waves: bool,
+    scale: Scale = CSE1,
 ) -> str:
     """The remainder of all axes in words.
 
@@ -60,6 +63,7 @@ def remainder_sentence(
         how: of each axis how it comes again; None where nothing is left.
         regions: where the model that is judged fails, the clearest of an axis first.
         waves: whether waves were found, which the model cannot take away.
+        scale: of the ship.
     """
     left = [axis for axis in axes if axes[axis].significant]
     if not left or how is None:
@@ -67,7 +71,7 @@ def remainder_sentence(
     parts: dict[tuple[str, str], list[str]] = {}
     for k, axis in enumerate(axes):
         if axis in left:
-            parts.setdefault(_kind(how[k]), []).append(axis)
+            parts.setdefault(_kind(how[k], BRIEFLY * scale.time), []).append(axis)
     texts = []
     for (comes, cause), group in parts.items():
         amounts = " and ".join(_amount(axis, axes[axis]) for axis in group)
@@ -86,13 +90,13 @@ def _amount(axis: str, r: AxisRemainder) -> str:
     return f"{NAMES[axis]}: {r.rms:.2g} {unit} (uncertainty {r.uncertainty:.1g}{of_first})"
 
 
-def _kind(r: Recurrence) -> tuple[str, str]:
+def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
     if r.best == "place":
         return REPEATS["place"]
     if r.in_part:
         return IN_PART
     if r.best is not None:
         return REPEATS[r.best]
-    if r.lasts > BRIEFLY:
+    if r.lasts > briefly:
         return LASTS[0].format(r.lasts), LASTS[1]
     return BRIEF

@@ -14,11 +14,12 @@ import numpy as np
 from cosim import InputError
 from fmus.effects import Loaded
 from fmus.hull import damping_force
+from fmus.scale import CSE1, Scale
 from fmus.vessel.vessel_effects import NONE
 
 from ..model import Model
 from ..progress import Advance, silent
-from .closed_loop import BOUND, REFERENCES, largest_distance
+from .closed_loop import REFERENCES, bound_of, largest_distance
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
 # Least difference that counts, share of the dissipation. Chosen: no coefficient is known to 1 %.
@@ -30,7 +31,7 @@ MIN_REGION = 0.1  # of the default limits; chosen, so that an axis that hardly m
 
 
 class OperatingRegion(NamedTuple):
-    """Largest |u|, |v| [m/s] and |r| [rad/s] at which the ship operates.
+    """Largest |u|, |v| [m/s] and |r| [rad/s] at which a ship operates.
 
     The default holds 99 % of each of the four runs that NTNU published of CyberShip Enterprise 1; the
     thesis' paths stay below half of it.
@@ -41,11 +42,16 @@ class OperatingRegion(NamedTuple):
     r: float = 0.6
 
     @classmethod
-    def of(cls, nu: np.ndarray) -> "OperatingRegion":
+    def at(cls, scale: Scale) -> "OperatingRegion":
+        """The default region of a ship of some size."""
+        return cls(*(x * f for x, f in zip(cls(), scale.speeds, strict=True)))
+
+    @classmethod
+    def of(cls, nu: np.ndarray, scale: Scale = CSE1) -> "OperatingRegion":
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         known = np.abs(nu[np.isfinite(nu).all(axis=1)])
         most = np.quantile(known, COVERAGE, axis=0) if len(known) else np.zeros(3)
-        return cls(*map(float, np.maximum(most, MIN_REGION * np.array(cls()))))
+        return cls(*map(float, np.maximum(most, MIN_REGION * np.array(cls.at(scale)))))
 
 
 OPERATING = OperatingRegion()
@@ -58,7 +64,7 @@ class Stability:
     Attributes:
         mass_definite: whether M is positive definite.
         nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
-        bounded: whether the ship stays within BOUND of its target on every reference path.
+        bounded: whether the ship stays within some ship lengths of its target on every reference path.
         region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
         notes: further remarks, a sentence each.
     """
@@ -80,19 +86,20 @@ def check_stability(
     model: Model,
     nominal: Model,
     advance: Advance = silent,
-    region: OperatingRegion = OPERATING,
+    region: OperatingRegion | None = None,
 ) -> Stability:
     """Check a learned model against the nominal one.
 
     Args:
         model, nominal: the learned model and the initial one.
         advance: receives the name of each step when it begins.
-        region: where the dissipation is compared.
+        region: where the dissipation is compared; by default that of the size of the ship.
 
     Raises:
         InputError: the nominal model's mass matrix is not positive definite, the learned model's has no
             inverse, or the region has no size.
     """
+    region = region or OperatingRegion.at(model.ship.scale)
     if not all(isfinite(most) and most > 0.0 for most in region):
         raise InputError("the operating region needs positive limits of u, v and r")
     metric = mass(nominal)
@@ -227,21 +234,21 @@ def _motion(nu: np.ndarray, after: float, before: float) -> str:
 
 def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> bool:
     """Whether the reference controller keeps the ship on every path; adds to the notes how well."""
-    bounded = True
+    bounded, bound = True, bound_of(model)
     for reference in REFERENCES:
         advance(f"closed loop on the {reference.name}")
         distance = largest_distance(reference, model)
-        if distance < BOUND:
+        if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
-        notes.append(f"{reference.name}: more than {BOUND:g} m from the target")
+        notes.append(f"{reference.name}: more than {bound:g} m from the target")
         outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
         undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
-        if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < BOUND:
+        if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
             notes.append(
                 "it holds without wind, waves and current: they are too strong for the thrusters"
             )
-        elif largest_distance(reference, nominal) >= BOUND:
+        elif largest_distance(reference, nominal) >= bound:
             notes.append("the nominal model is not held there either")
     return bounded

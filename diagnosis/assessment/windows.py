@@ -1,4 +1,4 @@
-"""Window prediction error: how far a model departs from the measurement within eight seconds.
+"""Window prediction error: how far a model departs from the measurement within some seconds.
 
 A run is cut into consecutive windows, the remainder is dropped. In each the model starts from the
 smoothed state, with the thrusters' history from the commands before, and is compared with every raw
@@ -16,10 +16,10 @@ from fmus.ops import wrap
 
 from ..model import Model
 from ..model.prediction import LONGEST_STEP, Starts, predict
+from ..model.weak_form import HORIZON
 from ..smoothing import Smoothed
 
-# s. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s (docs/stability.md).
-LENGTH = 8.0
+# Times the scale of the ship.
 FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
 LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
 MIN_COVERAGE = 0.5  # of a window's samples; chosen
@@ -61,9 +61,11 @@ class Windows:
     """The windows of some runs, in which models are compared with the measurement.
 
     Args:
-        runs: smoothed runs.
+        runs: smoothed runs of one ship.
+        length: of the windows [s]; by default that of the ship.
 
     Attributes:
+        length: of the windows [s].
         run, start: (w,), number of each window's run, and when it starts [s].
         sample_window: (samples,), the window of each sample that is used.
         measured: (samples, 3), the raw pose [m, m, rad].
@@ -73,11 +75,12 @@ class Windows:
         InputError: no run has a window with enough samples.
     """
 
-    def __init__(self, runs: Sequence[Smoothed]) -> None:
-        parts = [usable_windows(smoothed) for smoothed in runs]
+    def __init__(self, runs: Sequence[Smoothed], length: float | None = None) -> None:
+        self.length = length or HORIZON * runs[0].scale.time
+        parts = [usable_windows(smoothed, self.length) for smoothed in runs]
         counts = [p.first_rows.size for p in parts]
         if not sum(counts):
-            raise InputError(f"no window of {LENGTH:g} s has enough samples")
+            raise InputError(f"no window of {self.length:.3g} s has enough samples")
         before = np.cumsum([0, *counts[:-1]])
         self.run = np.repeat(np.arange(len(parts)), counts)
         self.start = np.concatenate([p.time[p.first_rows] for p in parts])
@@ -88,7 +91,7 @@ class Windows:
         for h, five in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
             members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, five)]
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            group = Starts(starts, h, int(np.ceil(LENGTH / h - 1e-6)), five)
+            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)), five)
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def residuals(self, model: Model | None = None) -> np.ndarray:
@@ -156,11 +159,11 @@ class RunWindows(NamedTuple):
     def step_and_commands(self) -> tuple[float, bool]:
         """Step of integration [s], which divides the sample period; whether commands are five."""
         row = round(float(np.median(np.diff(self.time))), 9)
-        parts = int(np.ceil(row / LONGEST_STEP - 1e-6))
+        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
         return row / parts, self.smoothed.track.run.five is not None
 
 
-def usable_windows(smoothed: Smoothed, length: float = LENGTH) -> RunWindows:
+def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     """The windows of a length [s] of a run that have their first sample and at least half of all."""
     track, used, period = smoothed.track, smoothed.used, smoothed.track.period
     since = smoothed.time - smoothed.time[0] + 0.25 * period
@@ -189,8 +192,9 @@ def free_run(smoothed: Smoothed, model: Model) -> np.ndarray:
     """
     first = np.flatnonzero(smoothed.used)[:1]
     step, five = RunWindows(smoothed, first, first, first).step_and_commands
-    h = max(step, FREE_STEP)
-    seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), LONGEST_FREE)
+    h = max(step, FREE_STEP * smoothed.scale.time)
+    longest = LONGEST_FREE * smoothed.scale.time
+    seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
     starts = Starts(((smoothed, first),), h, int(seconds / h), five)
     return predict(starts, model)[:, :, 0, 0]
 

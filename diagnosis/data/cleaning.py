@@ -9,10 +9,12 @@ import numpy as np
 
 from cosim import InputError
 from fmus.ops import wrap
+from fmus.scale import CSE1, Scale
 
 from .reading import Run
 from .unit_check import refuse_time, refuse_units
 
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 SHORTEST = 8.0  # s, of a run: one prediction window
 # Of what regular sampling would give, gaps of up to GAP seconds filled. Chosen: what is rarer comes in
 # bursts, of which nothing can be differentiated.
@@ -22,6 +24,7 @@ LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by th
 # s, or LONG periods if that is longer: gaps are told, and over one between commands none is known.
 # Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
 HELD = 0.5
+NEAR = 1.0  # s, before and after a gap of the heading, by whose yaw rate it is unwrapped (chosen)
 
 
 class Counts(NamedTuple):
@@ -47,6 +50,7 @@ class Track:
         period: of the measurement [s].
         out: rows left out, as their time stamp is missing, repeated or goes backwards.
         notes: what was found, a line each.
+        scale: of the ship.
     """
 
     run: Run
@@ -57,6 +61,7 @@ class Track:
     period: float
     out: int
     notes: tuple[str, ...]
+    scale: Scale = CSE1
 
     @cached_property
     def valid(self) -> np.ndarray:
@@ -71,7 +76,7 @@ class Track:
         """
         time, held = self.run.time, self.run.held
         given = time if held is None or 2 * int(held.sum()) > time.size else time[~held]
-        silent = np.diff(given) > max(HELD, LONG * float(np.median(np.diff(time))))
+        silent = np.diff(given) > max(HELD * self.scale.time, LONG * float(np.median(np.diff(time))))
         last, next_one = given[:-1][silent], given[1:][silent]
         return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
 
@@ -82,12 +87,13 @@ class Track:
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
-def clean(run: Run, anyway: bool = False) -> Track:
+def clean(run: Run, anyway: bool = False, scale: Scale = CSE1) -> Track:
     """Judge the samples of a run.
 
     Args:
         run: as it was read.
         anyway: whether a speed that no ship has, or a heading in degrees, is believed.
+        scale: of the ship.
 
     Raises:
         InputError: too short, time not in order, another unit than said, nothing valid, no motion.
@@ -104,16 +110,17 @@ def clean(run: Run, anyway: bool = False) -> Track:
     with np.errstate(over="ignore"):
         row = float(np.median(np.diff(run.time))) if kept.size > 1 else 0.0
     seconds = float(run.time[-1] - run.time[0]) + row if kept.size > 1 else 0.0
-    if seconds < SHORTEST * (1.0 - 1e-6):
-        raise InputError(f"{where} is too short: {seconds:.3g} s, at least {SHORTEST:g} s are needed")
+    shortest = SHORTEST * scale.time
+    if seconds < shortest * (1.0 - 1e-6):
+        raise InputError(f"{where} is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed")
     dropped = lost(run.pose)
     repeats = repeated(run.pose, ~dropped)
     fresh = np.flatnonzero(~dropped & ~repeats)
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
     period = float(np.median(np.diff(run.time[fresh])))
-    refuse_time(row, seconds, where, run.called or {})
-    steps = np.minimum(np.diff(run.time), GAP)
+    refuse_time(row, seconds, where, run.called or {}, scale)
+    steps = np.minimum(np.diff(run.time), GAP * scale.time)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
@@ -126,10 +133,10 @@ def clean(run: Run, anyway: bool = False) -> Track:
     frozen = repeats & ~between
     pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
     refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
-    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period)
+    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period, NEAR * scale.time)
     _moves(pose[fresh], where)
-    notes += _gaps(run.time[fresh] - run.time[0], period)
-    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes))
+    notes += _gaps(run.time[fresh] - run.time[0], max(HELD * scale.time, LONG * period))
+    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
 
 
 def in_order(time: np.ndarray) -> np.ndarray:
@@ -164,16 +171,16 @@ def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
     return repeats
 
 
-def unwrap(time: np.ndarray, psi: np.ndarray, period: float) -> np.ndarray:
+def unwrap(time: np.ndarray, psi: np.ndarray, period: float, reach: float = NEAR) -> np.ndarray:
     """The heading [rad] continuous over turns.
 
     Over a long gap it may have turned by more than half a turn: then that step is taken which comes
-    nearest to what the yaw rate of the second before and the second after would have turned it.
+    nearest to what the yaw rate just before and just after, within some reach [s], would have turned it.
     """
     step, dt = wrap(np.diff(psi)), np.diff(time)
     rate = step / dt
     for k in np.flatnonzero(dt > LONG * period):
-        near = (np.abs(time[1:] - time[k]) < 1.0) | (np.abs(time[:-1] - time[k + 1]) < 1.0)
+        near = (np.abs(time[1:] - time[k]) < reach) | (np.abs(time[:-1] - time[k + 1]) < reach)
         near &= dt <= LONG * period
         turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
         step[k] = turn + wrap(step[k] - turn)
@@ -198,10 +205,10 @@ def noise(values: np.ndarray) -> np.ndarray:
     return 1.4826 * np.median(third, axis=0) / np.sqrt(20.0)
 
 
-def _gaps(time: np.ndarray, period: float) -> list[str]:
-    """A line for the gaps of half a second and more between times since the start, if there are any."""
+def _gaps(time: np.ndarray, least: float) -> list[str]:
+    """A line for the gaps above some time [s] between times since the start, if there are any."""
     dt = np.diff(time)
-    long = dt > max(HELD, LONG * period)
+    long = dt > least
     if not long.any():
         return []
     longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim import InputError
+from fmus.scale import CSE1, Scale
 
 from .columns import UNITS
 
@@ -14,7 +15,8 @@ GO_ON = "--anyway goes on all the same"
 # s between two samples of a measurement, by which a unit of time is guessed (chosen)
 USUAL = 1e-3, 1.0
 TURN = 6.3  # rad, just above a turn; a heading that stays below is in radians, and may wrap
-RAREST = 2.0  # s between two samples; a model ship's own time constants are shorter (chosen)
+# s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
+RAREST = 2.0
 OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
 LONGEST = 1e9  # s, of a run; thirty years are a mistake in a time stamp
 FARTHEST = 1e9  # m, rad; beyond is no place on earth
@@ -22,7 +24,9 @@ FARTHEST = 1e9  # m, rad; beyond is no place on earth
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 
 
-def refuse_time(row: float, seconds: float, where: str, called: Mapping[str, str]) -> None:
+def refuse_time(
+    row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = CSE1
+) -> None:
     """Refuse a time in another unit than said.
 
     Args:
@@ -30,12 +34,14 @@ def refuse_time(row: float, seconds: float, where: str, called: Mapping[str, str
         seconds: length of the run [s].
         where: what messages call the run.
         called: signal -> its column in the file, where that has another name.
+        scale: of the ship.
 
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
     """
-    if row > RAREST or row < OFTENEST:
-        much = "rare" if row > RAREST else "frequent"
+    rarest = RAREST * scale.time
+    if row > rarest or row < OFTENEST:
+        much = "rare" if row > rarest else "frequent"
         unit = likely_unit(row)
         told = f" {_say(('time',), unit, called)}" if unit else ""
         raise InputError(

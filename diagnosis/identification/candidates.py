@@ -12,6 +12,7 @@ import numpy as np
 
 from fmus.effects import Effect
 from fmus.effects.effect import EACH_VSP
+from fmus.scale import Scale
 
 from ..model import Integrals, Model, omega
 from ..model.weak_form import remember_responses
@@ -19,9 +20,9 @@ from ..parallel import for_each
 from .multistart import Landscape, best_values
 from .segmentation import FLOOR, intervals, problem
 
-SMALL = (
-    1e-3  # step of a finite difference where the model error is not linear, in the coefficient's unit
-)
+# Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
+# Step of a finite difference where the model error is not linear.
+SMALL = 1e-3
 # A nonlinear effect without values of its own is tried at these multiples of the value at which its
 # force is as large as the model error, found between the smallest and the largest in steps of ten.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
@@ -42,6 +43,7 @@ class Shape:
         fitted: parameters that scale it.
         offset: (K, 3), the force of what is given alone; None where that is nothing.
         columns: (K, 3, p), force for one unit of each fitted parameter.
+        unit: (p,), what one unit of each is at the size of the ship.
         nuisance_offset: (q,), nuisance parameters together with what is given; None: as they are.
         precision: (p, p), prior precision of the fitted ones; None: 0.
     """
@@ -50,6 +52,7 @@ class Shape:
     fitted: Sequence[str]
     offset: np.ndarray | None
     columns: np.ndarray
+    unit: np.ndarray
     nuisance_offset: np.ndarray | None = None
     precision: np.ndarray | None = None
 
@@ -77,9 +80,11 @@ def shape(
 ) -> Shape:
     """What the model gains by an effect: minus the change of the model error, by steps of ``step``."""
     start = model_error(data, model.plus(given)) if given else base
-    columns = [(start - model_error(data, model.plus({**given, n: step}))) / step for n in fitted]
+    unit = np.array([model.unit(n) for n in fitted])
+    steps = zip(fitted, (step * unit).tolist(), strict=True)
+    columns = [(start - model_error(data, model.plus({**given, n: h}))) / h for n, h in steps]
     stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
-    return Shape(dict(given), list(fitted), base - start if given else None, stacked)
+    return Shape(dict(given), list(fitted), base - start if given else None, stacked, unit)
 
 
 def covered(columns: np.ndarray) -> np.ndarray:
@@ -116,14 +121,17 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     return bend.T @ bend
 
 
-def curve(base: np.ndarray, plain: Shape) -> list[Shape]:
+def curve(base: np.ndarray, plain: Shape, scale: Scale) -> list[Shape]:
     """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
-    inside = covered(plain.columns)
+    force = plain.columns * plain.unit / np.array(scale.forces)[:, None]
+    inside = covered(force)
     if inside.sum() < FEWEST:
         return []
-    columns = plain.columns[:, :, inside]
+    unit = plain.unit[inside]
+    precision = smoothness(base / scale.forces, force[:, :, inside]) / np.outer(unit, unit)
     fitted = [n for n, kept in zip(plain.fitted, inside, strict=True) if kept]
-    return [replace(plain, fitted=fitted, columns=columns, precision=smoothness(base, columns))]
+    columns = plain.columns[:, :, inside]
+    return [replace(plain, fitted=fitted, columns=columns, unit=unit, precision=precision)]
 
 
 def values_to_try(
@@ -152,7 +160,7 @@ def by_starts(
     data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, step: float
 ) -> list[Shape]:
     """The shapes of an effect at the best values of what it is not linear in."""
-    sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR
+    sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR * model.ship.scale.forces
 
     def force(values: Mapping[str, float]) -> np.ndarray:
         changed = model.plus({n: x - model.value(n) for n, x in values.items()})
@@ -165,7 +173,8 @@ def by_starts(
     poses = np.concatenate([w.smoothed.eta[w.known, :2] for w in data])
     extent = float(np.linalg.norm(np.ptp(poses, axis=0)))
     present = {p.name: model.value(p.name) for p in e.parameters}
-    of = Landscape(e, force, (base / sigma).ravel(), extent, present)
+    units = {p.name: model.unit(p.name) for p in e.parameters}
+    of = Landscape(e, force, (base / sigma).ravel(), extent, present, units)
     found, fitted = best_values(of, tried)
     return [shape(data, model, base, additions(model, e, v), fitted, step) for v in found]
 
@@ -200,17 +209,18 @@ def scaled(
     The effect's other parameters are refined as well, from where they are.
     """
     allowed = next(p.range for p in e.parameters if p.name == name)
-    low = -LARGEST if allowed.min is None else allowed.min
-    high = LARGEST if allowed.max is None else allowed.max
-    wanted = float(np.square(base).sum())
+    unit, forces_of = model.unit(name), model.ship.scale.forces
+    low = -LARGEST * unit if allowed.min is None else allowed.min
+    high = LARGEST * unit if allowed.max is None else allowed.max
+    wanted = float(np.square(base / forces_of).sum())
     others = {n: model.value(n) for n in e.shape_parameters}
     others |= {n: 0.0 for n in e.coefficients if n != name}
     for sign in (1.0, -1.0):
         forces: dict[float, float] = {}
-        size = SMALLEST
+        size = SMALLEST * unit
         while max(forces.values(), default=0.0) < wanted and low <= sign * size <= high:
             change = base - model_error(data, model.plus({name: sign * size}))
-            forces[size] = float(np.square(change).sum())
+            forces[size] = float(np.square(change / forces_of).sum())
             size *= 10.0
         largest = max(forces.values(), default=0.0)
         if largest > SLIGHT:
@@ -227,7 +237,7 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
     step = 1.0 if hull or not e.differentiable else SMALL
     if e.differentiable and not e.search.times:
         plain = shape(data, model, base, {}, e.fitted, step)
-        shapes += [plain] if not e.search.smooth else curve(base, plain)
+        shapes += [plain] if not e.search.smooth else curve(base, plain, model.ship.scale)
     if spread(e):
         return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
     for values in values_to_try(data, model, base, e):

@@ -12,7 +12,7 @@ from .candidates import model_error
 from .confidence import Evidence, confidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
-from .map_regression import RIDGE, Scored, regression, score
+from .map_regression import Scored, regression, ridge, score
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance, refit
 
@@ -128,7 +128,7 @@ class Search:
         names = [*self.at.fitted, *self.t.prior.mean]
         kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
         a = self._along
-        return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept])
+        return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept], a.unit[kept])
 
     def _nested(self) -> tuple[list[Model], list[float]]:
         """The models with each effect and those before it, and its share of the first model error.
@@ -171,7 +171,7 @@ def laplace_std(t: TrainingSet, along: Nuisance) -> np.ndarray:
     """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
     A = np.moveaxis(along.columns * t.weight[:, None], 2, 0).reshape(along.offset.size, -1).T
     H = A.T @ A + along.precision
-    H += RIDGE * np.diag(np.diag(H) + 1.0)
+    H += ridge(H, along.unit)
     return np.sqrt(np.diag(np.linalg.inv(H)))
 
 

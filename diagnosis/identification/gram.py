@@ -39,11 +39,13 @@ class Nuisance:
         precision: (q, q), prior precision: 1 on the diagonal for a nominal coefficient, in prior
             standard deviations; 0 for a parameter of an effect that was found before.
         offset: (q,), how far each already is from its prior mean.
+        unit: (q,), what one unit of each is at the size of the ship; 1 for a nominal coefficient.
     """
 
     columns: np.ndarray
     precision: np.ndarray
     offset: np.ndarray
+    unit: np.ndarray
 
 
 class Fold(NamedTuple):
@@ -87,6 +89,7 @@ class GramTable:
         entries: (candidate, shape) -> its columns.
         nuisance: indices of the nuisance parameters' columns.
         precision: (q, q), their prior precision.
+        unit: (p,), what one unit of each column's parameter is at the size of the ship.
         sigma: (3,), standard deviation of the noise of each axis [N, N, N m].
     """
 
@@ -96,6 +99,7 @@ class GramTable:
     entries: dict[Key, Entry]
     nuisance: list[int]
     precision: np.ndarray
+    unit: np.ndarray
     sigma: np.ndarray
 
     @cached_property
@@ -154,7 +158,7 @@ def gram_table(
         nuisance: parameters that are fitted along.
         sigma: (3,), standard deviation of the noise of each axis.
     """
-    columns = [y[:, :, None]]
+    columns, units = [y[:, :, None]], [np.ones(1)]
     count = 1
     entries = {NOTHING: Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)}
     for i, c in enumerate(candidates):
@@ -162,9 +166,11 @@ def gram_table(
             given = -1
             if s.offset is not None:
                 columns.append(s.offset[:, :, None])
+                units.append(np.ones(1))
                 given = count
                 count += 1
             columns.append(s.columns)
+            units.append(s.unit)
             size = len(s.fitted)
             entries[i, j] = Entry(
                 given,
@@ -176,6 +182,7 @@ def gram_table(
             )
             count += size
     columns.append(nuisance.columns)
+    units.append(nuisance.unit)
     indices = list(range(count, count + nuisance.columns.shape[2]))
     A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
     names = np.unique(blocks)
@@ -184,7 +191,8 @@ def gram_table(
         part = A[blocks == name].reshape(-1, A.shape[2])
         grams[k] = part.T @ part
     rows = np.array([(blocks == name).sum() for name in names])
-    return GramTable(grams, rows, names // RUN, entries, indices, nuisance.precision, sigma)
+    runs, unit = names // RUN, np.concatenate(units)
+    return GramTable(grams, rows, runs, entries, indices, nuisance.precision, unit, sigma)
 
 
 def block_folds(data: Sequence[Integrals]) -> list[np.ndarray]:

@@ -21,7 +21,13 @@ from scipy.linalg import block_diag
 from .gram import Fold, GramTable
 
 RIDGE = 1e-9  # relative: collinear regressors share what they explain
-EMPTY = 1e-12  # sum of squares, in units of the noise, below which a column holds nothing on these data
+# Sum of squares, in units of noise and ship, below which a column holds nothing on these data.
+EMPTY = 1e-12
+
+
+def ridge(H: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """(p, p), what makes an information matrix regular, for parameters with units (p,)."""
+    return RIDGE * np.diag(np.diag(H) + unit**-2.0)
 
 
 class Fit(NamedTuple):
@@ -53,6 +59,7 @@ class Regression(NamedTuple):
         free: how many of them are the candidate's.
         precision, offset: their prior precision, and distance from the prior mean at first.
         nonlinear: number of parameters that were given, not fitted.
+        unit: (q,), what one unit of each is at the size of the ship.
     """
 
     target: np.ndarray
@@ -61,12 +68,13 @@ class Regression(NamedTuple):
     precision: np.ndarray
     offset: np.ndarray
     nonlinear: int
+    unit: np.ndarray
 
     def fitted(self, gram: np.ndarray) -> Fit:
         """The maximum a posteriori fit to data with a Gram matrix (p, p)."""
         H = gram[self.use[:, None], self.use] + self.precision
         diagonal = np.einsum("ii->i", H)
-        diagonal += RIDGE * (diagonal + 1.0)
+        diagonal += RIDGE * (diagonal + self.unit**-2.0)
         given = np.flatnonzero(self.target)
         right = gram[self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
         beta = np.linalg.solve(H, right)
@@ -82,8 +90,8 @@ class Regression(NamedTuple):
         """Effective number of the candidate's parameters, those that were given included."""
         k = self.use[: self.free]
         data = gram[k[:, None], k]
-        ridge = RIDGE * np.diag(np.diag(data) + 1.0)
-        inverse = np.linalg.solve(data + self.precision[: k.size, : k.size] + ridge, data)
+        regular = data + self.precision[: k.size, : k.size] + ridge(data, self.unit[: k.size])
+        inverse = np.linalg.solve(regular, data)
         return float(np.trace(inverse)) + self.nonlinear
 
 
@@ -95,11 +103,12 @@ def regression(t: GramTable, candidate: int, shape: int) -> Regression:
     if entry.given >= 0:
         target[entry.given] = -1.0
     plain = not entry.precision.any()
-    live = np.array([k for k, c in enumerate(entry.columns) if not plain or t.total[c, c] > EMPTY], int)
+    sizes = [t.total[c, c] * t.unit[c] ** 2 for c in entry.columns]
+    live = np.array([k for k, size in enumerate(sizes) if not plain or size > EMPTY], int)
     use = np.array([*[entry.columns[k] for k in live], *t.nuisance])
     precision = np.asarray(block_diag(entry.precision[live[:, None], live], t.precision))
     offset = np.concatenate([entry.start[live], entry.offset])
-    return Regression(target, use, live.size, precision, offset, entry.nonlinear)
+    return Regression(target, use, live.size, precision, offset, entry.nonlinear, t.unit[use])
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ stay where they are: the refinement moves them along afterwards.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import asinh, pi
 
 import numpy as np
@@ -45,6 +45,7 @@ class Landscape:
         y: (N,), model error; both in units of its root mean square on each axis.
         extent: how far the ship moved [m], by which lengths without limits are tried.
         values: of the parameters in the model so far.
+        units: what one unit of each parameter is at the size of the ship; 1 of what is not named.
     """
 
     effect: Effect
@@ -52,6 +53,7 @@ class Landscape:
     y: np.ndarray
     extent: float
     values: Mapping[str, float]
+    units: Mapping[str, float] = field(default_factory=dict)
 
     def declared(self, names: Sequence[str]) -> list[Variable]:
         """The declarations of some parameters."""
@@ -62,7 +64,7 @@ class Landscape:
         """Of a parameter: its start, its limits, or how far the ship moved and turned."""
         ends = [abs(x) for x in (p.range.min, p.range.max) if x is not None]
         by_unit = {"m": self.extent / 5.0, "rad": pi / FAR}.get(p.unit, 0.0)
-        return max(abs(self.values[p.name]), by_unit) or max(ends, default=0.0) or 1.0
+        return max(abs(self.values[p.name]), by_unit) or max(ends, default=0.0) or self._one(p.name)
 
     def within(self, p: Variable, share: float) -> float:
         """The value at a share, 0 to 1, of the way through what is tried of a parameter."""
@@ -90,7 +92,11 @@ class Landscape:
     def unit(self, name: str) -> float:
         """One, or half of a coefficient's limit if that is less: the double is within it."""
         (p,) = self.declared([name])
-        return 1.0 if p.range.max is None else min(1.0, 0.5 * p.range.max)
+        one = self._one(name)
+        return one if p.range.max is None else min(one, 0.5 * p.range.max)
+
+    def _one(self, name: str) -> float:
+        return self.units.get(name, 1.0)
 
     def columns(self, shape: Mapping[str, float], linear: Sequence[str]) -> np.ndarray:
         """(N, p), force for one unit of each linear parameter."""

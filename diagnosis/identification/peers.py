@@ -65,18 +65,20 @@ def features(data: Sequence[Integrals], model: Model) -> Features:
     sigma = sigma / sigma[0]
     target = (base / sigma).reshape(-1)
     chosen = []
-    columns = []
+    columns, units = [], []
     names: list[str] = []
     for c in candidates(data, model, base):
         stacked = [_stacked(s, sigma) for s in c.shapes]
         best = int(np.argmax([_alone(x[:, 0], target) for x in stacked]))
         chosen.append((c, c.shapes[best]))
         columns.append(stacked[best])
-        names += [*([""] if c.shapes[best].offset is not None else []), *c.shapes[best].fitted]
+        given = [""] if c.shapes[best].offset is not None else []
+        names += [*given, *c.shapes[best].fitted]
+        units.append(np.concatenate([np.ones(len(given)), c.shapes[best].unit]))
     owner = np.repeat(np.arange(len(columns)), [x.shape[1] for x in columns])
     A = np.concatenate(columns, axis=1)
     scale, size = A.std(axis=0), float(target.std())
-    live = scale > LIVE * size
+    live = scale * np.concatenate(units) > LIVE * size
     blocks = np.repeat(np.concatenate([RUN * k + w.block for k, w in enumerate(data)]), 3)
     used = [n for n, keep in zip(names, live, strict=True) if keep]
     standard = A[:, live] / scale[live]

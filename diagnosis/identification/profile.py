@@ -63,8 +63,9 @@ def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str
     )
     best = min((trial(present), trial(float(found.x))), key=lambda r: r.cost)
     value = best.estimate.values[name]
-    low, high = (_end(trial, best.cost, at.start.value(name) + value, sign) for sign in (-1.0, 1.0))
     start = at.start.value(name)
+    size = max(abs(start + value), SMALLEST_SCALE * at.start.unit(name))
+    low, high = (_end(trial, best.cost, start + value, sign * size) for sign in (-1.0, 1.0))
     own = [at.fitted.index(n) for n in p.names if n in at.fitted and n != name]
     precision = np.asarray(block_diag(best.estimate.precision, at.precision[own][:, own]))
     last = replace(best.estimate, precision=precision, held=at.held | {name})
@@ -79,7 +80,7 @@ def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
     if run or effect.linear or effect.search.smooth:
         return False
     model, left = at.model(t.prior), t.error(at)
-    size = max(abs(at.start.value(name) + at.values[name]), SMALLEST_SCALE)
+    size = max(abs(at.start.value(name) + at.values[name]), SMALLEST_SCALE * model.unit(name))
     fine = slope(t, model, left, name, size)
     coarse = slope(t, model, left, name, COARSER * size)
     return float(np.linalg.norm(fine - coarse)) > ROUGH * float(np.linalg.norm(coarse))
@@ -99,14 +100,14 @@ def _profile(t: TrainingSet, at: Estimate, p: Place, name: str) -> Callable[[flo
     return trial
 
 
-def _end(trial: Callable[[float], Refined], least: float, value: float, sign: float) -> float:
-    """Where the cost passes its least by LIKELY, on one side of a value."""
-    inside, step = value, FINEST * max(abs(value), SMALLEST_SCALE)
-    while abs(step) < REACH * max(abs(value), SMALLEST_SCALE):
-        if trial(value + sign * step).cost > least + LIKELY:
+def _end(trial: Callable[[float], Refined], least: float, value: float, size: float) -> float:
+    """Where the cost passes its least by LIKELY, on the side of a value that its size is on."""
+    inside, step = value, FINEST * size
+    while abs(step) < REACH * abs(size):
+        if trial(value + step).cost > least + LIKELY:
             break
-        inside, step = value + sign * step, 2.0 * step
-    outside = value + sign * step
+        inside, step = value + step, 2.0 * step
+    outside = value + step
     for _ in range(BISECTIONS):
         middle = 0.5 * (inside + outside)
         if trial(middle).cost > least + LIKELY:

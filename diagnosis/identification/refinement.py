@@ -24,13 +24,14 @@ from ..model.ship_model import parameter_and_run
 from ..model.weak_form import OVERLAP
 from .candidates import SMALL, Shape, model_error
 from .gram import Nuisance
-from .map_regression import RIDGE
+from .map_regression import ridge
 from .prior import NominalPrior
 from .segmentation import likely, problem, segmented
 
 STEPS = 5  # of Gauss-Newton, at the most
 ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
-SMALLEST_SCALE = 1e-2  # of a parameter, by which the step of its finite difference is scaled
+# Of a parameter, in its unit at the size of the ship: the step of its finite difference is scaled by it.
+SMALLEST_SCALE = 1e-2
 HALVINGS = (1.0, 0.5, 0.25)
 NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
 
@@ -144,7 +145,7 @@ def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[
 
 def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:
     """Force (K, 3) that the model gains by one unit of a parameter."""
-    small = SMALL * max(abs(scale), SMALLEST_SCALE)
+    small = SMALL * max(abs(scale), SMALLEST_SCALE * model.unit(name))
     return (left - model_error(t.data, model.plus({name: small}))) / small
 
 
@@ -164,7 +165,8 @@ def nuisance(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
         columns.append(std * slope(t, model, base, n, t.prior.mean[n]) if std else none)
     precision = np.asarray(block_diag(at.precision, np.eye(t.prior.size)))
     offset = np.array([*[at.values[n] for n in fitted], *at.offset])
-    return Nuisance(np.stack(columns, axis=2), precision, offset)
+    unit = np.array([*[model.unit(n) for n in fitted], *[1.0] * t.prior.size])
+    return Nuisance(np.stack(columns, axis=2), precision, offset, unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +228,7 @@ def refit(t: TrainingSet, at: Estimate, along: Nuisance) -> Refined:
 def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
     fitted = [*start.fitted, *at.fitted]
     precision = np.asarray(block_diag(start.precision, along.precision))
+    unit = np.array([*[at.start.unit(n) for n in start.fitted], *along.unit])
     weight = t.weight
 
     def evaluate(estimate: Estimate) -> Refined:
@@ -246,7 +249,7 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
         columns = np.concatenate([best.columns, along.columns], axis=2)
         A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
         H = A.T @ A + precision
-        H += RIDGE * np.diag(np.diag(H) + 1.0)
+        H += ridge(H, unit)
         right = A.T @ (best.left * weight).reshape(-1) - precision @ parameters(best.estimate)
         delta = np.linalg.solve(H, right)
         further = best
@@ -271,7 +274,7 @@ def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start,
         without = {n: v for n, v in estimate.values.items() if n not in present}
         model = replace(estimate, values=without).model(t.prior)
         theta = np.array([*[estimate.values[n] for n in at.fitted], *estimate.offset])
-        parts = along.columns, along.precision, theta
+        parts = along.columns, along.precision, theta, along.unit
         whole = problem(t.data, model, model_error(t.data, model), e, parts)
         if whole is None:
             break
@@ -290,4 +293,5 @@ def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:
     given = r.own(at)
     fitted = [r.estimate.values[n] for n in at.fitted]
     offset = np.array([*fitted, *r.estimate.offset])
-    return Shape(given, list(start.fitted), base - r.left, r.columns, offset, start.precision)
+    unit = np.array([at.start.unit(n) for n in start.fitted])
+    return Shape(given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision)

@@ -27,11 +27,13 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, vstack
 
 from fmus.effects import Effect
+from fmus.scale import Scale
 
 from ..model import Integrals, Model
 from ..model.ship_model import of_run
-from ..model.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
+from ..model.weak_form import EVERY, OVERLAP, thrust_along
 
+# Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
 CELL, CELLS = 0.1, 50_000
 DECIMALS = 6  # of a time [s], so that it reads as it was meant
@@ -47,7 +49,7 @@ EXCEPTION = 0.5
 RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
 Interval = tuple[float, float]
-Along = tuple[np.ndarray, np.ndarray, np.ndarray]
+Along = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
 
 
@@ -80,8 +82,9 @@ class Problem:
         columns: (3 K, m), what each cell of a dead thruster adds to it.
         middles: (K,), cell, and part of it, in which the middle of each window lies.
         along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
-        precision, offset: (q, q) and (q,), of the nuisance parameters.
+        precision, offset, unit: (q, q), (q,) and (q,), of the nuisance parameters.
         work: (m,), share of the run's time in which the thruster is commanded, in each cell.
+        scale: of the ship.
     """
 
     sections: Sequence[Section]
@@ -93,7 +96,9 @@ class Problem:
     along: np.ndarray
     precision: np.ndarray
     offset: np.ndarray
+    unit: np.ndarray
     work: np.ndarray
+    scale: Scale
 
     def passing(self, spans: Spans) -> bool:
         """Whether in each run the thruster works for at least half of the time of its commands."""
@@ -178,7 +183,7 @@ class Problem:
     @cached_property
     def _information(self) -> tuple[np.ndarray, bool]:
         H = self.along.T @ self.along + self.precision
-        return cho_factor(H + RIDGE * np.diag(np.diag(H) + 1.0))
+        return cho_factor(H + RIDGE * np.diag(np.diag(H) + self.unit**-2.0))
 
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
@@ -206,7 +211,7 @@ def segmented(p: Problem, start: Spans | None = None) -> Spans:
 
 def programmed_in(p: Problem, s: Section, gain: np.ndarray) -> Iterator[tuple[int, int]]:
     """The intervals of one run that gain the most, by what each window (K,) gains inside of one."""
-    size = EVERY / p.cell  # cells in a bin
+    size = EVERY * p.scale.time / p.cell  # cells in a bin
     inside = (p.middles >= s.start) & (p.middles < s.end)
     place = ((p.middles[inside] - s.start) / size + 1e-6).astype(int)
     gained = np.bincount(place, gain[inside], int((s.end - s.start) / size))
@@ -224,7 +229,7 @@ def intervals(p: Problem) -> Spans:
     sigma = np.full(3, np.inf)
     for _ in range(ROUNDS):
         left = p.fitted(p.left(spans))[0].reshape(-1, 3)
-        smaller = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR)
+        smaller = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
         if (smaller > SETTLED * sigma).all():
             break
         sigma = np.minimum(smaller, sigma)
@@ -332,10 +337,11 @@ def problem(
         model: without the effect.
         base: (K, 3), its model error.
         e: the effect.
-        along: columns (K, 3, q), prior precision and offset of nuisance parameters; None: none.
+        along: columns (K, 3, q), prior precision, offset and unit of nuisance parameters; None: none.
     """
-    ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + WIDTH) for w in data]
-    cell = max(CELL, sum(last - first for first, last in ends) / CELLS)
+    ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + w.width) for w in data]
+    scale = model.ship.scale
+    cell = max(CELL * scale.time, sum(last - first for first, last in ends) / CELLS)
     counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
@@ -361,7 +367,8 @@ def problem(
     columns = csc_matrix(block_diag(parts))
     if not columns.count_nonzero():
         return None
-    Z, precision, offset = along or (np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0))
+    none = np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+    Z, precision, offset, unit = along or none
     return Problem(
         sections,
         not e.search.intervals[0][1],
@@ -372,7 +379,9 @@ def problem(
         Z.reshape(base.size, -1),
         precision,
         offset,
+        unit,
         np.concatenate(work),
+        scale,
     )
 
 

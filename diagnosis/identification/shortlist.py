@@ -14,7 +14,7 @@ from ..model.correlation import independent
 from ..parallel import for_each
 from .candidates import Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
-from .map_regression import RIDGE, Scored, regression, score
+from .map_regression import Scored, regression, ridge, score
 from .refinement import (
     Estimate,
     Refined,
@@ -67,7 +67,8 @@ def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
     found = candidates(t.data, model, base, known)
     along = nuisance(t, at, base)
     linear = [s.columns for c in found for s in c.shapes[:1]]
-    sigma = noise(base, np.concatenate([*linear, along.columns], axis=2), FLOOR)
+    floor = FLOOR * model.ship.scale.forces
+    sigma = noise(base, np.concatenate([*linear, along.columns], axis=2), floor)
     return weighted(t, sigma, base, along, found)
 
 
@@ -111,9 +112,9 @@ def novelty(t: GramTable, candidate: int, free: int) -> float:
         return 1.0
     found = t.nuisance[:free]
     own, gram, across = t.total[mine][:, mine], t.total[found][:, found], t.total[found][:, mine]
-    gram = gram + RIDGE * np.diag(np.diag(gram) + 1.0)
+    gram = gram + ridge(gram, t.unit[found])
     left = np.diag(own - across.T @ np.linalg.solve(gram, across))
-    return float(np.max(left / np.maximum(np.diag(own), 1e-12)))
+    return float(np.max(left / np.maximum(np.diag(own), 1e-12 * t.unit[mine] ** -2.0)))
 
 
 def in_order(scored: Sequence[Scored]) -> list[Scored]:

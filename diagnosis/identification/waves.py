@@ -22,6 +22,7 @@ from ..model.weak_form import acceleration, by_mass
 from ..parallel import for_each
 from ..smoothing import Smoothed, smooth
 
+# Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
 PEAK = 4.0  # times the spectrum around it
@@ -88,17 +89,22 @@ def _against_one_drawing(
     white = [part[2] for part in parts]
     if not left or not noise:
         return None
-    frequency, segments = segments_of(left)
-    floor = segments_of(noise)[1].mean(axis=-1)
+    time = model.ship.scale.time
+    frequency, segments = segments_of(left, time)
+    floor = segments_of(noise, time)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
-    band = inside(frequency, floor, np.mean(white, axis=0), model.reference_mass)
-    level, found = peak(frequency, power, floor, band)
+    follows = followed(frequency, floor, np.mean(white, axis=0), model.reference_mass)
+    band = inside(frequency * time)[:, None] & (follows >= FOLLOWED)
+    around = AROUND / time
+    level, found = peak(frequency, power, floor, band, around)
     count = segments.shape[-1]
     least = PEAK + FEW / count
     if found.height < least:
         return None
     draws = rng.integers(0, count, (REPLICATES, count))
-    heights = [peak(frequency, segments[..., d].mean(axis=-1), floor, band)[1].height for d in draws]
+    heights = [
+        peak(frequency, segments[..., d].mean(axis=-1), floor, band, around)[1].height for d in draws
+    ]
     at = float(frequency[found.row])
     near = np.abs(frequency - at) < NEAR * at
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
@@ -117,9 +123,11 @@ def _signals(
     run = smooth(smoothed.track, driven=False)
     error = model_error(run, model)
     white = 2.0 * run.noise**2 * run.track.period
-    left, other = stretches(error, run.time), redrawn(run, drawn)
+    rate = RATE / smoothed.scale.time
+    left, other = stretches(error, run.time, rate), redrawn(run, drawn)
     del run  # of a long run there is not room for two
-    return left, stretches(model_error(smooth(other, driven=False), model) - error, smoothed.time), white
+    noise = model_error(smooth(other, driven=False), model) - error
+    return left, stretches(noise, smoothed.time, rate), white
 
 
 def redrawn(run: Smoothed, drawn: np.ndarray) -> Track:
@@ -128,10 +136,15 @@ def redrawn(run: Smoothed, drawn: np.ndarray) -> Track:
     return replace(run.track, pose=np.where(run.used[:, None], pose, run.track.pose))
 
 
-def segments_of(parts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments)."""
+def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments).
+
+    Args:
+        parts: (n, 3), of each signal.
+        time: scale of the ship.
+    """
     length = round(SEGMENT * RATE)
-    found = [spectrogram(x, RATE, nperseg=length, axis=0, detrend="linear") for x in parts]
+    found = [spectrogram(x, RATE / time, nperseg=length, axis=0, detrend="linear") for x in parts]
     return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
 
 
@@ -154,14 +167,13 @@ def followed(
     return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
 
 
-def inside(frequency: np.ndarray, noise: np.ndarray, white: np.ndarray, mass: np.ndarray) -> np.ndarray:
-    """Where waves are looked for (m, 3); arguments as of :func:`followed`."""
-    band = (frequency >= BAND[0]) & (frequency <= BAND[1])
-    return band[:, None] & (followed(frequency, noise, white, mass) >= FOLLOWED)
+def inside(frequency: np.ndarray) -> np.ndarray:
+    """At which frequencies (m,) waves are looked for."""
+    return (frequency >= BAND[0]) & (frequency <= BAND[1])
 
 
 def peak(
-    frequency: np.ndarray, power: np.ndarray, floor: np.ndarray, band: np.ndarray
+    frequency: np.ndarray, power: np.ndarray, floor: np.ndarray, band: np.ndarray, around: float
 ) -> tuple[np.ndarray, Peak]:
     """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
 
@@ -170,8 +182,9 @@ def peak(
         power: (m, 3), spectrum.
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
         band: (m, 3), where a peak counts.
+        around: width of the spectrum around [Hz].
     """
-    width = 2 * int(AROUND / frequency[1] / 2.0) + 1
+    width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
@@ -190,17 +203,17 @@ def model_error(run: Smoothed, model: Model) -> np.ndarray:
     return (nu_dot - free - driven) @ model.reference_mass.T
 
 
-def stretches(error: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
-    """Parts (m, 3) without a gap and long enough for a spectrum, at RATE."""
+def stretches(error: np.ndarray, time: np.ndarray, rate: float) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, at a rate [Hz]."""
     known = np.isfinite(error).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     found = []
     for first, end in edges.reshape(-1, 2):
-        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / RATE)
+        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / rate)
         if even.size < SEGMENT * RATE:
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
         at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
-        found.append(np.diff(at, axis=0) * RATE)
+        found.append(np.diff(at, axis=0) * rate)
     return found

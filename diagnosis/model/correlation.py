@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .weak_form import EVERY, OVERLAP, Integrals
+from .weak_form import OVERLAP, Integrals
 
-LONGEST = 60  # lags, 30 s: as long as what counts as independent elsewhere (two blocks)
+LONGEST = 60  # lags: as long as what counts as independent elsewhere (two blocks)
 
 
 def independent(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
@@ -43,7 +43,7 @@ def autocovariance(data: Sequence[Integrals], error: np.ndarray, longest: int) -
     sums, pairs = np.zeros((longest + 1, 3)), np.zeros(longest + 1)
     edges = np.cumsum([w.middle.size for w in data])[:-1]
     for w, part in zip(data, np.split(error, edges), strict=True):
-        apart = np.minimum(np.round(np.diff(w.middle) / EVERY), longest + 1.0)  # not a gap of years
+        apart = np.minimum(np.round(np.diff(w.middle) / w.every), longest + 1.0)  # not a gap of years
         place = np.concatenate([[0], np.cumsum(apart)]).astype(int)
         series, there = np.zeros((place[-1] + 1, 3)), np.zeros(place[-1] + 1)
         series[place], there[place] = part, 1.0

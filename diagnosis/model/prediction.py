@@ -16,11 +16,13 @@ from fmus.ops import when, wrap
 from fmus.signals import Force
 from fmus.vessel import vessel
 
-from ..smoothing import IDLE, Smoothed
+from ..smoothing import Smoothed, idle
 from .ship_model import Model
 from .thrust import Response, commanded_shares, places
 
-LONGEST_STEP = 0.02  # s; of the integration, where its error is far below the noise of any measurement
+# s, times the scale of the ship; of the integration, where its error is far below the noise of any
+# measurement
+LONGEST_STEP = 0.02
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
 CLOSE = 1e-12  # m and rad, to which a true pose is found
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
@@ -87,7 +89,7 @@ class Starts:
 def at_rest(smoothed: Smoothed) -> bool:
     """Whether a ship hardly moves at the start of a run."""
     known = np.isfinite(smoothed.nu[:, 0])
-    return bool((np.abs(smoothed.nu[known.argmax()]) < IDLE).all())
+    return bool((np.abs(smoothed.nu[known.argmax()]) < idle(smoothed.scale)).all())
 
 
 def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:

@@ -146,6 +146,10 @@ class Model:
         known = [name for declared in self.ship.parameters.values() for name in declared]
         raise InputError(f"no parameter '{name}'{nearest(name, known)}")
 
+    def unit(self, name: str) -> float:
+        """What one unit of a parameter is at the size of the ship, by Froude's law."""
+        return self.ship.scale.factor(self.declared(name).unit)
+
     @property
     def values(self) -> dict[str, float]:
         """All parameters of the ship."""

@@ -12,6 +12,7 @@ import numpy as np
 from .ship_model import Model
 from .weak_form import WIDTH, Integrals, kernel
 
+# Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
 # On a noise-free run at 20 Hz with smooth commands the true model leaves 4e-5 N and 1e-5 N m.
 FLOOR = np.array([3e-4, 3e-4, 1e-4])
@@ -30,7 +31,7 @@ SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
 
 
 def _noise_gain() -> np.ndarray:
-    """For each corner frequency: integral of |kernel's second derivative|^2 H over frequency [s-3]."""
+    """For each corner frequency: integral of |kernel's second derivative|^2 H over frequency [s-5]."""
     t = np.linspace(-WIDTH / 2, WIDTH / 2, KERNEL_POINTS)
     w = kernel(t / (WIDTH / 2)) / (WIDTH / 2)
     transform = np.trapezoid(w * np.cos(FREQUENCIES[:, None] * t), t, axis=1)
@@ -53,6 +54,7 @@ def omega_std(w: Integrals, model: Model | None = None) -> np.ndarray:
         (K, 3) [N, N, N m].
     """
     s, mass = w.smoothed, (model or Model()).reference_mass
+    time = s.scale.time
     used = s.used.astype(float)
     gap = np.gradient(s.time)
     # Share of a window's time that its samples cover, and the variance of the smoothed pose there.
@@ -61,10 +63,11 @@ def omega_std(w: Integrals, model: Model | None = None) -> np.ndarray:
     )
     density = s.noise**2 * s.track.period / share[:, None]
     variance = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = np.clip(3.0 * variance / density, CORNERS[0], CORNERS[-1])
-    gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN)))
+    corner = np.clip(3.0 * variance / density * time, CORNERS[0], CORNERS[-1])
+    gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN))) / time**5
     x, y, psi = (density * gain).T
     heading = s.eta[:, 2]
     c2 = w.smooth @ np.where(w.known, np.cos(heading) ** 2, 0.0)
     surge, sway = c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y
-    return np.sqrt(np.column_stack([surge, sway, psi]) @ (mass**2).T + FLOOR**2)
+    floor = FLOOR * s.scale.forces
+    return np.sqrt(np.column_stack([surge, sway, psi]) @ (mass**2).T + floor**2)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from fmus.scale import CSE1, Scale
 from fmus.signals import Force
 from fmus.vessel import vessel
 
@@ -24,8 +25,10 @@ from .prediction import at_rest, true_motion
 from .ship_model import Model
 from .thrust import Response, thrust
 
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s
 EVERY = 0.5  # s
+HORIZON = 8.0  # s, of predictions. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s
 # Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
 # correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
 OVERLAP = 4.0
@@ -61,6 +64,7 @@ class Integrals:
         block: (K,), number of the block that the middle lies in.
         smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
             times one that is held from each sample to the next.
+        horizon: length of the windows in which models predict the run [s].
         memory: parts of the model error that were computed lately.
     """
 
@@ -70,6 +74,7 @@ class Integrals:
     smooth: csr_matrix
     slope: csr_matrix
     held: csr_matrix
+    horizon: float
     memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -80,6 +85,21 @@ class Integrals:
     @property
     def run(self) -> Run:
         return self.smoothed.track.run
+
+    @property
+    def scale(self) -> Scale:
+        """Of the ship."""
+        return self.smoothed.scale
+
+    @property
+    def width(self) -> float:
+        """Of a window [s]."""
+        return WIDTH * self.scale.time
+
+    @property
+    def every(self) -> float:
+        """From a window to the next [s]."""
+        return EVERY * self.scale.time
 
     @cached_property
     def known(self) -> np.ndarray:
@@ -102,26 +122,32 @@ class Integrals:
         return found
 
 
-def places(t: np.ndarray) -> np.ndarray:
+def places(t: np.ndarray, scale: Scale = CSE1) -> np.ndarray:
     """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
-    last = np.floor((t[-1] - t[0] - WIDTH + 1e-9) / EVERY)
-    reach = np.ceil(WIDTH / 2 / EVERY)
-    near = np.unique(np.round((t - t[0] - WIDTH / 2) / EVERY))
+    width, every = WIDTH * scale.time, EVERY * scale.time
+    last = np.floor((t[-1] - t[0] - width + 1e-9) / every)
+    reach = np.ceil(width / 2 / every)
+    near = np.unique(np.round((t - t[0] - width / 2) / every))
     found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
     return found[(found >= 0.0) & (found <= last)]
 
 
-def integrals(smoothed: Smoothed) -> Integrals:
-    """The windows of a run with half of the samples or more, all commands, and thrusters at work."""
-    run = smoothed.track.run
-    t = run.time
-    middles = t[0] + WIDTH / 2 + EVERY * places(t)
+def integrals(smoothed: Smoothed, horizon: float | None = None) -> Integrals:
+    """The windows of a run with half of the samples or more, all commands, and thrusters at work.
+
+    Args:
+        smoothed: the run.
+        horizon: length of the windows in which models predict it [s]; by default that of its ship.
+    """
+    run, scale = smoothed.track.run, smoothed.scale
+    t, half = run.time, 0.5 * WIDTH * scale.time
+    middles = t[0] + half + EVERY * scale.time * places(t, scale)
     known = np.isfinite(smoothed.nu).all(axis=1)
     fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
     gone = np.cumsum(np.concatenate([[0], ~known]))
     busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
-    first = np.searchsorted(t, middles - WIDTH / 2, side="left")
-    last = np.searchsorted(t, middles + WIDTH / 2, side="right")
+    first = np.searchsorted(t, middles - half, side="left")
+    last = np.searchsorted(t, middles + half, side="right")
     count = last - first
     # Stretches know nothing of each other: no window lies in two.
     parts = np.cumsum(np.concatenate([[0], breaks(np.arange(t.size), smoothed.track)]))
@@ -137,13 +163,12 @@ def integrals(smoothed: Smoothed) -> Integrals:
     middles, first, last = middles[kept], first[kept], last[kept]
     rows = np.repeat(np.arange(middles.size), last - first)
     columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
-    half = WIDTH / 2
     s = np.clip((t[columns] - middles[rows]) / half, -1.0, 1.0)
     after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
     gap = np.gradient(t)[columns]
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
     shape = (middles.size, t.size)
-    block = max(BLOCK, float(t[-1] - t[0]) / BLOCKS)
+    block = max(BLOCK * scale.time, float(t[-1] - t[0]) / BLOCKS)
 
     def matrix(values: np.ndarray) -> csr_matrix:
         return csr_matrix((values, columns, starts), shape=shape)
@@ -155,6 +180,7 @@ def integrals(smoothed: Smoothed) -> Integrals:
         matrix(kernel(s) / half * gap),
         matrix(-kernel_rate(s) / half**2 * gap),
         matrix(kernel_integral(after) - kernel_integral(s)),
+        horizon or HORIZON * scale.time,
     )
 
 

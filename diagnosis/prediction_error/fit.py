@@ -26,9 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..assessment.windows import LENGTH
 from ..identification.candidates import SMALL, model_error
-from ..identification.map_regression import RIDGE
+from ..identification.map_regression import ridge
 from ..identification.prior import NominalPrior
 from ..identification.refinement import HALVINGS, SMALLEST_SCALE, Estimate
 from ..model import Integrals
@@ -37,7 +36,7 @@ from ..parallel import for_each
 from .push import NO_PUSH, Push, covariance, estimate
 from .shooting import UNKNOWN, Around, Shooting
 
-LENGTHS = (0.5 * LENGTH, LENGTH, 2.0 * LENGTH)
+LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
 STEPS = 6  # of Gauss-Newton, at the most
 ENOUGH = 0.1  # of cost, which is twice a log likelihood, that a step may still gain
 POWERS = 5  # iterations of k, which changes by less than 1 % after three
@@ -64,8 +63,9 @@ def shootings(runs: Sequence[Integrals]) -> list[Shooting]:
     """The windows of all lengths, those of runs with one kind of commands together."""
     found = []
     for five in (False, True):
-        smoothed = [w.smoothed for w in runs if (w.run.five is not None) == five]
-        found += [Shooting(smoothed, length) for length in LENGTHS] if smoothed else []
+        these = [w for w in runs if (w.run.five is not None) == five]
+        smoothed = [w.smoothed for w in these]
+        found += [Shooting(smoothed, share * these[0].horizon) for share in LENGTHS if these]
     return [s for s in found if s.run.size]
 
 
@@ -105,7 +105,7 @@ class Information:
 
 def regular(H: np.ndarray) -> np.ndarray:
     """A matrix with a slight ridge: collinear parameters share what they explain."""
-    return H + RIDGE * np.diag(np.diag(H) + 1.0)
+    return H + ridge(H, np.ones(len(H)))
 
 
 class PredictionFit:
@@ -129,23 +129,30 @@ class PredictionFit:
         self.std = np.concatenate([omega_std(w, at.start) for w in runs])
         names, believed = at.fitted, [*prior.std.values()]
         self._kept = np.array([True] * len(names) + [s > 0.0 for s in believed])
-        self.unit = np.array([*[1.0] * len(names), *believed])[self._kept]
-        scale = {n: max(abs(at.values[n]), SMALLEST_SCALE) for n in names}
+        units = [at.start.unit(n) for n in names]
+        self._own = np.array([*units, *[1.0] * len(believed)])
+        self.unit = np.array([*units, *believed])[self._kept]
+        scale = {
+            n: max(abs(at.values[n]), SMALLEST_SCALE * u) for n, u in zip(names, units, strict=True)
+        }
         self.names = [n for n, kept in zip([*names, *prior.std], self._kept, strict=True) if kept]
         self._steps = {
             n: SMALL * s for n, s in (scale | {n: s for n, s in prior.std.items() if s}).items()
         }
-        P = np.asarray(block_diag(at.precision, np.eye(len(believed))))
+        P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
         self.precision = P[np.ix_(self._kept, self._kept)]
 
     def theta(self, at: Estimate) -> np.ndarray:
-        """(q,), fitted parameters about their prior means; coefficients in prior standard deviations."""
-        return np.array([*[at.values[n] for n in at.fitted], *at.offset])[self._kept]
+        """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
+        prior standard deviations.
+        """
+        return (np.array([*[at.values[n] for n in at.fitted], *at.offset]) / self._own)[self._kept]
 
     def moved(self, at: Estimate, step: np.ndarray) -> Estimate:
         """The estimate after a step (q,)."""
         whole = np.zeros(self._kept.size)
         whole[self._kept] = step
+        whole *= self._own
         names = at.fitted
         return at.plus(dict(zip(names, whole.tolist(), strict=False)), whole[len(names) :])
 
@@ -153,7 +160,7 @@ class PredictionFit:
         """The factor (w, 3T, 3T) that whitens the residuals of windows; zero where a model runs away."""
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
-        seen = fine[:, None] & (s.noise[..., 0] < UNKNOWN)
+        seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
         V = covariance(around.motion[fine], s.at_start[fine], NO_PUSH)
         squares = np.where(seen[..., None], r, 0.0) ** 2
         missed = np.zeros((len(s.runs), 3))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..assessment.bands import Bands
-from ..assessment.windows import LENGTH, Windows
+from ..assessment.windows import Windows
 from ..model import Model
 from ..smoothing import Smoothed
 from .joint_posterior import Posterior
@@ -27,7 +27,7 @@ def prediction_bands(
     """
     if windows is None:
         return None
-    shots = Shooting([smoothed], LENGTH)
+    shots = Shooting([smoothed], windows.length)
     std = posterior.std
     around = shots.around(model, {n: STEP * s for n, s in std.items() if s > 0.0})
     kept = [k for k, s in enumerate(std.values()) if s > 0.0]

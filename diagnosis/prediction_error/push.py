@@ -16,9 +16,10 @@ from ..model.correlation import autocovariance
 from ..model.weak_form import EVERY, WIDTH, kernel
 from .shooting import Linear
 
-# s; correlation times that are tried. A shorter one is white for windows of 3 s, a longer one a bias.
+# s, times the scale of the ship; correlation times that are tried. A shorter one is white for windows of
+# the weak form, a longer one a bias.
 TIMES = np.geomspace(0.2, 12.0, 25)
-LAGS = 12  # windows: 6 s, twice their width, from which on the covariance is hardly determined; chosen
+LAGS = 12  # windows: twice their width, from which on the covariance is hardly determined; chosen
 POINTS = 301  # of the kernel's integrals; chosen
 GAUSS = 4  # points of the integral of the noise between two instants; chosen, exact to its 8th power
 
@@ -60,13 +61,14 @@ def estimate(
         data: windows of every run.
         error: (K, 3), what a model leaves in them [N, N, N m].
         std: (K, 3), its standard deviation by the measurement's noise.
-        time: (3,), correlation times of TIMES if they are known [s].
+        time: (3,), correlation times among those that are tried, if they are known [s].
     """
+    times = TIMES * data[0].scale.time
     left = autocovariance(data, error, LAGS) - np.mean(std**2, axis=0) * OF_NOISE[:, None]
     variance = np.maximum(OF_FORCE @ left, 0.0) / np.sum(OF_FORCE**2, axis=1)[:, None]  # (times, 3)
     missed = np.sum((left - variance[..., None, :] * OF_FORCE[..., None]) ** 2, axis=1)
-    best = np.argmin(missed, axis=0) if time is None else np.searchsorted(TIMES, time)
-    return Push(np.sqrt(variance[best, range(3)]), TIMES[best])
+    best = np.argmin(missed, axis=0) if time is None else np.searchsorted(times, time)
+    return Push(np.sqrt(variance[best, range(3)]), times[best])
 
 
 def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:

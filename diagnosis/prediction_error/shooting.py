@@ -20,11 +20,11 @@ from ..model import Model, Response
 from ..model.prediction import Starts, arriving, propagate
 from ..smoothing import Smoothed
 
-INSTANTS = 16  # of a window at which pose and prediction are compared; half a second of eight
+INSTANTS = 16  # of a window at which pose and prediction are compared
 PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
 ROOM = 40_000  # windows of models in one integration: in arrays of that size numpy's overhead is small
-UNKNOWN = 1e6  # m2, rad2; variance of an instant without a sample
-VELOCITY = 1e-4  # m/s, rad/s; step of the derivatives of the acceleration
+UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
+VELOCITY = 1e-4  # m/s, rad/s, times the scale of the ship; step of the derivatives of the acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,8 @@ def _seen(s: Smoothed, times: np.ndarray, reach: float) -> tuple[np.ndarray, np.
     low, high = (np.searchsorted(s.time, times + side) for side in (-reach, reach))
     number = (counts[high] - counts[low])[..., None]
     some = np.maximum(number, 1)
-    noise = np.where(number > 0, s.noise**2 / some, UNKNOWN)
+    area = s.scale.length**2
+    noise = np.where(number > 0, s.noise**2 / some, UNKNOWN * np.array([area, area, 1.0]))
     return smooth + (sums[high] - sums[low]) / some, noise
 
 
@@ -216,7 +217,7 @@ def _slope(s: vessel.State, model: Model) -> np.ndarray:
     found[:, 0, 3], found[:, 0, 4], found[:, 1, 3], found[:, 1, 4] = c, -sn, sn, c
     found[:, 2, 5] = 1.0
     base = acceleration(at)
-    for k, name in enumerate(("u", "v", "r")):
-        ahead = at._replace(**{name: getattr(at, name) + VELOCITY})
-        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / VELOCITY
+    for k, (name, speed) in enumerate(zip(("u", "v", "r"), model.ship.scale.speeds, strict=True)):
+        ahead = at._replace(**{name: getattr(at, name) + VELOCITY * speed})
+        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / (VELOCITY * speed)
     return found

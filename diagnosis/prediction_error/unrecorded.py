@@ -14,14 +14,14 @@ from scipy.stats import norm
 
 from ..model import Integrals, Model, omega
 from ..model.uncertainty import NOISE_TOLERANCE, omega_std
-from ..model.weak_form import EVERY, WIDTH, kernel_integral
+from ..model.weak_form import kernel_integral
 from .push import Push
 
 CHANCE = 0.01  # that a run without a push tells of one; that of the remainder
 MAD = 1.4826  # standard deviations of a normal distribution in a median absolute deviation
 MOST = 5  # pushes that are told, the clearest; chosen
-# s; what lasts longer is no push but a remainder, and what is shorter than a third of a window of the
-# weak form cannot be told from a jump of the measured pose; chosen.
+# s, times the scale of the ship; what lasts longer is no push but a remainder, and what is shorter than
+# a third of a window of the weak form cannot be told from a jump of the measured pose; chosen.
 SHORTEST, LONGEST = 1.0, 10.0
 AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
 
@@ -116,25 +116,27 @@ def _pushes(
     w: Integrals, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
 ) -> Iterator[tuple[float, Stretch]]:
     """Pushes of a run on an axis, each with how many standard deviations are left at its clearest."""
-    z = error / std
+    z, time = error / std, w.scale.time
     rows = np.flatnonzero(np.abs(z) > beyond)
-    for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > WIDTH) + 1):
-        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST:
-            near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + WIDTH
-            start, end, size = box(w.middle[near], error[near])
-            if end - start >= SHORTEST:
+    for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > w.width) + 1):
+        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST * time:
+            near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + w.width
+            start, end, size = box(w, near, error[near])
+            if end - start >= SHORTEST * time:
                 yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
 
 
-def box(middle: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
+def box(w: Integrals, near: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
     """Start, end [s] and size of the constant force whose means over windows are next to an error.
 
     Args:
-        middle: (k,), of windows [s].
+        w: windows of a run.
+        near: (K,), which of them.
         error: (k,), in these [N or N m].
     """
-    times = np.arange(middle[0] - 0.5 * WIDTH, middle[-1] + 0.5 * WIDTH, 0.5 * EVERY)
-    passed = kernel_integral(np.clip((times[:, None] - middle) / (0.5 * WIDTH), -1.0, 1.0))
+    middle, half = w.middle[near], 0.5 * w.width
+    times = np.arange(middle[0] - half, middle[-1] + half, 0.5 * w.every)
+    passed = kernel_integral(np.clip((times[:, None] - middle) / half, -1.0, 1.0))
     first, last = np.triu_indices(times.size, 1)
     means = passed[last] - passed[first]
     power = np.einsum("ij,ij->i", means, means)

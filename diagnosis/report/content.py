@@ -37,6 +37,7 @@ def comparison_content(
     """
     return result_keys.ComparisonContent(
         data=_data(comparison.evaluations),
+        windows=_lengths(comparison.evaluations[0]),
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         **_provenance(comparison, model, files),
@@ -75,6 +76,7 @@ def diagnosis_content(
         coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
+        windows=_lengths(comparison.evaluations[0]),
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         where_after=result_keys.WhereResult.model_validate(comparison.after),
@@ -144,6 +146,10 @@ def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]
         "files": list(files),
         "versions": versions,
     }
+
+
+def _lengths(e: Evaluation) -> result_keys.WindowLengths:
+    return result_keys.WindowLengths(prediction=e.integrals.horizon, model_error=e.integrals.width)
 
 
 def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:

@@ -9,7 +9,6 @@ from cosim.results import thin
 
 from ..assessment.evaluation import Evaluation
 from ..identification.shortlist import TIE
-from ..model.weak_form import EVERY
 from .content import Z95
 from .panels import breaks, figure_of, legend, plain_numbers, stack
 from .profiles import BinnedError, Quantity
@@ -29,7 +28,7 @@ def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> "Figure
     """Model error over time of X, Y and N, with its uncertainty, and the part that is explained."""
     figure, panels = stack(4.6)
     time = e.integrals.middle
-    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * EVERY)])
+    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * e.integrals.every)])
     for axis, panel in enumerate(panels):
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]

@@ -1,6 +1,6 @@
 """Numbers and units as the page shows them, and its glossary."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,8 @@ GLOSSARY = (
     ("ω, model error", "the force that the model would need to move as the ship did [N, N, N·m]"),
     (
         "window",
-        "8 s of a run, predicted from where the ship was at first; of ω: 3 s, weighted",
+        "{prediction} s of a run, predicted from where the ship was at first; "
+        "of ω: {model_error} s, weighted",
     ),
     ("held out", "a run of which nothing was learned, to see whether what was learned holds"),
     ("candidate, effect", "a physical cause that the model lacks, with its own parameters"),
@@ -38,6 +39,13 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
     if "e" in text and POSITIONAL[0] <= abs(scaled) < POSITIONAL[1]:
         text = f"{scaled:.0f}" if abs(scaled) >= 1.0 else f"{scaled:.6f}".rstrip("0")
     return text.replace("-", "−")
+
+
+def glossary(prediction: float | None, model_error: float | None) -> Iterator[tuple[str, str]]:
+    """Words of the page and what they mean, for windows of two lengths [s]."""
+    lengths = {"prediction": number(prediction), "model_error": number(model_error)}
+    for word, meaning in GLOSSARY:
+        yield word, meaning.format(**lengths)
 
 
 def unit(text: str) -> str:

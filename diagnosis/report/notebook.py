@@ -86,7 +86,8 @@ def as_html(content: DiagnosisContent, plots: Plots) -> str:
     )
     lines += [f"<table>{rows}</table>"] if rows else []
     cells = "".join(map(_row, content.errors))
-    head = "<tr><th>run</th><th>position over 8 s [mm]</th><th>heading over 8 s [°]</th></tr>"
+    over = f"over {formatting.number(content.windows.prediction)} s"
+    head = f"<tr><th>run</th><th>position {over} [mm]</th><th>heading {over} [°]</th></tr>"
     lines += [f"<table>{head}{cells}</table>"]
     shown = (plots.where(), plots.omega())
     lines += [f'<div style="max-width: 36rem">{p._repr_svg_()}</div>' for p in shown]

@@ -86,7 +86,7 @@ def write_report(
         tiles=list(_tiles(content, learned)),
         runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
         provenance=[(k, v) for k, v in (*_provenance(content), *origin.items()) if v is not None],
-        glossary=formatting.GLOSSARY,
+        glossary=list(formatting.glossary(content.windows.prediction, content.windows.model_error)),
     )
     with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
@@ -235,8 +235,11 @@ def _tiles(
     part = "held-out" if held_out else ("training" if learned else "measured")
     position = [e.window_position_rmse for e in chosen]
     heading = [e.window_heading_rmse for e in chosen]
-    yield from _tile("position error of 8 s predictions", position, 1e3, "mm", part, learned)
-    yield from _tile("heading error of 8 s predictions", heading, degrees(1.0), "°", part, learned)
+    length = formatting.number(content.windows.prediction)
+    yield from _tile(f"position error of {length} s predictions", position, 1e3, "mm", part, learned)
+    yield from _tile(
+        f"heading error of {length} s predictions", heading, degrees(1.0), "°", part, learned
+    )
 
 
 def _tile(

@@ -66,6 +66,13 @@ class AxesChange(Part):
     after: list[Number]
 
 
+class WindowLengths(Part):
+    """Length [s] of the windows of predictions, and of those of the model error."""
+
+    prediction: Number
+    model_error: Number
+
+
 class RunErrors(Part):
     """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m].
 
@@ -120,6 +127,7 @@ class ComparisonContent(Part):
     """The content of ``comparison.json``; at its end what it was made with."""
 
     data: Data
+    windows: WindowLengths
     errors: list[RunErrors]
     where: WhereResult
     runs: list[str]
@@ -281,6 +289,7 @@ class DiagnosisContent(Part):
     coefficients: list[CoefficientChange] = []
     ranking: list[RankedResult]
     data: Data
+    windows: WindowLengths
     errors: list[RunErrors]
     where: WhereResult
     where_after: WhereResult

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from .headline import is_sure, told, verdict_title
-from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, RunErrors
+from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
 MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
@@ -19,7 +19,7 @@ def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.compare``."""
     yield from _data(r.data)
     yield from _lines("Where the model fails", r.where.sentences)
-    yield from _errors(r.errors, learned=False)
+    yield from _errors(r, learned=False)
     yield from _files(r.files, out)
 
 
@@ -53,7 +53,7 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
         yield from _lines(
             "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
         )
-    yield from _errors(r.errors, learned=has_learned(r))
+    yield from _errors(r, learned=has_learned(r))
     yield from _lines("Stability", _stability(r))
     yield from _files(r.files, out)
 
@@ -70,7 +70,9 @@ def summary(r: DiagnosisContent) -> str:
             _number(None if x is None else 1e3 * x, 2) for x in (position.before, position.after)
         )
         held_out = " (held out)" if e.held_out else ""
-        lines.append(f"  {e.run}{held_out}: predictions over 8 s miss by {pair} mm")
+        lines.append(
+            f"  {e.run}{held_out}: predictions over {_number(r.windows.prediction)} s miss by {pair} mm"
+        )
     more = len(r.errors) - MAX_SUMMARY
     lines += [f"  and {more} more runs"] if more > 0 else []
     return "\n".join(lines)
@@ -126,7 +128,7 @@ def _effect(e: EffectResult) -> Iterator[str]:
     yield from filter(None, (e.separation, e.advice))
 
 
-def _errors(errors: Sequence[RunErrors], learned: bool) -> Iterator[RenderableType]:
+def _errors(r: ComparisonContent | DiagnosisContent, learned: bool) -> Iterator[RenderableType]:
     """Window prediction error, and RMS of the model error."""
     predictions, forces = (
         _table("run", "position [mm]", "heading [°]"),
@@ -137,14 +139,14 @@ def _errors(errors: Sequence[RunErrors], learned: bool) -> Iterator[RenderableTy
         parts = (before, after) if learned else (before,)
         return " -> ".join(_number(None if x is None else scale * x, 2) for x in parts)
 
-    for e in errors:
+    for e in r.errors:
         run, position, heading = _run(e.run, e.held_out), e.window_position_rmse, e.window_heading_rmse
         millimetres = cell(position.before, position.after, 1e3)
         predictions.add_row(run, millimetres, cell(heading.before, heading.after, degrees(1.0)))
         axes = zip(e.omega_rms.before, e.omega_rms.after, strict=True)
         forces.add_row(run, *(cell(b, a) for b, a in axes))
     when = ", before -> after" if learned else ""
-    yield from _titled(f"Predictions over 8 s miss by{when}", predictions)
+    yield from _titled(f"Predictions over {_number(r.windows.prediction)} s miss by{when}", predictions)
     yield from _titled(f"Force that the model lacks{when}", forces)
 
 

@@ -10,7 +10,7 @@ from fmus.ops import wrap
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
-from ..assessment.windows import LENGTH, free_run
+from ..assessment.windows import free_run
 from .panels import breaks, figure_of, legend, plain_numbers
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
@@ -26,7 +26,7 @@ MAX_REACH = 2.0  # times the measured extent, beyond which a prediction leaves t
 QUARTILES = (0.25, 0.5, 0.75)
 ARROWS, ARROW = 80, 0.15  # of a force: how many, and the longest as a share of the reach; chosen
 SHIP = 0.5  # longest ship, as a share of a map; chosen
-BIN = 0.25  # s, over which errors of a window are summarised; chosen
+BINS = 32  # parts of a window over which errors are summarised; chosen
 
 
 def track(e: Evaluation, learned: bool) -> "Figure":
@@ -168,8 +168,9 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
     figure = figure_of(3.6)
     panels = figure.subplots(2, 1, sharex=True)
     known = [e for e in evaluations if e.windows is not None]
-    since = np.concatenate([e.windows.since for e in known if e.windows is not None])
-    edges = np.arange(0.0, LENGTH + 1e-9, BIN)
+    windows = [e.windows for e in known if e.windows is not None]
+    since = np.concatenate([w.since for w in windows])
+    edges = np.linspace(0.0, windows[0].length, BINS + 1)
     place = np.clip(np.digitize(since, edges) - 1, 0, edges.size - 2)
     sides = [_models(e, learned) for e in known]
     for number in range(len(sides[0])):
@@ -180,7 +181,7 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
             bands = np.full((3, edges.size - 1), np.nan)
             for k in np.unique(place):
                 bands[:, k] = np.quantile(error[place == k], QUARTILES, method="nearest")
-            middle = edges[:-1] + 0.5 * BIN
+            middle = 0.5 * (edges[:-1] + edges[1:])
             panel.fill_between(middle, bands[0], bands[2], color=colour, alpha=0.2, lw=0.0)
             panel.plot(middle, bands[1], color=colour, label=label)
     for panel, label in zip(panels, ("position [mm]", "heading [°]"), strict=True):
@@ -189,7 +190,7 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
         panel.set_ylabel(label)
     figure.align_ylabels(panels)
     panels[1].set_xlabel("time since the window began [s]")
-    panels[1].set_xlim(0.0, LENGTH)
+    panels[1].set_xlim(0.0, edges[-1])
     if learned:
         legend(figure, panels[0])
     return figure

@@ -12,14 +12,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
+from fmus.scale import Scale
+
 from ..data import Track
 from .spline import Knots
 
+# Of CyberShip Enterprise 1, times the scale of the ship.
 # m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
 IDLE = (0.02, 0.02, 0.05)
-FORGETTING = (
-    30.0  # s, T; a slower motion by the commands is no different from any smooth motion (chosen)
-)
+FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
+
+
+def idle(scale: Scale) -> np.ndarray:
+    """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
+    return np.multiply(IDLE, scale.speeds)
 
 
 class CommandResponse(NamedTuple):
@@ -59,6 +65,11 @@ class Commands:
     psi: np.ndarray
     grid: Knots
     at_rest: bool = False
+
+    @property
+    def forgetting(self) -> float:
+        """T [s]."""
+        return FORGETTING * self.track.scale.time
 
     @cached_property
     def parts(self) -> list[np.ndarray]:
@@ -123,7 +134,7 @@ class Commands:
         (d/dt + 1/T)^2 x = a forgets, as a double integral would grow beyond all numbers. First comes
         w = (d/dt + 1/T) x.
         """
-        h, T = self.track.period, FORGETTING
+        h, T = self.track.period, self.forgetting
         kept = np.exp(-h / T)
         w = self._recursion(T * (1.0 - kept) * a, kept)
         x = self._recursion(h * kept * w + T * (T * (1.0 - kept) - h * kept) * a, kept)
@@ -139,7 +150,7 @@ class Commands:
         surge, sway, yaw = (self.delayed(delay) @ gains.T).T
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
-        x_ddot = a - 2.0 * x_dot / FORGETTING - x / FORGETTING**2
+        x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
         eta, eta_dot, eta_ddot = (_channels(self.sampled(each)) for each in (x, x_dot, x_ddot))
         return CommandResponse(eta, eta_dot, eta_ddot, delay)
 

@@ -21,8 +21,9 @@ from .command_motion import Commands
 from .penalised import Fit, Problem
 from .spline import POINTS
 
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 COARSE = 0.2  # s, between the delays that are tried first
-LONGEST = 1.0  # s, of these; a ship of this size has 0.4 s (docs/studies/measured_ship)
+LONGEST = 1.0  # s, of these; the ship has 0.4 s (docs/studies/measured_ship)
 FINE = 0.01  # s, to which a delay is found, or a sampling period if that is longer
 NOTICED = 0.1  # s; a shorter delay is as good as none, and not reported (chosen)
 RANK = 1e-9  # of the largest singular value; below, commands do not differ and share their effect evenly
@@ -46,6 +47,7 @@ class Regression:
 
     def __init__(self, problem: Problem, fit: Fit, commands: Commands) -> None:
         self.problem, self.fit, self.commands = problem, fit, commands
+        self.time_scale = commands.track.scale.time
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
 
@@ -77,12 +79,14 @@ class Regression:
 
     @property
     def block(self) -> np.ndarray:
-        """Number of the block of LATENESS_BLOCK seconds of each row of r(x)."""
+        """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
         grid, run = self.problem.grid, self.commands.track.run
         stretches = zip(grid.start, grid.intervals, strict=True)
         middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
         time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
-        return np.unique(np.floor(np.concatenate(time) / LATENESS_BLOCK), return_inverse=True)[1]
+        return np.unique(
+            np.floor(np.concatenate(time) / (LATENESS_BLOCK * self.time_scale)), return_inverse=True
+        )[1]
 
 
 def size_of(a: np.ndarray) -> np.ndarray:
@@ -106,7 +110,10 @@ class Lateness:
     def __init__(self, regression: Regression) -> None:
         self._regression, self._block = regression, regression.block
         tau = regression.commands.delayed(0.0)
-        lagged = [regression.motions(regression.commands.lagging(tau, lag)) for lag in LAGS]
+        lagged = [
+            regression.motions(regression.commands.lagging(tau, lag * regression.time_scale))
+            for lag in LAGS
+        ]
         self._aside = [orthonormal(np.hstack(part)) for part in zip(*lagged, strict=True)]
         self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
 
@@ -137,6 +144,9 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     logarithm of their number) is zero.
     """
     period, lateness = regression.commands.track.period, Lateness(regression)
+    coarse, longest, fine, noticed = (
+        x * regression.time_scale for x in (COARSE, LONGEST, FINE, NOTICED)
+    )
 
     @cache
     def blocks(periods: int) -> Any:
@@ -145,9 +155,9 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     def left(periods: int) -> float:
         return float(blocks(periods).sum())
 
-    tried = {round(k * COARSE / period) for k in range(round(LONGEST / COARSE) + 1)}
+    tried = {round(k * coarse / period) for k in range(round(longest / coarse) + 1)}
     best = min(sorted(tried), key=left)
-    step, finest = COARSE / period, max(1, round(FINE / period))
+    step, finest = coarse / period, max(1, round(fine / period))
     while step > finest:
         step = max(finest, np.ceil(step / 2.0))
         near = {max(best - int(step), 0), best + int(step)}
@@ -155,7 +165,7 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
         best = min((best, *sorted(near)), key=left)
     if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
         return 0.0, False
-    prompt = min((k for k in tried if k * period < NOTICED), key=left)
+    prompt = min((k for k in tried if k * period < noticed), key=left)
     sure = best != prompt and surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried))
     return best * period, sure
 

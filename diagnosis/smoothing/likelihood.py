@@ -25,7 +25,6 @@ from .penalised import Equations, Problem, System, Weighted, solve
 from .spline import third
 
 ADAPTIONS = 2  # rounds of adapting the penalty; a third changes less than the noise does (chosen)
-AVERAGE = 8.0  # s over which the squared jerk is averaged; chosen, as long as a prediction window
 LEAST_JERK = 0.2  # of the mean square: where there is none, it may yet begin (chosen)
 DECADES = (
     -8.0,
@@ -145,6 +144,6 @@ def adapted(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Problem:
     """The problem with a penalty by the inverse of the local mean square of the jerk that a fit has."""
     square = third(p.grid, solve(p, smoothness, weights).coefficients) ** 2
     mean = np.maximum(square.mean(axis=0), 1e-30)
-    local = uniform_filter1d(square, max(1, round(AVERAGE / p.grid.spacing)), axis=0, mode="nearest")
+    local = uniform_filter1d(square, p.average, axis=0, mode="nearest")
     share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
     return p._replace(stiffness=1.0 / share.T)

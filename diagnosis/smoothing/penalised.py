@@ -33,6 +33,7 @@ class Problem(NamedTuple):
         rough: (3 intervals, size), R of the penalty K = R^T V R, see :func:`.spline.roughness`.
         stiffness: (3, intervals), weight V of each interval in the penalty of each channel.
         sigma: (3,), standard deviation of the noise [m, m, rad].
+        average: intervals over which the squared jerk is averaged, where the penalty is adapted to it.
     """
 
     rows: np.ndarray
@@ -42,6 +43,7 @@ class Problem(NamedTuple):
     rough: csr_array
     stiffness: np.ndarray
     sigma: np.ndarray
+    average: int
 
 
 class Weighted:

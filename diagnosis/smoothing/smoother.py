@@ -14,19 +14,22 @@ from scipy.linalg import LinAlgError
 
 from cosim import InputError
 from fmus.frames import rotate_to_body
+from fmus.scale import Scale
 
 from ..data import Counts, Track
 from ..data.cleaning import noise
-from .command_motion import IDLE, CommandResponse, Commands
+from .command_motion import CommandResponse, Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
 from .spline import Knots, basis, inverse_band, knots, roughness, variance
 
+# Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
 BREAK = 3.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
+AVERAGE = 8.0  # s over which the squared jerk is averaged; chosen, as long as a prediction window
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
@@ -72,6 +75,11 @@ class Smoothed:
         return self.track.run.time
 
     @property
+    def scale(self) -> Scale:
+        """Of the ship."""
+        return self.track.scale
+
+    @property
     def used(self) -> np.ndarray:
         """(n,), samples that count: new, no spike, in a stretch that could be smoothed."""
         return self.track.valid & ~self.spikes & np.isfinite(self.eta[:, 0])
@@ -79,7 +87,7 @@ class Smoothed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was found in the data, a line each."""
-        if not (self.late and self.delay >= NOTICED):
+        if not (self.late and self.delay >= NOTICED * self.scale.time):
             return self.track.notes
         delay = (
             f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
@@ -120,20 +128,23 @@ def smooth(track: Track, driven: bool = True) -> Smoothed:
 def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     """Smooth a run by some of its rows."""
     time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
-    grid = knots(*stretches(rows, track), max(SPACING, track.period))
+    scale = track.scale
+    grid = knots(*stretches(rows, track), max(SPACING * scale.time, track.period))
     inside = within(grid, time)
     dense = rows[inside[rows]]
     z = track.pose[dense] - origin
-    sigma = np.maximum(noise(z), LEAST_NOISE)
+    sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
-    even = Problem(dense, z, basis(grid, time[dense]), grid, roughness(grid), stiffness, sigma)
+    average = max(1, round(AVERAGE * scale.time / grid.spacing))
+    even = Problem(dense, z, basis(grid, time[dense]), grid, roughness(grid), stiffness, sigma, average)
     local = np.full(3, LOCAL * (track.period / grid.spacing) ** 5)
     adapted, smoothness, weights = robust(even, local)
     fit, response = solve(adapted, smoothness, weights), CommandResponse.none(time.size)
     if driven:
         psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
         first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
-        slow = np.hypot(*first[:2]) < IDLE[0] and abs(first[2]) < IDLE[2]
+        still = idle(scale)
+        slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
         commands = Commands(track, psi, grid, bool(slow))
         smoothness, fit, response = with_commands(even, smoothness, fit, weights, commands)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
@@ -171,7 +182,7 @@ def breaks(rows: np.ndarray, track: Track) -> np.ndarray:
 
     Where a pose is missing, the commands lead over the gap; where they are missing, too, nothing does.
     """
-    long = np.diff(track.run.time[rows]) > max(BREAK, 10.0 * track.period)
+    long = np.diff(track.run.time[rows]) > max(BREAK * track.scale.time, 10.0 * track.period)
     return long | (np.diff(track.silences[rows]) > 0)
 
 

@@ -19,7 +19,7 @@ from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ships.naming import described_ship
 from . import ledger
-from .building import build, export
+from .building import build, came_compiled, export
 from .cached_fmu import cache_folder
 from .finding import BuildError, load, which
 from .platforms import native_targets
@@ -52,7 +52,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="with --out or --source: replace other files of these names",
     )
     parser.add_argument(
-        "--list", action="store_true", help="list the FMUs, or the variables of those named"
+        "--list",
+        action="store_true",
+        help="list the FMUs (with --native: those that came compiled), or the variables of those named",
     )
     parser.add_argument(
         "--verify",
@@ -102,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.verify:
             _verify(options.names)
         elif options.list:
-            _print_list(options.names, make_ship(effects, ship))
+            _print_list(options.names, make_ship(effects, ship), options.native)
         else:
             starts = None if options.parameters is None else read_starts(options.parameters)
             if options.source is not None:
@@ -146,10 +148,10 @@ def _verify(names: Sequence[str]) -> None:
             raise BuildError(f"'{name}' was not built here: it holds '{wrong}'")
 
 
-def _print_list(names: Sequence[str], of: Ship) -> None:
+def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
     """Print the FMUs there are, or every variable of those that are named."""
-    if not names:
-        for _, component in discover(of):
+    for _, component in discover(of) if not names else ():
+        if not native or came_compiled(component.name):
             print(f"{component.name:24} {component.description}")
     for name in names:
         _, component = load(*which(name), of)

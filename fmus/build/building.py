@@ -17,7 +17,8 @@ from . import ledger
 from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
 from .packing import changes, hash_of, pack, sources
-from .platforms import Native
+from .platforms import Native, native_targets
+from .released import released
 from .start_values_file import Starts
 
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
@@ -96,6 +97,12 @@ def export(
         return _placed([Path(work, name) for name in files], folder, overwrite)
 
 
+def came_compiled(name: str) -> bool:
+    """Whether a compiled FMU of a component came with the package, for this source and computer."""
+    with tempfile.TemporaryDirectory(prefix="fmu_") as work:
+        return released(name, own_source(), native_targets(), Path(work)) is not None
+
+
 def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
     """Copies of files in a folder, which is made.
 
@@ -171,8 +178,11 @@ def _cached(
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
             with tempfile.TemporaryDirectory(prefix="fmu_") as work:
+                as_released = starts is None and own_file is None and of is make_ship()
                 if native is None:
                     built = pack(component, module, own_file, Path(work), of)
+                elif as_released and (fits := released(stem, own_source(), native, Path(work))):
+                    built = fits
                 else:
                     code_hash = hash_of(sources(module, own_file, of), component.starts, of)
                     built = _compiled(component, code_hash, native, Path(work), python)
@@ -199,7 +209,8 @@ def _source_hash(
     own_file: Path | None, of: Ship, starts: Mapping[str, float], native: Native | None = None
 ) -> str:
     """Hash of all that a build reads, of ship and start values, and of its compilers."""
-    digest = _our_source().copy()
+    digest = hashlib.sha256(own_source().encode())
+    digest.update(importlib.metadata.version("pythonfmu").encode())
     for path in [*of.effects.files, *([own_file] if own_file else [])]:
         _read(digest, path)
     if of.description is not None:
@@ -211,13 +222,13 @@ def _source_hash(
 
 
 @cache
-def _our_source() -> Any:
-    """Hash of this package's source, and of the version of pythonfmu: read once in a process."""
-    digest = hashlib.sha256(importlib.metadata.version("pythonfmu").encode())
+def own_source() -> str:
+    """Hash of this package's source: read once in a process."""
+    digest = hashlib.sha256()
     ours = [p for suffix in ("py", "c") for p in ROOT.rglob(f"*.{suffix}") if CHECKER not in p.parents]
     for path in sorted(ours):
         _read(digest, path)
-    return digest
+    return digest.hexdigest()
 
 
 def _read(digest: Any, path: Path) -> None:

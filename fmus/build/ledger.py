@@ -1,8 +1,9 @@
 """What was built here: the hash of every program file that a build on this computer put into an FMU.
 
-A file with such a hash came from this project's source, from a component file given to the build, or
-from the installed pythonfmu: every program in it is known. The model description holds no program and
-does not count, so an FMU whose start values were changed is still one of ours.
+A file with such a hash came from this project's source, compiled here or by its release, from a
+component file given to the build, or from the installed pythonfmu: every program in it is known. The
+model description holds no program and does not count, so an FMU whose start values were changed is still
+one of ours.
 """
 
 import hashlib

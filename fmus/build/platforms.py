@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..declare import nearest
-from ..native.compilers import TARGETS, CompilerError, compiler_for, this_platform
+from ..native.compilers import TARGETS, Compiler, CompilerError, compiler_for, this_platform
 from .finding import BuildError
 
 # Not a platform: the Python body, for all those that nothing is compiled for.
@@ -19,7 +19,7 @@ class Native:
     Attributes:
         targets: platforms of FMI 2.0.
         python: whether it runs in Python on all others.
-        key: platforms and compilers, for a cache.
+        key: platforms and compilers, or why there is none, for a cache.
     """
 
     targets: tuple[str, ...]
@@ -31,7 +31,7 @@ def native_targets(text: str | None = None) -> Native:
     """The platforms that a text such as ``linux64,win64`` names; without one that of this computer.
 
     Raises:
-        BuildError: unknown name, or no compiler for it.
+        BuildError: unknown name.
     """
     names = [this_platform()] if text is None else [name.strip() for name in text.split(",")]
     for name in names:
@@ -42,9 +42,13 @@ def native_targets(text: str | None = None) -> Native:
     targets = tuple(sorted({name for name in names if name != PYTHON}))
     if not targets:
         raise BuildError(f"no platform to compile for; there are {', '.join(TARGETS)}")
-    try:
-        compilers = [compiler_for(target) for target in targets]
-    except CompilerError as error:
-        raise BuildError(str(error)) from error
     python = PYTHON in names
-    return Native(targets, python, repr((targets, python, compilers)))
+    return Native(targets, python, repr((targets, python, [_compiler(target) for target in targets])))
+
+
+def _compiler(target: str) -> Compiler | str:
+    """The compiler for a platform; without one the reason, as the FMU may come with the package."""
+    try:
+        return compiler_for(target)
+    except CompilerError as error:
+        return str(error)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..declare import DeclarationError, nearest
 from ..scale import Scale
-from .effect import Effect, Kind, Loaded, Running, Thrust, Values
+from .effect import Effect, Kind, Loaded, Running, Thrust
 
 ROOM = Path(__file__).parent
 
@@ -57,6 +57,10 @@ class EffectSet(Mapping[str, Effect]):
     def __hash__(self) -> int:
         return id(self)
 
+    def at(self, scale: Scale) -> "EffectSet":
+        """The set for a ship of another size: starts, ranges and values to try by Froude's law."""
+        return EffectSet([_scaled(e, scale) for e in self.values()], self.files)
+
     def of_kind(self, *kinds: Kind) -> list[Effect]:
         """The effects of some kinds: kind by kind, in the order of declaration."""
         return [e for kind in kinds for e in self.values() if e.kind == kind]
@@ -78,11 +82,6 @@ class EffectSet(Mapping[str, Effect]):
                     "declare it with linear=False"
                 )
         return EffectSet([*self.values(), *effects], [*self.files, *([] if file is None else [file])])
-
-    def at(self, scale: Scale, devices: Iterable[str]) -> "EffectSet":
-        """The effects that a ship with these thrusters may have, of its size."""
-        has = set(devices)
-        return EffectSet([_resized(e, scale) for e in self.values() if e.needs <= has], self.files)
 
     def plus_file(self, path: Path) -> "EffectSet":
         """The set with the effects of a user's file.
@@ -113,22 +112,15 @@ class EffectSet(Mapping[str, Effect]):
             raise DeclarationError(f"'{path}': {error}") from error
 
 
-def _resized(e: Effect, scale: Scale) -> Effect:
-    """An effect whose parameters start, end and are tried where they are for a ship of this size."""
-    units = {p.name: p.unit for p in e.parameters}
+def _scaled(e: Effect, scale: Scale) -> Effect:
+    factors = {p.name: scale.factor(p.unit) for p in e.parameters}
 
-    def tried(nominal: Values) -> list[Values]:
-        return [
-            {name: scale.factor(units[name]) * x for name, x in values.items()}
-            for values in e.search.values(nominal)
-        ]
-
-    tries = e.search.tries if callable(e.search.tries) else tried
-    return replace(
-        e,
-        parameters=tuple(scale.of(p) for p in e.parameters),
-        search=replace(e.search, tries=tries if e.search.tries else ()),
-    )
+    # Values that are made of the model in use have its size.
+    tries = e.search.tries
+    if not callable(tries):
+        tries = [{name: factors[name] * x for name, x in values.items()} for values in tries]
+    parameters = tuple(scale.of(p) for p in e.parameters)
+    return replace(e, parameters=parameters, search=replace(e.search, tries=tries))
 
 
 def _imported(name: str, path: Path) -> ModuleType:

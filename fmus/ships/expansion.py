@@ -28,7 +28,7 @@ def effects_of_ship(ship: Description, effects: EffectSet = STANDARD) -> EffectS
     return EffectSet(
         [
             *[e for a in actuators(ship) for e in failings(a, width)],
-            *effects.at(ship.scale, ()).values(),
+            *[e for e in effects.at(ship.scale).values() if not e.needs],
             *[further_change(term_variable(t.name)) for t in ship.terms if t.name not in own],
         ],
         effects.files,
