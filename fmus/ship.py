@@ -7,7 +7,7 @@ from inspect import signature
 from types import ModuleType
 from typing import Any, get_args
 
-from .actuators.actuation import command_units
+from .actuators.actuation import axes, command_units
 from .actuators.response import Layout, Prepared
 from .declare import Component, Known, Variable, variables
 from .description import Description
@@ -68,6 +68,12 @@ class Ship:
         """``ACTUATOR.COMMAND`` and unit of each command of a described ship."""
         return None if self.description is None else command_units(self.description)
 
+    @property
+    def fully_actuated(self) -> bool:
+        """Whether its thrusters can be asked for a force on every axis."""
+        d = self.description
+        return d is None or (d.allocates and len(axes(d)) == 3)
+
     def commanded_force(self, commands: Any) -> Any:
         """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands (n, k) at rest."""
         import numpy as np
@@ -80,6 +86,10 @@ class Ship:
         """Coefficients of the nominal hull and thrusters -> where their value comes from."""
         parts = (self.vessel.params, self.thrusters.params)
         return {v.name: v.known for part in parts for v in variables(part) if v.known is not None}
+
+    def serving(self, component: Component) -> Component:
+        """A component that is no part of the ship, such as a controller, made for it."""
+        return component if self.description is None else sized(component, self.description)
 
     def component(self, component: Component, module: ModuleType) -> Component | None:
         """A component of this project, made for this ship; None: it is of another ship's kind.
@@ -94,7 +104,7 @@ class Ship:
         if not component.any_ship:
             return None
         if make is None:
-            return sized(component, self.description)
+            return self.serving(component)
         return make(self.effects, self.description) if "ship" in signature(make).parameters else None
 
     @property

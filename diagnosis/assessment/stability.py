@@ -15,6 +15,8 @@ from cosim import InputError
 from fmus.effects import Loaded
 from fmus.hull import damping_force
 from fmus.scale import CSE1, Scale
+from fmus.signals import Force
+from fmus.vessel import vessel
 from fmus.vessel.vessel_effects import NONE
 
 from ..model import Model
@@ -57,6 +59,12 @@ class OperatingRegion(NamedTuple):
 OPERATING = OperatingRegion()
 
 
+# Chosen: at the size of CyberShip Enterprise 1 all motion has died away by then, and a hull
+# that gains speed by itself has doubled it many times.
+COASTING, COASTING_STEP = 60.0, 0.02  # s
+RUNAWAY = 3.0  # times the speeds of the region
+
+
 @dataclass(frozen=True)
 class Stability:
     """Result of the check.
@@ -64,7 +72,9 @@ class Stability:
     Attributes:
         mass_definite: whether M is positive definite.
         nominal_min_dissipation, learned_min_dissipation: smallest dissipation over the region [1/s].
-        bounded: whether the ship stays within some ship lengths of its target on every reference path.
+        bounded: whether the ship stays within some ship lengths of its target on every reference path;
+            of a ship that lacks thrust on an axis, whether it comes to rest without thrust.
+        closed_loop: which of the two was judged.
         region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
         notes: further remarks, a sentence each.
     """
@@ -75,6 +85,7 @@ class Stability:
     bounded: bool
     region: str | None
     notes: tuple[str, ...]
+    closed_loop: bool = True
 
     @property
     def safe(self) -> bool:
@@ -120,7 +131,11 @@ def check_stability(
     lowest = int(np.argmin(after))
     if not worse and _less(after.min(), before.min()):
         worse = [_motion(everywhere[lowest], float(after.min()), float(before.min()))]
-    bounded = mass_definite and _bounded(model, nominal, advance, notes)
+    if not model.ship.fully_actuated:
+        advance("coming to rest without thrust")
+        bounded = mass_definite and comes_to_rest(model, everywhere, region, notes)
+    else:
+        bounded = mass_definite and _bounded(model, nominal, advance, notes)
     return Stability(
         mass_definite,
         float(before.min()),
@@ -128,6 +143,7 @@ def check_stability(
         bounded,
         "; ".join(worse) or None,
         tuple(dict.fromkeys(notes)),
+        model.ship.fully_actuated,
     )
 
 
@@ -230,6 +246,35 @@ def _motion(nu: np.ndarray, after: float, before: float) -> str:
         f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
         f"{after:.3g} 1/s (nominal at least {before:.3g})"
     )
+
+
+def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, notes: list[str]) -> bool:
+    """Whether a ship without thrust stays near the speeds of its region, whatever motion it begins with.
+
+    Args:
+        model: its hull, in still water and without what acts from outside.
+        motions: (n, 3) that it begins with [m/s, m/s, rad/s].
+        region: speeds of which it may reach no more than ``RUNAWAY`` times.
+        notes: receives what was found.
+    """
+    scale = model.ship.scale
+    still = np.zeros(len(motions))
+    s = vessel.State(still, still, still, *motions.T, still)
+    most = 0.0
+    with np.errstate(all="ignore"):
+        for _ in range(round(COASTING / COASTING_STEP)):
+            s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, COASTING_STEP * scale.time)
+            speeds = np.abs(np.stack([s.u, s.v, s.r])) / np.array(region)[:, None]
+            most = max(most, float(np.nan_to_num(speeds, nan=np.inf).max()))
+            if most > RUNAWAY:
+                break
+    kept = most <= RUNAWAY
+    what = "stays below" if kept else "exceeds"
+    notes.append(
+        "its thrusters give no force on some axis, so that no reference controller holds it: judged is "
+        f"how it moves without thrust, where it {what} {RUNAWAY:g} times the speeds of its region"
+    )
+    return kept
 
 
 def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> bool:

@@ -16,7 +16,7 @@ from ..progress import Advance, silent
 from . import figures, formatting, tracks
 from .headline import told, verdict_title
 from .profiles import QUANTITIES, binned_errors
-from .result_keys import Change, ComparisonContent, DiagnosisContent
+from .result_keys import Change, ComparisonContent, DiagnosisContent, StabilityResult
 from .shape import Curve, curves
 from .svg import data_uri, inline, style
 
@@ -103,7 +103,8 @@ def _template() -> "Template":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, told, data_uri)
+    told_so = (told, data_uri, bounded)
+    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, *told_so)
     environment.filters |= {f.__name__: f for f in filters}
     environment.globals["times"] = formatting.times
     return environment.get_template("page.html")
@@ -257,3 +258,13 @@ def _tile(
         shown += f" → {formatting.number(last, factor=factor)}"
         remark += f", {formatting.times(before, last)} less" if last <= before else ", more than before"
     yield label, f"{shown} {unit}", remark
+
+
+def bounded(stability: StabilityResult) -> str:
+    """The verdict on the learned model in a simulation."""
+    if stability.closed_loop:
+        return (
+            "Closed loops stay bounded" if stability.bounded else "A closed loop does not stay bounded"
+        )
+    how = "stays" if stability.bounded else "does not stay"
+    return f"Without thrust its motion {how} bounded"

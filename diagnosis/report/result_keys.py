@@ -228,6 +228,7 @@ class StabilityResult(Part):
     bounded: bool
     region: str | None
     mass_definite: bool
+    closed_loop: bool
     notes: list[str]
 
 

@@ -155,7 +155,8 @@ def _stability(r: DiagnosisContent) -> Iterator[str]:
     if not s.mass_definite:
         yield "The mass matrix of the learned model is not positive definite."
     bounded = "stays bounded" if s.bounded else "does NOT stay bounded"
-    yield f"In closed loop the learned model {bounded} on the reference paths."
+    where = "In closed loop" if s.closed_loop else "Without thrust"
+    yield f"{where} the learned model {bounded}{' on the reference paths' if s.closed_loop else ''}."
     yield (
         f"smallest dissipation {_number(s.learned_min_dissipation)} 1/s, "
         f"of the model at first {_number(s.nominal_min_dissipation)} 1/s"

@@ -13,7 +13,7 @@ from ..actuators.response import (
     prepared,
     thruster_effects,
 )
-from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclared
+from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclared, variables
 from ..description import Description
 from ..effects import EffectSet
 from ..ops import Number, finite, when
@@ -81,7 +81,7 @@ def described(effects: EffectSet, ship: Description) -> Component:
     commands: Any = commands_of(ship)
     if ship.allocates:
         inputs = bundle("Inputs", request=Force(), velocity=Velocity())
-        outputs: Any = bundle("Outputs", commands=commands(), applied=Applied())
+        outputs: Any = group_of("Outputs", [*variables(commands), *variables(Applied)])
     else:
         inputs = bundle("Inputs", request=commands(), velocity=Velocity())
         outputs = Applied
@@ -102,8 +102,8 @@ def described(effects: EffectSet, ship: Description) -> Component:
         tau = shape.act(acting, shape.running(s.t + h, u, v, r, arriving, b), b)
         possible = total(forces(ship, given, (u, v, r), p.allocation))
         after = when(h > 0.0, lambda: past, lambda: s)
-        applied = Applied(*possible, *tau)
-        return after, outputs(commands(*given), applied) if ship.allocates else applied
+        told = given if ship.allocates else ()
+        return after, outputs(*told, *possible, *tau)
 
     def step(s: Past, i: Any, p: Any, h: Number) -> tuple[Past, Any]:
         return prepared_step(s, i, prepare(p), h)
