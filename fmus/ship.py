@@ -10,10 +10,10 @@ from typing import Any, get_args
 from .actuators.actuation import axes, command_units
 from .actuators.response import Layout, Prepared
 from .declare import Component, Known, Variable, variables
-from .description import Description
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
 from .scale import CSE1, Scale
+from .ship_description import Description
 from .ships.expansion import effects_of_ship
 from .ships.sizing import sized
 from .thrusters.thrusters import make as make_thrusters

@@ -56,7 +56,7 @@ DIAGNOSIS_LAYERS = (
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
     ("scale",),
-    ("description",),
+    ("ship_description",),
     ("hull_functions",),
     ("frames", "hull"),
     ("effects",),

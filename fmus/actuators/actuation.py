@@ -5,9 +5,9 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from ..declare import Known, Range, Variable, group_of, variables
-from ..description import Description
 from ..hull import Triple
 from ..ops import Number, clip, fmax, where
+from ..ship_description import Description
 from . import laws as laws  # registers the laws
 from .failings import Actuator, Pushing, Working
 from .law import Flow, Law

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from ..declare import POSITIVE, Range, Variable
-from ..description import Part
 from ..effects.curve import NODES, interpolate, node_parameters
 from ..effects.effect import Effect, Memory, Search, Wording, effect
 from ..effects.families import Family
@@ -17,6 +16,7 @@ from ..effects.text import Found, lost, number, peak, percent, towards
 from ..effects.thruster_dynamics import FORGOTTEN, LONGEST, TIMES
 from ..ops import Number, clip, cos, exp, fmax, sin, where
 from ..scale import Scale
+from ..ship_description import Part
 from .law import Flow, Law
 
 ANY = Range()

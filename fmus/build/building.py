@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..declare import Component, discover
-from ..description import Description
 from ..effects import STANDARD, EffectSet
 from ..ship import Ship
 from ..ship import ship as make_ship
+from ..ship_description import Description
 from . import ledger
 from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which

@@ -5,10 +5,10 @@ from functools import cache
 from ..actuators.actuation import actuators, command_names
 from ..actuators.failings import failings
 from ..declare import variables
-from ..description import Description
 from ..effects import STANDARD, EffectSet
 from ..effects.force import further_change
 from ..hull import Damping, term_variable
+from ..ship_description import Description
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ..description import Description
+from ..ship_description import Description
 
 DEFAULT = "cse1"
 

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationErro
 from ..actuators import laws as laws  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
-from ..description import Description, Part, Value
 from ..hull import Inertia, term
 from ..hull_functions import FUNCTIONS
+from ..ship_description import Description, Part, Value
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers

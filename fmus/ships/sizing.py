@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from ..declare import Component, Variable, redeclared, variables
-from ..description import Description
 from ..hull import Damping, Inertia
+from ..ship_description import Description
 
 ESTIMATE = "estimate at the start of "
 

@@ -14,9 +14,9 @@ from ..actuators.response import (
     thruster_effects,
 )
 from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclared, variables
-from ..description import Description
 from ..effects import EffectSet
 from ..ops import Number, finite, when
+from ..ship_description import Description
 from ..signals import Force, Velocity
 
 

@@ -3,10 +3,10 @@
 from typing import Any, NamedTuple
 
 from ..declare import Component
-from ..description import Description
 from ..effects import STANDARD, EffectSet, Running
 from ..hull import Triple
 from ..ops import Number
+from ..ship_description import Description
 from .chain import thrusters
 from .described import described
 

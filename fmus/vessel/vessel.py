@@ -18,7 +18,6 @@ from ..declare import (
     redeclared,
     variables,
 )
-from ..description import Description, Part, Value
 from ..effects import STANDARD, EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
@@ -39,6 +38,7 @@ from ..hull import (
 )
 from ..hull_functions import FUNCTIONS
 from ..ops import Number, finite, when, wrap
+from ..ship_description import Description, Part, Value
 from ..signals import Force, Measurement, Velocity
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
