@@ -21,7 +21,8 @@ from xml.etree import ElementTree
 
 from coverage import CoverageData
 
-LEFT_OUT = (".git", "results", "site", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
+LEFT_OUT = (".git", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
+MADE = {"results", "site"}  # folders of the project itself
 OURS = ("fmus", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
 # Results of this code lie in caches: the test that runs it need not be the one that uses the result.
 CACHED = ("fmus/", "cosim/compiled/")
@@ -48,7 +49,12 @@ fmus =
 
 def copied(root: Path, copy: Path) -> Path:
     """A copy of the project, without what is made from it."""
-    shutil.copytree(root, copy, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    left_out = shutil.ignore_patterns(*LEFT_OUT)
+    shutil.copytree(
+        root,
+        copy,
+        ignore=lambda folder, names: left_out(folder, names) | (MADE if folder == str(root) else set()),
+    )
     return copy
 
 
