@@ -318,11 +318,11 @@ def test_matlab_matrix_of_another_kind_is_refused(tmp_path):
 
 def matlab(path, by_hand, steered):
     """A file of NTNU with two stretches, whose power settings are given."""
-    data = np.zeros((14, N))
+    data = np.zeros((16, N))  # what follows the two power settings is not read
     data[0], data[[1, 2, 6]], data[7:12] = TIME, POSE.T, SHARES.T
     half = N // 2
     data[10, half:] = data[8, half:]  # a controller asks the same of both VSP in sway
-    data[12:, :half], data[12:, half:] = np.array([by_hand, steered])[:, :, None]
+    data[12:14, :half], data[12:14, half:] = np.array([by_hand, steered])[:, :, None]
     savemat(path, {"cse1_data": data})
     return diagnosis.read(path)
 

@@ -15,6 +15,7 @@ from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, integrals
 from diagnosis.model.weak_form import EVERY, HORIZON
 from diagnosis.prediction_error import push as pushes
+from diagnosis.prediction_error import shooting
 from diagnosis.prediction_error.fit import fit_predictions, shootings
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.prediction_error.predicted_bands import prediction_bands
@@ -89,6 +90,13 @@ def test_slopes_are_those_of_one_model_after_the_other():
         alone = (first - windows().residuals(Model().plus({name: step}))) / step
         np.testing.assert_allclose(around.slopes[..., k], alone, rtol=0.0, atol=1e-9)
         assert np.abs(alone).max() > 1e-3
+
+
+def test_slopes_do_not_depend_on_how_many_models_are_stepped_together(monkeypatch):
+    together = windows().around(Model(), STEPS)
+    monkeypatch.setattr(shooting, "ROOM", 1)
+    alone = windows().around(Model(), STEPS)
+    np.testing.assert_allclose(alone.slopes, together.slopes, rtol=0.0, atol=1e-9)
 
 
 def test_coarse_steps_predict_what_fine_ones_do():
