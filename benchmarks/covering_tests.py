@@ -1,8 +1,9 @@
 """Which quick tests execute a line: measured once with coverage.py, kept, and brought up to date.
 
 A test file that has changed since is measured anew. Of a module that has changed, the tests of any of
-its lines count, since lines have moved. Lines that run while modules are imported, or whose results lie
-in caches, fall back on the tests that import the module.
+its lines count, since lines have moved. Lines that run while modules are imported, whose results lie in
+caches, or that only processes execute which end without a word to coverage.py, fall back on the tests
+that import the module.
 """
 
 import ast
@@ -206,7 +207,7 @@ class Covering:
         around, inside = statement((self.root / module).read_text(encoding="utf-8"), line)
         executed = lines if module in self.moved else [each for each in around if each in lines]
         names = {name for each in executed for name in lines[each]}
-        fallback = module.startswith(CACHED) or not inside or names == {""}
+        fallback = module.startswith(CACHED) or not inside or names <= {""}
         tests = self._one_of_each_first(names & self.seconds.keys())
         if fallback:
             steps = self._importing.get(module, {})

@@ -99,6 +99,20 @@ def test_slopes_do_not_depend_on_how_many_models_are_stepped_together(monkeypatc
     np.testing.assert_allclose(alone.slopes, together.slopes, rtol=0.0, atol=1e-9)
 
 
+def test_pose_that_is_seen_is_the_mean_of_the_samples_in_reach():
+    s = smoothed(sail()[0])
+    rows = np.flatnonzero(s.used)[100:130]
+    one, noise = shooting._seen(s, s.time[rows][None], 1e-6)
+    np.testing.assert_allclose(shooting._off(one, s.track.pose[rows][None]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(noise[0], np.tile(s.noise**2, (30, 1)))
+    h = s.time[1] - s.time[0]
+    _, three = shooting._seen(s, s.time[rows][None], 1.5 * h)
+    assert s.used[99:131].all()
+    np.testing.assert_allclose(three[0], np.tile(s.noise**2 / 3.0, (30, 1)))
+    _, none = shooting._seen(s, s.time[rows][None] + 0.5 * h, 1e-6)
+    assert (none > 1e3 * noise).all()
+
+
 def test_coarse_steps_predict_what_fine_ones_do():
     run = smoothed(sail(noise=0.0)[0])
     coarse = Shooting([run], HORIZON).residuals(Model(vessel={"N_r": -0.6}))[:, -1]
