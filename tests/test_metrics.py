@@ -407,7 +407,7 @@ class TestPlots:
         assert length(track.once([laps, lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
 
     def test_a_target_as_long_as_the_picture_is_drawn_in_500_steps(self):
-        x, y = track.once([(np.array([0.0, 3.0]), np.array([1.0, 1.0]))], 3.0)
+        x, _ = track.once([(np.array([0.0, 3.0]), np.array([1.0, 1.0]))], 3.0)
         known = x[np.isfinite(x)]
         assert known.size == 500 + 2
         assert np.ptp(known) == 3.0
