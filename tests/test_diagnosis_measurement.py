@@ -374,6 +374,7 @@ def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):
     tracemalloc.start()
     try:
         table = csv_table(path, Layout(), {"time", "x"})
+        assert set(table) <= {"time", "x"}
         _, most = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
