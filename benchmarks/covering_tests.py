@@ -1,8 +1,9 @@
 """Which quick tests execute a line: measured once with coverage.py, kept, and brought up to date.
 
 A test file that has changed since is measured anew. Of a module that has changed, the tests of any of
-its lines count, since lines have moved. Lines that run while modules are imported, or whose results lie
-in caches, fall back on the tests that import the module.
+its lines count, since lines have moved. Lines that run while modules are imported, whose results lie in
+caches, or that only processes execute which end without a word to coverage.py, fall back on the tests
+that import the module.
 """
 
 import ast
@@ -21,7 +22,8 @@ from xml.etree import ElementTree
 
 from coverage import CoverageData
 
-LEFT_OUT = (".git", "results", "site", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
+LEFT_OUT = (".git", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
+MADE = {"results", "site"}  # folders of the project itself
 OURS = ("fmus", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
 # Results of this code lie in caches: the test that runs it need not be the one that uses the result.
 CACHED = ("fmus/", "cosim/compiled/")
@@ -48,7 +50,12 @@ fmus =
 
 def copied(root: Path, copy: Path) -> Path:
     """A copy of the project, without what is made from it."""
-    shutil.copytree(root, copy, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    left_out = shutil.ignore_patterns(*LEFT_OUT)
+    shutil.copytree(
+        root,
+        copy,
+        ignore=lambda folder, names: left_out(folder, names) | (MADE if folder == str(root) else set()),
+    )
     return copy
 
 
@@ -200,7 +207,7 @@ class Covering:
         around, inside = statement((self.root / module).read_text(encoding="utf-8"), line)
         executed = lines if module in self.moved else [each for each in around if each in lines]
         names = {name for each in executed for name in lines[each]}
-        fallback = module.startswith(CACHED) or not inside or names == {""}
+        fallback = module.startswith(CACHED) or not inside or names <= {""}
         tests = self._one_of_each_first(names & self.seconds.keys())
         if fallback:
             steps = self._importing.get(module, {})

@@ -7,12 +7,14 @@ import pytest
 from scipy import stats
 
 from cosim import InputError
+from diagnosis.analysis import analysis_figures, pls_report
 from diagnosis.analysis import organisation as org
 from diagnosis.analysis import partial_least_squares as pls
 from diagnosis.analysis import principal_components as pc
 from diagnosis.analysis.outlier_report import analyse, sentences
 from diagnosis.analysis.recipes import RECIPES, recipe
 from diagnosis.analysis.samples import NU, TAU, Samples, model_error
+from diagnosis.report.formatting import number
 
 NAMES = list("abcdef")
 
@@ -290,6 +292,35 @@ class TestPls:
             pls.regressed(s, recipe("PLS2"))
         with pytest.raises(InputError, match="too few"):
             pls.regressed(made(n=100), recipe("PLS2"))
+
+
+def test_a_regression_is_told_in_sentences():
+    B = np.array([[-2.0, 0, 0, -0.3, 0, 0], [0, 0, 1.5, 0, 0, 0], [0, 0, -1.0, 0, 0, -0.3]])
+    found = pls.regressed(made(law=lambda nu, tau: np.hstack([nu, tau]) @ B.T), recipe("PLS3"))
+    first, *rest = pls_report.sentences(found)
+    assert first.startswith("PLS3, 1600 samples, ")
+    for axis in "XYN":
+        assert f"{axis}: {number(found.by_axis('r2')[axis])} / " in first
+    assert first.endswith("by 3 factors.")
+    assert "Coefficients within two of their standard deviations" in " ".join(rest)
+    assert pls_report.thrust_of(found).sentence in rest
+    clipped = list(pls_report.sentences(pls.regressed(made(), recipe("continuous"))))
+    assert "Outside of the ranges of Table 1, and clipped: u " in " ".join(clipped)
+
+
+def test_pictures_of_the_analysis_hold_what_they_are_given():
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(2, 50))
+    (panel,) = analysis_figures.cloud(a, b, ("t1", "t2")).axes
+    assert (panel.get_lines()[0].get_ydata() == b).all()
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("t1", "t2")
+    (panel,) = analysis_figures.loadings(np.eye(2), ["omega_X", "u"], "p").axes
+    assert [text.get_text() for text in panel.texts] == ["omega_X", "u"]
+    nu, kept = rng.normal(size=(50, 3)), np.arange(50) != 7
+    top = analysis_figures.before_and_after(nu, kept).axes[0]
+    drawn = {line.get_label(): line for line in top.get_lines()}
+    assert drawn["removed"].get_xdata().tolist() == [7]
+    assert drawn["kept"].get_xdata().size == 49
 
 
 def test_remark_where_the_validated_share_exceeds_the_explained_one():

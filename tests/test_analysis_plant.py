@@ -155,6 +155,7 @@ class TestPasses:
         found = cp.identify([s])
         said = " ".join(warnings(found, [s]))
         assert "|r|v = −|v|r" in said
+        assert re.search(r"Y: condition number \S+; these data hardly tell apart .*Y_absr_v", said)
         assert found.condition[1] > 1e6
         rich = made(row("SYSID4"), n=800)
         assert "|r|v =" not in " ".join(warnings(cp.identify([rich]), [rich]))

@@ -11,6 +11,7 @@ import zipfile
 import pytest
 from support.project import ROOT
 
+from fmus import interruption
 from fmus.build import building
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no signals to send")
@@ -38,6 +39,18 @@ def main():
     finally:
         signal.raise_signal(signal.SIGINT)
 """
+
+
+def test_all_ways_to_interrupt_end_a_command_but_those_that_are_ignored(monkeypatch):
+    taken = {}
+    ignored = interruption.SIGNALS[-1]
+    monkeypatch.setattr(
+        interruption.signal, "getsignal", lambda n: signal.SIG_IGN if n == ignored else signal.SIG_DFL
+    )
+    monkeypatch.setattr(interruption.signal, "signal", taken.__setitem__)
+    interruption.leave_on_interrupt()
+    assert taken == dict.fromkeys(interruption.SIGNALS[:-1], interruption._leave)
+    assert signal.SIGINT in taken
 
 
 @posix

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from support.command import command
 from support.project import ROOT
 
 import cosim
+from cosim.campaign import __main__ as conducting
 from cosim.campaign import shown_progress
 from cosim.campaign.__main__ import main
 from cosim.campaign.campaign_file import LoadedCampaign
@@ -257,6 +259,39 @@ def test_equal_runs_are_made_once_and_labels_are_shown(base):
     made = cosim.run_campaign(campaign(base, axes), base / "out", workers=0)
     assert list(made["m"]) == ["a", "b"]
     assert len((base / "out" / JOURNAL).read_bytes().splitlines()) == 1
+
+
+def test_differences_and_the_best_are_tables(base, monkeypatch):
+    axes = {
+        "m": {"set": "vessel.m", "values": [14.0, 15.0]},
+        "seed": {"set": "seed", "values": [0, 1, 2]},
+    }
+    rows = [
+        {
+            "m": m,
+            "seed": s,
+            "W": (m == 15.0) + 1.0 + 0.1 * s,
+            "IAE": 2.0,
+            "status": "done",
+            "hash": f"{m} {s}",
+            "message": "",
+        }
+        for m in (14.0, 15.0)
+        for s in range(3)
+    ]
+    monkeypatch.setattr(conducting, "run_campaign", lambda *_, **__: pandas.DataFrame(rows))
+    (base / "out").mkdir()
+    arguments = ("--metrics", "W", "--compare", "m", "--pareto", "W,IAE", "--out", base / "out")
+    done = command(main, campaign(base, axes), *arguments)
+    assert done.returncode == 0, done.stderr
+    text = " ".join(done.stdout.split())
+    assert "6 runs in" in text
+    assert "not beaten in both W and IAE" in text
+    assert "m against metric unit pairs difference percent better" in re.sub(r"\W+", " ", text)
+    found = pandas.read_csv(base / "out" / "differences.csv")
+    assert found["pairs"].tolist() == [3]
+    assert found["difference"].abs().tolist() == pytest.approx([1.0])
+    assert pandas.read_csv(base / "out" / "pareto.csv")["m"].tolist() == [14.0]
 
 
 def test_the_campaign_file_is_not_overwritten(base):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.project import COMPONENTS
 
 from fmus.controller import abs as abs_module
 from fmus.controller import bs, pid
@@ -14,11 +15,22 @@ from fmus.frames import rotate_to_body
 from fmus.hull import Damping, Inertia, RotationalDamping, mass_matrix
 from fmus.signals import Estimate, Force, Target
 from fmus.vessel import vessel
+from studies.trials import SOFT
 
 ABS = abs_module.COMPONENT
 Params = ABS.params
 TRUE_PHI = RotationalDamping()
 H = 0.002
+
+
+def test_gains_are_those_of_table_5_1():
+    assert {f"K_{name}": gain for name, gain in SOFT.items()} == Gains()._asdict()
+
+
+@pytest.mark.parametrize("name", ["controller_cl_win_eps_scaled", "controller_cl_improved"])
+def test_samples_of_what_a_lag_would_spoil_are_smoothed_over_two_seconds(name):
+    assert COMPONENTS[name].params().samples.smoothing == 2.0
+    assert COMPONENTS["controller_cl_win_eps"].params().samples.smoothing == 0.0
 
 
 def true_estimate(s, nu_dot=(0.0, 0.0, 0.0)):

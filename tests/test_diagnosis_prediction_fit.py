@@ -15,6 +15,7 @@ from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, integrals
 from diagnosis.model.weak_form import EVERY, HORIZON
 from diagnosis.prediction_error import push as pushes
+from diagnosis.prediction_error import shooting
 from diagnosis.prediction_error.fit import fit_predictions, shootings
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.prediction_error.predicted_bands import prediction_bands
@@ -89,6 +90,27 @@ def test_slopes_are_those_of_one_model_after_the_other():
         alone = (first - windows().residuals(Model().plus({name: step}))) / step
         np.testing.assert_allclose(around.slopes[..., k], alone, rtol=0.0, atol=1e-9)
         assert np.abs(alone).max() > 1e-3
+
+
+def test_slopes_do_not_depend_on_how_many_models_are_stepped_together(monkeypatch):
+    together = windows().around(Model(), STEPS)
+    monkeypatch.setattr(shooting, "ROOM", 1)
+    alone = windows().around(Model(), STEPS)
+    np.testing.assert_allclose(alone.slopes, together.slopes, rtol=0.0, atol=1e-9)
+
+
+def test_pose_that_is_seen_is_the_mean_of_the_samples_in_reach():
+    s = smoothed(sail()[0])
+    rows = np.flatnonzero(s.used)[100:130]
+    one, noise = shooting._seen(s, s.time[rows][None], 1e-6)
+    np.testing.assert_allclose(shooting._off(one, s.track.pose[rows][None]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(noise[0], np.tile(s.noise**2, (30, 1)))
+    h = s.time[1] - s.time[0]
+    _, three = shooting._seen(s, s.time[rows][None], 1.5 * h)
+    assert s.used[99:131].all()
+    np.testing.assert_allclose(three[0], np.tile(s.noise**2 / 3.0, (30, 1)))
+    _, none = shooting._seen(s, s.time[rows][None] + 0.5 * h, 1e-6)
+    assert (none > 1e3 * noise).all()
 
 
 def test_coarse_steps_predict_what_fine_ones_do():

@@ -18,6 +18,9 @@ from test_run import start
 import cosim
 from cosim.fmu.isolated import _reason
 
+# A watching thread that dies would be told as a warning only.
+pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+
 
 def one(path, **entry):
     return {

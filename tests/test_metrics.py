@@ -406,6 +406,31 @@ class TestPlots:
         assert length(track.once([lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
         assert length(track.once([laps, lap], 2.0)) == pytest.approx(2.0 * np.pi, rel=0.02)
 
+    def test_paths_of_ship_and_target_lie_where_they_were(self):
+        log = shift(circle(), 0.0, 0.5)
+        log["vessel.psi"] = log["vessel.psi"] + 7.0
+        (_, figure), *_ = drawing.figures({"a": log}, names=("trajectory",))
+        drawn = {line.get_label(): line for line in figure.axes[0].get_lines()}
+        for label, name in (("a", "vessel.{}"), ("target", "guidance.{}_t")):
+            for axis, values in (("y", drawn[label].get_xdata()), ("x", drawn[label].get_ydata())):
+                true = log[name.format(axis)]
+                assert np.nanmin(values) == pytest.approx(true.min(), abs=0.02)
+                assert np.nanmax(values) == pytest.approx(true.max(), abs=0.02)
+
+    def test_a_target_as_long_as_the_picture_is_drawn_in_500_steps(self):
+        x, _ = track.once([(np.array([0.0, 3.0]), np.array([1.0, 1.0]))], 3.0)
+        known = x[np.isfinite(x)]
+        assert known.size == 500 + 2
+        assert np.ptp(known) == 3.0
+        assert np.diff(known) == pytest.approx(3.0 / 501, rel=1e-9)
+
+    def test_hull_is_alike_on_both_sides_and_as_long_and_wide_as_the_ship(self):
+        (corners,) = track.hulls(np.zeros((1, 3)))
+        mirrored = corners * [-1.0, 1.0]
+        assert {tuple(c) for c in corners.tolist()} == {tuple(c) for c in (mirrored + 0.0).tolist()}
+        assert np.ptp(corners, axis=0) == pytest.approx([track.HULL_WIDTH, track.HULL_LENGTH])
+        assert corners[corners[:, 1].argmax()] == pytest.approx([0.0, 0.5 * track.HULL_LENGTH])
+
     def test_a_crossing_stays_whole(self):
         angle = np.linspace(0.1, 2.0 * np.pi + 0.1, 3000)
         x, _ = track.once([(np.sin(2.0 * angle), np.sin(angle))], 2.0)

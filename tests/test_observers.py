@@ -149,6 +149,23 @@ def test_nonlinear_observer_has_the_poles_of_its_gains():
     assert np.allclose(errors, expected, atol=2e-3)
 
 
+@pytest.mark.parametrize("name", ["observer_nonlinear", "observer_luenberger"])
+def test_no_pose_makes_a_velocity_that_no_ship_has(name):
+    """2 m/s and 5 rad/s at the most, whichever way and how far the measured pose jumps."""
+    component = COMPONENTS[name]
+    pack, params = packer(component.inputs), component.params()
+    for sign in (1.0, -1.0):
+        state = component.init(pack([0.0] * 6), params)
+        most = np.zeros(3)
+        for k in range(300):
+            pose = [sign * 3.0 * k, sign * 2.0 * k, sign * 2.0 * k]
+            state, e = component.step(state, pack([*pose, 0.0, 0.0, 0.0]), params, 0.01)
+            most = np.maximum(most, np.abs([e.u_hat, e.v_hat, e.r_hat]))
+        assert (most <= [2.0, 2.0, 5.0]).all()
+        reached = 2 if name == "observer_luenberger" else 3  # its damping brakes the yaw rate before
+        assert most[:reached].tolist() == [2.0, 2.0, 5.0][:reached]
+
+
 def test_luenberger_without_measurement_is_the_model():
     component, vessel = COMPONENTS["observer_luenberger"], COMPONENTS["vessel"]
     pack, force = packer(component.inputs), packer(vessel.inputs)

@@ -221,6 +221,9 @@ def test_adaptive_backstepping_that_is_far_better_would_be_seen():
     assert lessons.adaptive(made_up()).here.startswith("reproduced")
     better = {trials.ABS: {"position": 0.1}}
     assert lessons.adaptive(made_up(better, better)).here.startswith("in 0 of 8")
+    assert "Fell behind for good: none." in lessons.adaptive(made_up()).numbers
+    fell = lessons.adaptive(made_up(faulty={trials.RBS: {"lost": 1.0}})).numbers
+    assert "ellipse 0.08, fault: 5 of RBS and 0 of ABS" in fell
 
 
 def test_those_who_fall_behind_are_told():

@@ -189,7 +189,9 @@ def test_reason_for_the_lack_of_rank_is_told_by_the_motion(sway, signs, said):
 def test_condition_1_is_counted_where_it_is_met():
     met = full_rank(by_path(rank=lambda p, c, n: 0.5 if p == "eight" and n == "svd_z2" else 0.0))
     assert met.here == f"σ_min above 0.01 at some time in {len(CONDITIONS)} of {8 * len(CONDITIONS)}"
+    assert "eight, mdf, svd_z2: 50 %" in met.numbers
     assert "at some time in 0 of" in full_rank(by_path()).here
+    assert "share of the time: none" in full_rank(by_path()).numbers
     assert met.thesis.startswith("Condition 1")
 
 

@@ -103,6 +103,8 @@ def test_interface_command_tells_what_is_wrong(tmp_path, capsys):
 
     assert main([str(tmp_path / "nothing.json")]) == 2
     assert "no such scenario" in capsys.readouterr().err
+    assert main([str(SCENARIO)]) == 0
+    assert capsys.readouterr().out.strip() in (ROOT / "docs" / "interface.md").read_text()
 
 
 def test_log_tells_the_order(tmp_path):

@@ -11,6 +11,7 @@ from benchmarks.watch_delay import Told, outcome
 from benchmarks.watched_runs import cases
 from diagnosis.watch import main
 from fmus.controller.backstepping import Applied, Inputs
+from fmus.signals import Force
 from fmus.watch import thruster_watch as watch
 
 F = np.random.default_rng(0).normal(size=(watch.ROWS, 3))
@@ -93,6 +94,18 @@ def test_nothing_is_told_without_the_applied_force():
         e = inputs.estimate._replace(u_hat=0.1 * np.sin(k), v_hat=0.05 * np.cos(k))
         state, out = c.step(state, inputs._replace(estimate=e), p, 0.5)
         assert max(out.failed_vsp, out.failed_bow) < 0.5
+
+
+def test_a_ship_that_force_does_not_move_misses_all_of_it():
+    c, tau = watch.COMPONENT, Force(0.5, -0.3, 0.2)
+    p, inputs = c.params(), Inputs(applied=Applied(*tau))
+    state = c.init(inputs, p)
+    for _ in range(400):
+        state, _ = c.step(state, inputs, p, 0.05)
+    row = state.rows[0]
+    assert row.f == pytest.approx(watch.forces(tau, p.allocation), rel=1e-6)
+    assert row.g == pytest.approx([-f for f in row.f], rel=1e-6)
+    assert row.nu == (0.0, 0.0, 0.0)
 
 
 def test_outcome_counts_alarms_delays_and_thrusters():
