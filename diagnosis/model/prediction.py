@@ -24,6 +24,7 @@ from .thrust import Response, commanded_shares, places
 # measurement
 LONGEST_STEP = 0.02
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
+UNSURE = 3.0  # standard deviations of a speed within which it may be none
 CLOSE = 1e-12  # m and rad, to which a true pose is found
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
@@ -87,9 +88,10 @@ class Starts:
 
 
 def at_rest(smoothed: Smoothed) -> bool:
-    """Whether a ship hardly moves at the start of a run."""
-    known = np.isfinite(smoothed.nu[:, 0])
-    return bool((np.abs(smoothed.nu[known.argmax()]) < idle(smoothed.scale)).all())
+    """Whether a ship hardly moves at the start of a run, or as little as cannot be told from rest."""
+    first = np.isfinite(smoothed.nu[:, 0]).argmax()
+    still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
+    return bool((np.abs(smoothed.nu[first]) < still).all())
 
 
 def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
