@@ -17,6 +17,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from importlib.util import resolve_name
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -61,21 +62,17 @@ def copied(root: Path, copy: Path) -> Path:
 
 def imported(root: Path, path: Path) -> Iterator[Path]:
     """The project's modules that a file imports, also inside of functions."""
-    package = path.relative_to(root).parent.parts
+    package = ".".join(path.relative_to(root).parent.parts)
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         names = []
         if isinstance(node, ast.Import):
-            names = [alias.name.split(".") for alias in node.names]
+            names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            up = package[: len(package) - node.level + 1] if node.level else ()
-            base = [*up, *(node.module or "").split(".")]
-            names = [base, *([*base, alias.name] for alias in node.names)]
-        for parts in names:
-            for folder in (root, root / "tests"):
-                place = folder.joinpath(*filter(None, parts))
-                for file in (place.with_suffix(".py"), place / "__init__.py"):
-                    if file.is_file():
-                        yield file
+            base = resolve_name("." * node.level + (node.module or ""), package)
+            names = [base, *(f"{base}.{alias.name}" for alias in node.names)]
+        places = [f.joinpath(*name.split(".")) for name in names for f in (root, root / "tests")]
+        files = [file for p in places for file in (p.with_suffix(".py"), p / "__init__.py")]
+        yield from filter(Path.is_file, files)
 
 
 def distances(start: Path, graph: Mapping[Path, Sequence[Path]]) -> dict[Path, int]:
@@ -110,24 +107,17 @@ class Covering:
         self.cache = out / "session" / "cache"
         self.unsound: set[str] = set()
         kept = out / "measured.json"
-        now = {
-            p.relative_to(root).as_posix(): self._hash(p)
-            for n in OURS
-            for p in root.glob(f"{n}/**/*.py")
-        }
+        every = [path for name in OURS for path in root.glob(f"{name}/**/*.py")]
+        now = {path.relative_to(root).as_posix(): self._hash(path) for path in every}
         old = json.loads(kept.read_text("utf-8")) if kept.exists() else {"hashes": {}, "seconds": {}}
-        changed = [
-            name
-            for name in now
-            if re.match(r"tests/test_\w+\.py", name) and now[name] != old["hashes"].get(name)
-        ]
         self.hashes, self.seconds = old["hashes"], old["seconds"]
+        tests = [name for name in now if name.startswith("tests/test_")]
+        changed = [name for name in tests if now[name] != self.hashes.get(name)]
         if changed:
             measured = self._measure(changed if kept.exists() else [], processes)
-            self.seconds = {
-                test: s for test, s in self.seconds.items() if test.partition("::")[0] not in changed
-            } | measured
+            others = {t: s for t, s in self.seconds.items() if t.partition("::")[0] not in changed}
             self.hashes = now | self.hashes | {name: now[name] for name in changed}
+            self.seconds = others | measured
             kept.write_text(json.dumps({"hashes": self.hashes, "seconds": self.seconds}), "utf-8")
         self.moved = {name for name in now if now[name] != self.hashes.get(name)}
 
@@ -143,18 +133,11 @@ class Covering:
         settings.write_text(COVERAGE, encoding="utf-8")
         copy = self.out / "copy"
         shutil.rmtree(copy, ignore_errors=True)
-        options = (
-            f"-q -n {processes} -p no:cacheprovider --cov --cov-context=test --cov-append --cov-report="
-        )
+        options = f"-q -n {processes} -p no:cacheprovider --cov --cov-context=test --cov-append"
+        places = [f"--cov-config={settings}", f"--junitxml={report}", f"--basetemp={session}"]
+        options = [*options.split(), "--cov-report=", "-mnot slow", *places]
         subprocess.run(
-            [
-                *(sys.executable, "-m", "pytest", *options.split(), "-m", "not slow", *files),
-                *(
-                    f"--cov-config={settings}",
-                    f"--junitxml={report}",
-                    f"--basetemp={session}",
-                ),
-            ],
+            [sys.executable, "-m", "pytest", *options, *files],
             cwd=copied(self.root, copy),
             env={**os.environ, "PYTHONPATH": str(copy), "COVERAGE_FILE": str(self.out / "coverage")},
             check=False,  # tests that fail without a mutant are left out

@@ -357,6 +357,84 @@ def test_bad_input_is_one_line_and_leaves_nothing(case, ugly, tmp_path, monkeypa
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "name", ["compare", "learn", "pca", "pls", "propose_columns", "replay", "sysid", "watch"]
+)
+def test_help_has_examples_and_exit_codes_on_lines_of_their_own(name):
+    code, text = run(import_module(f"diagnosis.{name}").main, "--help")
+    lines = text.splitlines()
+    assert code == 0
+    assert any(line.startswith("exit codes: 0 done") for line in lines)
+    first = next(k for k, line in enumerate(lines) if line.startswith("examples:"))
+    assert f"python -m diagnosis.{name} " in lines[first]
+
+
+@pytest.fixture
+def written(monkeypatch, tmp_path):
+    """The commands without their work: what is learned is given, and each file says what made it."""
+    (tmp_path / "a.csv").write_text("time\n")
+    content = SimpleNamespace(model_dump_json=lambda indent: '{"verdict": "found"}')
+    given = SimpleNamespace(
+        sound=True,
+        learned=SimpleNamespace(model=diagnosis.Model().plus({"delta_X_u": -1.0})),
+        posterior=SimpleNamespace(write=lambda path: path.write_text("{}")),
+        comparison=SimpleNamespace(evaluations=[], omega_std=[]),
+        files=None,
+    )
+
+    def diagnosis_content(found, model, files):
+        given.files = files
+        return content
+
+    def write_coefficients(made, csv, tex):
+        assert made is content
+        csv.write_text("csv")
+        tex.write_text("tex")
+
+    def write_report(path, made, evaluations, std, advance, origin):
+        assert made is content
+        path.write_text("html")
+
+    for name, stub in (
+        ("diagnosis_content", diagnosis_content),
+        ("comparison_content", diagnosis_content),
+        ("show_diagnosis", lambda made, out: [f"shown, in {out}"]),
+        ("show_comparison", lambda made, out: [f"shown, in {out}"]),
+        ("write_coefficients", write_coefficients),
+        ("write_report", write_report),
+    ):
+        monkeypatch.setattr(f"diagnosis.report.{name}", stub)
+    monkeypatch.setattr("diagnosis.gathering.gather", lambda paths, *_: list(paths))
+    monkeypatch.setattr(session, "diagnose", lambda *_, **__: given)
+    monkeypatch.setattr(session, "evaluate", lambda *_, **__: given.comparison)
+    return given
+
+
+@pytest.mark.parametrize(
+    ("sound", "options", "kept"),
+    [(True, [], True), (False, [], False), (False, ["--allow-unstable"], True)],
+)
+def test_model_that_is_not_sound_is_not_written_unless_it_is_asked_for(
+    sound, options, kept, written, tmp_path
+):
+    written.sound = sound
+    code, text = run(learn.main, tmp_path / "a.csv", "--out", tmp_path / "out", *options)
+    files = set(learn.FILES) - (set() if kept else {learn.MODEL, learn.POSTERIOR})
+    assert code == (0 if kept else 3)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == files == set(written.files)
+    assert ("model.ssv is NOT written" in text) is not kept
+    assert "shown, in" in text
+    assert strict(tmp_path / "out" / "diagnosis.json") == {"verdict": "found"}
+    assert (tmp_path / "out" / learn.CSV).read_text() == "csv"
+
+
+def test_compare_writes_its_numbers_and_its_page(written, tmp_path):
+    code, text = run(compare.main, tmp_path / "a.csv", "--out", tmp_path / "out")
+    assert (code, "shown, in" in text) == (0, True)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"comparison.json", "report.html"}
+    assert strict(tmp_path / "out" / "comparison.json") == {"verdict": "found"}
+
+
 @pytest.mark.parametrize("prior", ["-0.1", "nan", "much"])
 def test_a_prior_that_is_none_is_refused(prior, runs, capfd):
     code, _ = run(learn.main, runs / "a.csv", f"--prior={prior}")

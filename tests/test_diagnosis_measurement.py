@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 from scipy.io import savemat
 from support.command import command
 from support.measured import DATA, needs_data
@@ -15,7 +16,7 @@ import cosim
 import diagnosis
 from diagnosis import propose_columns
 from diagnosis.data import propose
-from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Layout
+from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Column, Layout
 from diagnosis.data.csv_tables import csv_table
 from diagnosis.data.reading import force
 from fmus.thrusters.allocation import Allocation, thrust
@@ -366,6 +367,12 @@ def test_measured_runs_are_read():
         assert np.median(np.diff(run.time)) == pytest.approx(0.05)
         most = np.abs(run.tau_cmd[:, 0]).max()
         assert most == pytest.approx(2.33 * run.power[:, 0].max(), rel=0.01), "full ahead, once"
+
+
+@pytest.mark.parametrize(("made", "field"), [(Column(name="x"), "factor"), (Layout(), "skip")])
+def test_a_description_of_a_file_does_not_change(made, field):
+    with pytest.raises(ValidationError, match="frozen"):
+        setattr(made, field, 1)
 
 
 def test_columns_of_a_large_file_take_less_memory_than_the_file(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
-from diagnosis.identification.candidates import candidate, covered, model_error
+from diagnosis.identification.candidates import additions, candidate, covered, model_error
 from diagnosis.identification.multistart import Landscape, best_values
 from diagnosis.identification.segmentation import programmed
 from diagnosis.model import integrals, read_model, write_model
@@ -39,6 +39,16 @@ def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tm
     again = read_model(tmp_path / "model.ssv")
     assert again.thrusters == {}
     assert again.during("made").thrusters == pytest.approx(hidden, abs=0.3)
+
+
+def test_what_is_tried_of_a_coefficient_is_an_addition_and_of_a_shape_the_value_itself():
+    for e in STANDARD.values():
+        start = Model().plus({p.name: 0.1 for p in e.parameters if p.name not in e.coefficients})
+        tried = {p.name: 0.3 for p in e.parameters}
+        found = start.plus(additions(start, e, tried))
+        for name, value in tried.items():
+            before = start.value(name) if name in e.coefficients else 0.0
+            assert found.value(name) - before == pytest.approx(value), (e.id, name)
 
 
 def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure():

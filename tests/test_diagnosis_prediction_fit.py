@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache, partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from diagnosis.prediction_error.predicted_bands import prediction_bands
 from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
 from diagnosis.prediction_error.refit import fit_model_error
 from diagnosis.prediction_error.shooting import Linear, Shooting
-from diagnosis.prediction_error.unrecorded import unrecorded
+from diagnosis.prediction_error.unrecorded import box, unrecorded
 
 STEPS = {
     "N_r": 1e-3,
@@ -111,6 +112,20 @@ def test_pose_that_is_seen_is_the_mean_of_the_samples_in_reach():
     np.testing.assert_allclose(three[0], np.tile(s.noise**2 / 3.0, (30, 1)))
     _, none = shooting._seen(s, s.time[rows][None] + 0.5 * h, 1e-6)
     assert (none > 1e3 * noise).all()
+
+
+@pytest.mark.parametrize(("start", "end"), [(4.0, 6.0), (0.5, 1.5), (9.0, 10.5)])
+def test_box_is_found_by_its_means_over_windows(start, end):
+    """Also where it begins before the first window's middle, or ends after the last one's."""
+    width, every, size = 3.0, 0.5, 0.7
+    middle = np.arange(1.0, 10.01, every)
+    s = np.linspace(-1.0, 1.0, 3001)
+    kernel = (1.0 - s * s) ** 3 / ((1.0 - s * s) ** 3).sum()
+    times = middle[:, None] + 0.5 * width * s
+    error = size * ((times >= start) & (times < end)) @ kernel
+    w = SimpleNamespace(middle=middle, width=width, every=every)
+    found = box(w, np.ones(middle.size, bool), error)
+    assert found == pytest.approx((start, end, size), abs=0.01)
 
 
 def test_coarse_steps_predict_what_fine_ones_do():

@@ -288,6 +288,23 @@ def test_processes_die_with_a_master_that_is_killed(running, hang):
     assert gone(workers)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process ends after its present call")
+def test_process_ends_with_the_one_that_has_started_it():
+    child = (
+        "import os, time\nfrom cosim.process.spawned import end_with_parent\n"
+        "end_with_parent(os.getppid()); print(os.getpid(), flush=True); time.sleep(60)"
+    )
+    parent = f"import subprocess, sys\nsubprocess.run([sys.executable, '-c', {child!r}])"
+    started = subprocess.Popen(
+        [sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    pid = int(started.stdout.readline())
+    assert alive(pid)
+    started.kill()
+    started.wait()
+    assert gone([pid])
+
+
 def test_timeout_without_a_process_is_refused():
     with pytest.raises(cosim.InputError, match='timeout needs "isolate": true'):
         cosim.load_scenario(one("x.fmu", isolate=False, timeout=3.0))

@@ -457,6 +457,22 @@ def test_what_is_found_at_a_place_has_a_picture_of_the_place(data, tmp_path, by,
     assert page.values("download").count("free.svg") == 1
 
 
+def test_pictures_of_a_run_name_their_lines(data):
+    """The measured track below, the predictions of each window on it, from where the window begins."""
+    e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
+    track = tracks.track(e, True)
+    lines = {line.get_label(): line for line in track.axes[0].get_lines()}
+    assert {"measured", "before", "after"} <= set(lines)
+    assert {text.get_text() for text in track.legends[0].get_texts()} == {"measured", "before", "after"}
+    east = e.smoothed.eta[:, 1]
+    assert np.nanmax(lines["measured"].get_xdata()) == pytest.approx(np.nanmax(east), abs=1e-3)
+    assert lines["measured"].get_linewidth() > lines["before"].get_linewidth()
+    assert lines["before"].get_linewidth() == lines["after"].get_linewidth() == 1.0
+    worst = tracks.worst_window(e, True)
+    labels = {line.get_label() for line in worst.axes[0].get_lines()}
+    assert {"measured", "before", "after"} <= labels
+
+
 def test_arrows_point_where_the_missing_force_does(data):
     """A force to the north and to the east by the heading of the ship, from its own axes."""
     e = evaluate_run(data[1], Model())

@@ -1,5 +1,6 @@
 """Reports, pictures and commands of the studies, of numbers and logs that were made up: nothing sails."""
 
+import inspect
 import itertools
 import json
 import re
@@ -23,6 +24,7 @@ from studies import (
     improved,
     lap_pictures,
     lost_thrust,
+    measured_ship,
     model_loops,
     observer_gains,
     pictures,
@@ -33,6 +35,7 @@ from studies import (
     trials,
 )
 from studies.estimates_replayed import OBSERVERS, SIGNALS
+from studies.expected import BY_HAND, STEERED, Fall
 from studies.outcome import AXES, LEARNED_FROM, Outcome
 from studies.store_contents import StoreContents
 from studies.study_report import Report
@@ -654,6 +657,63 @@ def test_fall_of_the_heading_is_told_beside_that_with_the_run_learned_from(tmp_p
     assert "no candidate" not in text
     assert "no candidate has what turns the ship" in said([1.0, 1.0], [1.5, 1.5])
     assert "heading's fall" not in said([1.0], [None])
+
+
+def test_falls_are_told_beside_their_targets(tmp_path, monkeypatch):
+    def fold(name, kind, *falls):
+        rms = SimpleNamespace(omega_rms=np.array([0.4, 0.3, 0.2]))
+        evaluation = SimpleNamespace(integrals=None, before=rms, after=rms)
+        return SimpleNamespace(name=name, evaluation=evaluation, kind=kind, falls=falls)
+
+    high, low = Fall(8.0, 9.0, 99.0, 0.1, 0.1), Fall(0.5, float("nan"), 99.0, 0.1, 0.1)
+    monkeypatch.setattr(ship_tables, "falls", lambda f: f.falls)
+    monkeypatch.setattr(ship_tables, "kind", lambda f: f.kind)
+    monkeypatch.setattr(ship_tables, "at_full_power", lambda _: [1.0, 2.0, 3.0])
+    report = Report(tmp_path, "t")
+    ship_tables.write_falls(
+        report, [fold("a", STEERED, high, high, high), fold("b", BY_HAND, high, low, low)]
+    )
+    text, results = written(report.write(), tmp_path)
+    assert "| a, dynamic positioning | surge [N] | 0.4 (1) | 0.4 | 8.00× | 4×: reached | 9.00× |" in text
+    assert "| b, by hand | surge [N] | 0.4 (1) | 0.4 | 8.00× | – | 9.00× |" in text
+    assert "| b, by hand | yaw [N m] | 0.2 (3) | 0.2 | 0.50× | 2.5×: not reached | – |" in text
+    assert "it would allow 99× or more" in text
+    assert "worse than the nominal one in sway of b, yaw of b." in text
+    assert "- b, sway (0.50× of 7×): not known." in text
+    assert results["falls"]["b"]["axes"]["yaw"]["before_without_power"] == 3.0
+
+
+def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
+    """What each table gets is checked against what it takes; their content is tested elsewhere."""
+    run = SimpleNamespace(run=SimpleNamespace(name="a"))
+    content = SimpleNamespace(model_dump=lambda mode, exclude: {"verdict": "found"})
+    fold = SimpleNamespace(name="a", content=content, evaluation=None)
+    last = SimpleNamespace(learned=SimpleNamespace(model="learned"))
+    parts = {}
+    for name in ("falls", "windows", "expected", "curve", "findings"):
+        takes = inspect.signature(getattr(ship_tables, f"write_{name}"))
+
+        def write(*given, name=name, takes=takes):
+            parts.setdefault(name, []).append(takes.bind(*given).arguments)
+
+        monkeypatch.setattr(ship_tables, f"write_{name}", write)
+    monkeypatch.setattr(ship_tables, "model_error_picture", lambda e: "drawn")
+    monkeypatch.setattr(measured_ship.bollard, "read", lambda _: "pulls")
+    monkeypatch.setattr(measured_ship.basin, "files", lambda _: ["a.mat"])
+    monkeypatch.setattr(measured_ship, "gather", lambda files, advance: [run])
+    monkeypatch.setattr(measured_ship, "learned", lambda runs, prior, quick, advance: [fold])
+    monkeypatch.setattr(measured_ship, "with_all", lambda folds, found: folds)
+    monkeypatch.setattr(measured_ship.diagnosis, "diagnose", lambda *_, **__: last)
+    monkeypatch.setattr(measured_ship, "diagnosis_content", lambda found, model, files: content)
+    text, results = written(measured_ship.study(tmp_path, tmp_path, 0.1, quick=True), tmp_path)
+    assert [list(arguments.values())[1:] for arguments in parts["curve"]] == [
+        [[fold], "learned", "pulls"]
+    ]
+    assert [a["name"] for a in parts["findings"]] == ["Learned without a", "Learned from all runs"]
+    assert [len(parts[name]) for name in ("falls", "windows", "expected")] == [1, 1, 1]
+    assert figures["omega_a"][0] == "drawn"
+    assert set(results["diagnoses"]) == {"without a", "all runs"}
+    assert "`python -m diagnosis.learn --prior 0.1`" in text
 
 
 # Commands

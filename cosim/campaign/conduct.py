@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 NEEDED = ("pandas", "pyarrow", "scipy", "distributed")
 SUMMARY = "campaign.json"
 LOCK = ".campaign.lock"
-# Share of the runs that the table may lack while a campaign runs; up to a hundred it lacks none. Chosen:
-# with a million runs all its writing takes a hundredth of the time.
-AGREE = 0.01
+# Share of the time that writing the table may take while a campaign runs; chosen: it then lacks the runs
+# of the last half second, and none where a run takes longer.
+WRITING = 0.02
 # Receives the number of runs that have ended, failed ones among them, and of all runs.
 Progress = Callable[[int, int, int], None]
 
@@ -161,6 +161,7 @@ class _Work:
         waiting: how many of them wait for the run of a hash.
         ended, failed: how many of them have ended, and failed.
         earlier: hashes of the runs that the table had before.
+        due: when the table is written next, of :func:`time.monotonic`.
     """
 
     scenarios: CaseScenarios
@@ -173,6 +174,7 @@ class _Work:
     ended: int = 0
     failed: int = 0
     earlier: set[str] = field(default_factory=set)
+    due: float = 0.0
 
     def recall(self, overwrite: bool) -> None:
         """Find the runs that the folder has.
@@ -239,7 +241,7 @@ class _Work:
                 keep_log(self.folder, job.hash, row.log)
             self.journal.add(job.hash, row)
             self._count(row, self.waiting.pop(job.hash, 0))
-            if len(self.journal.new) >= max(1.0, AGREE * len(self.journal.rows)):
+            if time.monotonic() >= self.due:
                 self._keep("running")
             progress(self.ended, self.failed, len(self.cases))
             if self._settled():
@@ -251,6 +253,7 @@ class _Work:
         Raises:
             OSError: the table cannot be written; then the journal is brought to what that has.
         """
+        started = time.monotonic()
         made = table(self._counted(), self.journal.rows)
         try:
             write_table(self.folder, made)
@@ -260,6 +263,7 @@ class _Work:
             if status == "running":
                 raise
         update_json(self.folder / SUMMARY, self.told, self._state(status, message))
+        self.due = (ended := time.monotonic()) + (ended - started) / WRITING
         return made
 
     def _state(self, status: str, message: str = "") -> dict[str, Any]:

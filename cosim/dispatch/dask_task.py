@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import dataclass
 from multiprocessing import parent_process
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from distributed import Worker, WorkerPlugin, get_worker
 
@@ -21,8 +22,9 @@ PATIENCE, LOOK = 60.0, 0.05
 FOLDER = "cybership"  # below a worker's own folder
 
 
-class Request(NamedTuple):
-    """What a task of Dask gets.
+@dataclass(frozen=True)
+class Request:
+    """What a task of Dask gets; no tuple, in which Dask would look for results of other tasks.
 
     Attributes:
         runs: scenarios with files named by their contents, each with what makes it.

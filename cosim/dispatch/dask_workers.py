@@ -31,9 +31,9 @@ from .dask_task import OneFile, Request, run_on_worker
 from .job import Job, Row, own_version
 from .travelling_files import Files
 
-# Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is below one
-# percent of it; chosen: little is lost with a worker.
-TASK_TIME = 1.0
+# Wall time that one task of Dask should last [s], so that what Dask does for it, a few ms, is one or two
+# percent of it; chosen: little is lost with a worker, and none waits long for another at the end.
+TASK_TIME = 0.3
 # Runs in one task; chosen: the request stays small.
 MOST_IN_TASK = 64
 # Tasks that wait or run for each thread of the workers: one runs while the next one is on its way.
