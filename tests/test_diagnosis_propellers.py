@@ -7,7 +7,6 @@ from test_diagnosis_selection import learn
 
 from diagnosis import Model, Run, integrals
 from diagnosis.data.reading import ASIDE, force, propellers
-from diagnosis.model.thrust import placed
 from fmus.effects import STANDARD, Running, Thrust
 from fmus.signals import Force
 from fmus.thrusters import chain
@@ -40,8 +39,8 @@ def voyage(seconds=90.0, **values):
         poses.append(s[:3])
         total = np.zeros(3)
         for one, aside in zip(shares, ASIDE, strict=True):
-            drive = placed(model.drive, aside, chain.Power(*power))
-            total += chain.act(tuple(one), Running(now, *s[3:6], *one)._replace(aside=aside), drive)
+            drive = chain.placed(model.drive, aside, power)
+            total += chain.act(tuple(one), chain.running(now, *s[3:6], one, drive), drive)
         s, _ = model.ship.vessel.advance(s, Force(*total.tolist()), ready, H)
     pose = np.array(poses) + NOISE * np.random.default_rng(4).standard_normal((t.size, 3))
     return integrals(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))

@@ -86,7 +86,7 @@ def _moves_on(w: Integrals, model: Model, size: np.ndarray) -> str | None:
     s, tau = w.smoothed, w.run.tau_cmd
     if not (np.abs(tau).max(axis=1) == 0.0).any():
         return None
-    always = replace(w.run, tau_cmd=np.ones_like(tau), u=None, five=None)
+    always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None, five=None)
     every = integrals(replace(s, track=replace(s.track, run=always)))
     idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
     if idle.sum() < LONG:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..model import Integrals, Model
 from ..model.correlation import correlated_windows
-from ..model.weak_form import OVERLAP
+from ..model.weak_form import OVERLAP, commanded_force
 from .readings import inertial, needed
 
 # Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the
@@ -81,7 +81,7 @@ def gains(w: Integrals, model: Model) -> Gains:
         w: windows of the run.
         model: its inertia and damping.
     """
-    a, z, T = inertial(w, model), needed(w, model), w.held @ w.run.tau_cmd
+    a, z, T = inertial(w, model), needed(w, model), w.held @ commanded_force(w, model)
     moves = T.std(axis=0) > SILENT * np.abs(T).max()
     psi = w.smoothed.eta[:, 2]
     u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)

@@ -31,6 +31,7 @@ from ..data.beside import Change
 from ..data.columns import POSE, TAU
 from ..data.unit_check import GO_ON
 from ..model import Integrals, Model
+from ..model.weak_form import commanded_force
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import Gains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
@@ -141,7 +142,7 @@ def _of_least_error(
         told = (then.told | ~given.told).all()
         if not (told and then.close) or beyond_thrusters(meant.run, model):
             continue
-        T = meant.held @ meant.run.tau_cmd
+        T = meant.held @ commanded_force(meant, model)
         off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
         found.append((float(np.median(np.nan_to_num(off, nan=np.inf))), reading))
     return min(found, key=lambda each: each[0])[1] if found else None
@@ -189,7 +190,7 @@ def likeliest_mistake(w: Integrals, model: Model) -> Mistake | None:
         w: windows of the run.
         model: whose inertia and hull tell which force a motion needs.
     """
-    commands = w.held @ w.run.tau_cmd
+    commands = w.held @ commanded_force(w, model)
     commands = commands - commands.mean(axis=0)
     size = (commands**2).sum(axis=0)
     heard = size > SILENT * size.max()

@@ -250,6 +250,13 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
     return thrust(w.run, model, between, nu)
 
 
+def commanded_force(w: Integrals, model: Model) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] of a run's commands at rest, as late as the model's thrusters follow."""
+    if not Response(w.run, model).slow:
+        return w.run.tau_cmd
+    return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
+
+
 def _between(w: Integrals, model: Model) -> np.ndarray:
     return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 

@@ -1,0 +1,89 @@
+"""A described ship through the diagnosis: its commands, its predictions, and what is hidden in its runs."""
+
+import numpy as np
+import pytest
+
+import diagnosis
+from benchmarks import ship_effects
+from benchmarks.ship_effects import Cause, causes, sail
+from cosim import InputError
+from diagnosis.data import read, read_frame
+from diagnosis.model import Model, ship_with
+
+
+@pytest.fixture(scope="module")
+def ship():
+    return ship_with((), "otter")
+
+
+@pytest.fixture(scope="module")
+def run(ship):
+    return sail(ship, Cause("", {}, {}), np.random.default_rng(5), None)
+
+
+def test_commands_are_read_by_actuator_and_unit(ship, run, tmp_path):
+    revolutions = run.rename(columns={"port.n": "port.n [rpm]", "starboard.n": "starboard.n [rad/s]"})
+    revolutions["port.n [rpm]"] *= 60.0
+    revolutions["starboard.n [rad/s]"] *= 2.0 * np.pi
+    run.to_csv(tmp_path / "run.csv", index=False)
+    from_file, from_table = read(tmp_path / "run.csv", of=ship), read_frame(revolutions, "run", ship)
+    assert from_file.signals == ("port.n", "starboard.n")
+    np.testing.assert_allclose(from_table.commands, from_file.commands, rtol=1e-12)
+    np.testing.assert_allclose(from_file.commands, run[["port.n", "starboard.n"]], rtol=1e-12)
+
+
+def test_force_of_the_commands_is_that_of_the_two_propellers(ship, run):
+    found = read_frame(run, "run", ship)
+    thrust = np.where(found.commands > 0.0, 0.43742, 0.25444) * found.commands * abs(found.commands)
+    port, starboard = thrust.T
+    np.testing.assert_allclose(found.tau_cmd[:, 0], port + starboard, atol=1e-9)
+    np.testing.assert_allclose(found.tau_cmd[:, 1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.tau_cmd[:, 2], 0.395 * (port - starboard), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ({"port.n": "prot.n"}, "no column 'port.n'; did you mean 'prot.n'"),
+        ({"port.n": "a", "starboard.n": "b"}, "no commands: port.n, starboard.n"),
+        ({"port.n": "port.n [kg]"}, "'kg' is no unit of port.n"),
+    ],
+)
+def test_a_wrong_column_is_told_in_one_line(ship, run, columns, told):
+    with pytest.raises(InputError, match=told.replace(".", r"\.")):
+        read_frame(run.rename(columns=columns), "run", ship)
+
+
+def test_force_columns_are_commands_too(ship, run):
+    """A run that tells forces is one of the commands that the ship's allocation gives for them."""
+    found = read_frame(run, "run", ship)
+    forces = run[["time", "x", "y", "psi"]].copy()
+    for k, name in enumerate(("tau_X", "tau_Y", "tau_N")):
+        forces[name] = found.tau_cmd[:, k]
+    (by_force,), (by_command,) = (diagnosis.load(t, ship="otter") for t in (forces, run))
+    a, b = (
+        diagnosis.evaluate([w], Model(ship=ship)).evaluations[0].before for w in (by_force, by_command)
+    )
+    np.testing.assert_allclose(a.omega, b.omega, atol=1e-6 * np.abs(found.tau_cmd).max())
+
+
+def test_the_exact_model_predicts_what_was_simulated(ship, monkeypatch):
+    """Simulation step by step and prediction of windows are two ways to the same motion."""
+    monkeypatch.setattr(ship_effects, "NOISE", (2e-4, 2e-4, 2e-4))
+    run = sail(ship, Cause("", {}, {}), np.random.default_rng(6), None)
+    (w,) = diagnosis.load(run, ship="otter")
+    (e,) = diagnosis.evaluate([w], Model(ship=ship)).evaluations
+    assert e.before.position < 5e-3  # of some 5 m
+
+
+@pytest.mark.slow
+def test_a_weak_port_propeller_is_named(ship):
+    rng = np.random.default_rng(3)
+    runs = [sail(ship, causes(ship)["loss"], rng, None) for _ in range(2)]
+    found = diagnosis.diagnose(runs[:1], runs[1:], prior=0.0, ship="otter").content
+    assert found.verdict == "found"
+    (effect,) = found.effects
+    assert effect.id == "loss_port"
+    assert "port propeller" in found.sentence
+    low, high = effect.coefficients["loss_port"].ci95
+    assert low < 0.15 < high
