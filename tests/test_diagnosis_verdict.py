@@ -1,6 +1,7 @@
 """What a diagnosis says of what it does not know: remainder, verdict, withdrawal, confidence."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,11 +25,23 @@ from diagnosis.model.ship_model import of_one_run
 from diagnosis.model.uncertainty import omega_std
 from diagnosis.model.weak_form import commanded
 from diagnosis.report import diagnosis_content
+from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
 from diagnosis.unseen import Losses, harm
 from diagnosis.withdrawal import Unseen, withdraw, without
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
+
+
+@pytest.mark.parametrize("possible", [False, True])
+@pytest.mark.parametrize("alone", [False, True])
+@pytest.mark.parametrize("said", VERDICTS)
+def test_heading_claims_no_more_than_the_findings(said, alone, possible):
+    """Unsure are one cause without rivals that is not believed, and possibilities where none is found."""
+    effects = [SimpleNamespace(indistinguishable=[] if alone else ["X_u"])]
+    content = SimpleNamespace(verdict=said, effects=effects, possibilities=["X_u"] if possible else [])
+    unsure = (said == "ambiguous" and alone) or (said == "unexplained" and possible)
+    assert verdict_title(content) == (UNSURE if unsure else VERDICTS[said])
 
 
 def left(runs, model=None):

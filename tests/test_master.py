@@ -1,8 +1,10 @@
 """The step loop: same numbers as plain Python, no spurious delay, faults, events, rates, failures."""
 
+import errno
 import gc
 import json
 import math
+import os
 from types import ModuleType
 
 import numpy as np
@@ -467,3 +469,20 @@ def test_pace_that_is_none_is_refused(factor, ellipse, tmp_path):
     with pytest.raises(cosim.InputError, match="positive factor"):
         cosim.simulate(cosim.load_scenario(ellipse), tmp_path / "out", realtime=factor)
     assert not (tmp_path / "out").exists()
+
+
+def test_log_does_not_write_into_a_file_that_took_its_place(tmp_path):
+    """An FMU may close whatever is open, and open a file of its own."""
+    writer = LogWriter(tmp_path / "log.csv", ["time", "a"])
+    rows = Rows(np.array([0.0]), np.array([[1.0]]), np.array([0], np.intp))
+    writer.write(rows)
+    other = os.open(tmp_path / "other", os.O_CREAT | os.O_WRONLY)
+    os.dup2(other, writer._file.fileno())
+    for _ in range(2):
+        with pytest.raises(OSError, match="closed by something else") as told:
+            writer.write(rows)
+        assert told.value.errno == errno.EBADF
+    assert writer.rows == 1
+    os.close(other)
+    assert (tmp_path / "other").read_bytes() == b""
+    assert (tmp_path / "log.csv").read_text().count("\n") == 2

@@ -26,6 +26,7 @@ from diagnosis.report import (
     Curve,
     DiagnosisContent,
     curves,
+    page,
     tracks,
     write_coefficients,
     write_report,
@@ -471,6 +472,23 @@ def test_pictures_of_a_run_name_their_lines(data):
     worst = tracks.worst_window(e, True)
     labels = {line.get_label() for line in worst.axes[0].get_lines()}
     assert {"measured", "before", "after"} <= labels
+
+
+@pytest.mark.parametrize(
+    ("after", "shown", "remark"),
+    [
+        ([0.01, 0.03], "50 → 22.4 mm", "training runs, 2.2× less"),
+        ([0.1, 0.0], "50 → 70.7 mm", "training runs, more than before"),
+        ([0.01, None], "50 mm", "training runs"),
+    ],
+)
+def test_errors_of_runs_are_told_as_their_root_mean_square(after, shown, remark):
+    changes = [
+        SimpleNamespace(before=b, after=a) for b, a in zip((0.01, 0.07), after, strict=True)
+    ]  # sqrt((1 + 49) / 2) = 5
+    (tile,) = page._tile("error", changes, 1e3, "mm", "training", learned=True)
+    assert tile == ("error", shown, remark)
+    assert not list(page._tile("error", [SimpleNamespace(before=None, after=None)], 1.0, "mm", "", True))
 
 
 def test_arrows_point_where_the_missing_force_does(data):

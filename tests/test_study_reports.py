@@ -683,6 +683,28 @@ def test_falls_are_told_beside_their_targets(tmp_path, monkeypatch):
     assert results["falls"]["b"]["axes"]["yaw"]["before_without_power"] == 3.0
 
 
+def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
+    def errors(position, heading):
+        return SimpleNamespace(position=position, heading=heading)
+
+    def fold(name, after, seen):
+        evaluation = SimpleNamespace(before=errors(0.1, 0.2), after=after)
+        return SimpleNamespace(name=name, evaluation=evaluation, seen=seen and SimpleNamespace(
+            before=errors(0.1, 0.2), after=seen
+        ))  # fmt: skip
+
+    report = Report(tmp_path, "t")
+    better, worse = errors(0.05, 0.1), errors(float("inf"), 0.4)
+    ship_tables.write_windows(report, [fold("a", better, better), fold("b", worse, None)])
+    text, _ = written(report.write(), tmp_path)
+    assert "| a | 100 | 50 | 50 | 11.5 | 5.73 | 5.73 |" in text
+    assert "| b | 100 | runs away | – | 11.5 | 22.9 | – |" in text
+    for quantity in ("position", "heading"):
+        assert f"The {quantity} is predicted worse than by the nominal model in b." in text
+    assert "In b the learned model runs away" in text
+    assert "Geometric mean of the heading's fall: 1.00× left out, 2.00× with the run" in text
+
+
 def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
     """What each table gets is checked against what it takes; their content is tested elsewhere."""
     run = SimpleNamespace(run=SimpleNamespace(name="a"))

@@ -259,7 +259,7 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     """
     scale = model.ship.scale
     still = np.zeros(len(motions))
-    s = vessel.State(still, still, still, *motions.T, still)
+    s = vessel.State._make([still, still, still, *motions.T, still])
     most = 0.0
     with np.errstate(all="ignore"):
         for _ in range(round(COASTING / COASTING_STEP)):

@@ -17,6 +17,7 @@ from fmus.effects import Memory
 from ..data.reading import ASIDE, Run, propellers
 from .ship_model import Model
 
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; longest step of the thrusters, as of the vessel: a force that lags is held over a step as in the
 # FMU, which is half a step earlier than a continuous lag.
 STEP = 0.02
@@ -134,7 +135,7 @@ class Response:
     @cached_property
     def _clock(self) -> np.ndarray:
         """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
-        gaps = np.minimum(np.diff(self.run.time), LONGEST_MEMORY)
+        gaps = np.minimum(np.diff(self.run.time), LONGEST_MEMORY * self.model.ship.scale.time)
         return np.concatenate([[0.0], np.cumsum(gaps)])
 
     def _elapsed(self, time: np.ndarray) -> np.ndarray:
@@ -164,7 +165,7 @@ class Response:
     @property
     def _step(self) -> float:
         """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
-        fine = self._period / np.ceil(self._period / STEP - 1e-6)
+        fine = self._period / np.ceil(self._period / (STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
             self._lasts(member, memory) / (memory.keeps - 1)
             for _, member, memory in self._memories
@@ -182,7 +183,9 @@ class Response:
         largest = np.abs(self._commands.values).max(axis=(0, 1), initial=0.0)
         rates = np.broadcast_to(drive.params.rate, largest.shape)
         memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
-        before, part = (int(np.ceil(min(x, LONGEST_MEMORY) / h)) + 1 for x in (memory, PART))
+        scale = self.model.ship.scale.time
+        longest = LONGEST_MEMORY * scale
+        before, part = (int(np.ceil(min(x, longest) / h)) + 1 for x in (memory, PART * scale))
         size = edges.size - 1
         parts = -(-size // part)
         # Column m holds the steps of part m, those before it that it remembers first.
