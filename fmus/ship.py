@@ -113,9 +113,13 @@ class Ship:
         return [e.id for e in self.effects.values() if e.needs <= self.devices]
 
 
-@cache
 def ship(effects: EffectSet = STANDARD, description: Description | None = None) -> Ship:
     """A ship that may have some effects: a described one, or CyberShip Enterprise 1."""
+    return _ship(effects, description)
+
+
+@cache
+def _ship(effects: EffectSet, description: Description | None) -> Ship:
     if description is None:
         return Ship(effects, make_vessel(effects), make_thrusters(effects))
     own = effects_of_ship(description, effects)

@@ -110,7 +110,7 @@ def test_two_propellers_with_the_same_commands_are_twice_the_one_that_stands_for
     run, nu = base(), true_nu()
     u = np.column_stack(allocate(*run.tau_cmd.T, Model().drive.params.allocation))
     u[:, 2] = 0.0
-    one = replace(run, u=u)
+    one = replace(run, commands=u)
     two = replace(run, five=np.column_stack([u[:, :2], u[:, :2], u[:, 2]]))
     if len(values) == 21:
         values = {n: 0.01 * k for k, n in enumerate(values)}

@@ -120,6 +120,7 @@ def nothing(evaluations):
             "bounded": True,
             "region": "|u| < 0.3 m/s",
             "mass_definite": True,
+            "closed_loop": True,
             "notes": [],
         },
         "prior": 0.1,

@@ -218,6 +218,7 @@ def test_report_has_all_that_was_learned(tmp_path, monkeypatch):
         bounded=True,
         region=None,
         mass_definite=True,
+        closed_loop=True,
         notes=(),
     )
     monkeypatch.setattr(session, "method", lambda _: SimpleNamespace(fit=lambda *_: learned))

@@ -42,9 +42,10 @@ if TYPE_CHECKING:
 NEEDED = ("pandas", "pyarrow", "scipy", "distributed")
 SUMMARY = "campaign.json"
 LOCK = ".campaign.lock"
-# Share of the time that writing the table may take while a campaign runs; chosen: it then lacks the runs
-# of the last half second, and none where a run takes longer.
+# Share of the time that writing the table of a larger campaign may take while it runs; chosen: it then
+# lacks the runs of the last half second, and none where a run takes longer.
 WRITING = 0.02
+SMALL = 100  # runs up to which the table lacks none
 # Receives the number of runs that have ended, failed ones among them, and of all runs.
 Progress = Callable[[int, int, int], None]
 
@@ -241,7 +242,7 @@ class _Work:
                 keep_log(self.folder, job.hash, row.log)
             self.journal.add(job.hash, row)
             self._count(row, self.waiting.pop(job.hash, 0))
-            if time.monotonic() >= self.due:
+            if len(self.journal.rows) <= SMALL or time.monotonic() >= self.due:
                 self._keep("running")
             progress(self.ended, self.failed, len(self.cases))
             if self._settled():

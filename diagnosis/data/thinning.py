@@ -44,7 +44,7 @@ def thinned(track: Track) -> Track:
     dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
     commands = {
         name: _mean(run.time, values, time)
-        for name in ("tau_cmd", "u", "five", "power")
+        for name in ("tau_cmd", "commands", "five", "power")
         if (values := getattr(run, name)) is not None
     }
     held = None if run.held is None else _by(part, run.held).mean().to_numpy()[:, 0] > 0.5
