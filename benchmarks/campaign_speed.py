@@ -3,12 +3,14 @@
 The ellipse with faults and metrics, over seeds: the same runs in a bare loop of one process (FMUs loaded
 once and reset), as a campaign in this process, on one worker and on two; and in bare loops of two
 processes at once, each with half of the runs, which tells what the second core of this machine is worth.
-Repeats are interleaved; wall time, and processor time of all processes. Then what a run costs beside its
+Repeats are interleaved; wall time, and processor time of all processes, when the first run of a campaign
+had ended, and how many runs a second the others made until the end. Then what a run costs beside its
 steps, and the memory of a process over many short runs.
 """
 
 import argparse
 import json
+import math
 import multiprocessing
 import os
 import platform
@@ -28,10 +30,11 @@ SHORT, WARM = 200, 20
 
 
 class Taken(NamedTuple):
-    """Time [s] that some runs took: by the clock, and of the processors."""
+    """Time [s] that some runs took: by the clock, of the processors, and until the first had ended."""
 
     wall: float
     processor: float
+    first: float
 
 
 def axes(scenario: Path, runs: int, first: int) -> dict[str, Any]:
@@ -55,19 +58,28 @@ def processor() -> float:
     return sum(used.ru_utime + used.ru_stime for used in found)
 
 
-def timed(work: Callable[[], object]) -> Taken:
+def timed(work: Callable[[], float | None]) -> Taken:
+    """Time of some work, which tells when its first run had ended, if it knows."""
     started, used = time.perf_counter(), processor()
-    work()
-    return Taken(time.perf_counter() - started, processor() - used)
+    first = work()
+    ended = time.perf_counter()
+    return Taken(ended - started, processor() - used, math.nan if first is None else first - started)
 
 
-def campaign(content: dict[str, Any], workers: int) -> None:
-    """The runs as a campaign."""
+def campaign(content: dict[str, Any], workers: int) -> float:
+    """The runs as a campaign; returns when the first had ended, of :func:`time.perf_counter`."""
     import cosim
 
+    seen: list[float] = []
+
+    def progress(ended: int, failed: int, of: int) -> None:
+        if ended and not seen:
+            seen.append(time.perf_counter())
+
     with tempfile.TemporaryDirectory(prefix="speed_") as folder:
-        made = cosim.run_campaign(content, folder, workers=workers)
+        made = cosim.run_campaign(content, folder, workers=workers, progress=progress)
     assert set(made["status"]) == {"done"}
+    return seen[0]
 
 
 def bare(content: dict[str, Any]) -> None:
@@ -133,11 +145,11 @@ def memory(folder: Path, native: bool, runs: int) -> list[float]:
 def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
     """Print what the runs take in each place."""
     path = ellipse(folder, native, options.stop)
-    cases: dict[str, Callable[[dict[str, Any]], None]] = {
+    cases: dict[str, Callable[[dict[str, Any]], float | None]] = {
         "bare loop": bare,
         "campaign, this process": lambda c: campaign(c, 0),
     }
-    others: dict[str, Callable[[dict[str, Any]], None]] = {
+    others: dict[str, Callable[[dict[str, Any]], float | None]] = {
         "bare loops, 2 processes": bare_twice,
         "campaign, 1 worker": lambda c: campaign(c, 1),
         "campaign, 2 workers": lambda c: campaign(c, 2),
@@ -152,10 +164,12 @@ def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
             taken[name].append(timed(lambda w=work, c=content: w(c)))
     kind = "native" if native else "Python"
     print(f"{kind} FMUs, {options.runs} runs of {options.stop:g} s; medians")
-    print(f"{'':28}{'wall s':>9}{'runs/s':>9}{'processor s':>13}{'a run, s':>10}")
+    head = f"{'':28}{'wall s':>9}{'runs/s':>9}{'processor s':>13}{'a run, s':>10}"
+    print(f"{head}{'first, s':>10}{'then/s':>9}")
     for name, each in taken.items():
-        wall, used = (statistics.median(column) for column in zip(*each, strict=True))
-        print(f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}")
+        wall, used, first = (statistics.median(column) for column in zip(*each, strict=True))
+        told = f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}"
+        print(f"{told}{first:10.2f}{(options.runs - 1) / (wall - first):9.3f}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,7 +2,7 @@
 
 Runs scenarios/ellipse.json with each controller that stores samples, then gives the controller's
 inputs to its plain function again and times the storage alone: the gate, the choice of a row, the sums.
-All times are processor time.
+All times are processor time, of FMUs in Python.
 """
 
 import argparse
@@ -24,7 +24,7 @@ SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
 def run(controller, stop, folder):
     """Result of the scenario with this controller up to a time [s], and how long it took [s]."""
     content = json.loads(SCENARIO.read_text())
-    content["stop"], content["metrics"] = stop, {}
+    content["stop"], content["metrics"], content["native"] = stop, {}, False
     content["fmus"]["controller"] = {"path": f"{controller}.fmu"}
     started = process_time()
     result = cosim.simulate(cosim.load_scenario(content), folder)

@@ -23,7 +23,9 @@ class DeclarationError(Exception):
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint at the known name most like a wrong one; empty if none is like it."""
-    found = difflib.get_close_matches(name, known, 1, 0.5)
+    known = list(known)
+    same = [k for k in known if k.casefold() == name.casefold()]
+    found = same or difflib.get_close_matches(name, known, 1, 0.5)
     return f"; did you mean '{found[0]}'?" if found else ""
 
 

@@ -114,7 +114,11 @@ class Ship:
 
 
 def ship(effects: EffectSet = STANDARD, description: Description | None = None) -> Ship:
-    """A ship that may have some effects: a described one, or CyberShip Enterprise 1."""
+    """A ship that may have some effects: a described one, or CyberShip Enterprise 1.
+
+    Raises:
+        DeclarationError: parts of the description have names of others, or of its effects.
+    """
     return _ship(effects, description)
 
 
@@ -123,11 +127,7 @@ def _ship(effects: EffectSet, description: Description | None) -> Ship:
     if description is None:
         return Ship(effects, make_vessel(effects), make_thrusters(effects))
     own = effects_of_ship(description, effects)
-    return Ship(
-        own,
-        make_vessel(own, description),
-        make_thrusters(own, description),
-        frozenset(),
-        description.scale,
-        description,
-    )
+    parts = make_vessel(own, description), make_thrusters(own, description)
+    for part in parts:
+        _ = part.variables  # refuses names that are there twice
+    return Ship(own, *parts, frozenset(), description.scale, description)

@@ -417,12 +417,11 @@ class TestPlots:
                 assert np.nanmin(values) == pytest.approx(true.min(), abs=0.02)
                 assert np.nanmax(values) == pytest.approx(true.max(), abs=0.02)
 
-    def test_a_target_as_long_as_the_picture_is_drawn_in_500_steps(self):
-        x, _ = track.once([(np.array([0.0, 3.0]), np.array([1.0, 1.0]))], 3.0)
+    def test_a_target_is_drawn_in_500_steps_for_each_width_of_the_picture(self):
+        x, _ = track.once([(np.array([0.0, 30.0]), np.array([1.0, 1.0]))], 3.0)
         known = x[np.isfinite(x)]
-        assert known.size == 500 + 2
-        assert np.ptp(known) == 3.0
-        assert np.diff(known) == pytest.approx(3.0 / 501, rel=1e-9)
+        assert np.ptp(known) == 30.0
+        assert np.diff(known) == pytest.approx(30.0 / 5001, rel=1e-9)
 
     def test_hull_is_alike_on_both_sides_and_as_long_and_wide_as_the_ship(self):
         (corners,) = track.hulls(np.zeros((1, 3)))

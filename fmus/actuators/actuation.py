@@ -136,25 +136,26 @@ def components(ship: Description) -> tuple[Component, ...]:
 def axes(ship: Description) -> tuple[int, ...]:
     """The axes of tau (0: X, 1: Y, 2: N) that a ship can be asked for.
 
-    Sway only where the actuators push in sway at two places, or two ways: else it comes with the turn.
+    An axis that comes with others, as sway does with the turn of a single rudder, is left out.
     """
     columns = [
         _column(c, c.actuator.part.number("x"), c.actuator.part.number("y")) for c in components(ship)
     ]
-    able = [k for k in range(3) if any(column[k] for column in columns)]
-    if len(able) == 3 and _independent(columns) < TINY:
-        able.remove(1)
-    return tuple(able)
+    found: list[int] = []
+    apart: list[list[float]] = []  # rows of the axes found, each without its part along those before
+    for k in (0, 2, 1):
+        row = rest = [float(column[k]) for column in columns]
+        for other in apart:
+            share = _dot(rest, other) / _dot(other, other)
+            rest = [x - share * y for x, y in zip(rest, other, strict=True)]
+        if _dot(rest, rest) > TINY * _dot(row, row):
+            found.append(k)
+            apart.append(rest)
+    return tuple(sorted(found))
 
 
-def _independent(columns: Sequence[Triple]) -> float:
-    """Determinant of B B' with rows of unit length: 0 where one axis follows from the others."""
-    sizes = [sum(column[k] ** 2 for column in columns) ** 0.5 for k in range(3)]
-    rows = [
-        [sum(b[i] * b[j] for b in columns) / (sizes[i] * sizes[j]) for j in range(3)] for i in range(3)
-    ]
-    (a, b, c), (_, e, f), (_, _, i) = rows
-    return a * (e * i - f * f) - b * (b * i - f * c) + c * (b * f - e * c)
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
 
 
 def _column(c: Component, x: Number, y: Number) -> Triple:

@@ -7,7 +7,9 @@ from ..ops import Number, atan2, clip, cos, fmax, fmin, power, sin, sqrt, where
 from .law import Command, Flow, Law, Span
 
 DIVISOR = Range(min=1e-6)
+ASTERN = Range(max=0.0)
 SMALL = 1e-12  # in place of zero, by which nothing can be divided
+QUARTER = 1.5707963267948966  # of a turn [rad]
 SHAFT_SPEED = Command("n", "1/s", "shaft speed")
 
 
@@ -23,7 +25,7 @@ class Bollard(NamedTuple):
     k_ahead: Annotated[float, "N.s2", "thrust ahead by n^2", DIVISOR] = 1.0
     k_astern: Annotated[float, "N.s2", "thrust astern by n^2", DIVISOR] = 1.0
     n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
-    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern"] = -1.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
 def bollard_thrust(n: Number, p: Any) -> Number:
@@ -74,7 +76,7 @@ class OpenWater(NamedTuple):
     astern: Annotated[float, "1", "thrust astern, as a share of that ahead", DIVISOR] = 1.0
     water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0
     n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
-    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern"] = -1.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
 class OpenWaterPropeller(Law):
@@ -115,7 +117,7 @@ class OpenWaterPropeller(Law):
         rest = p.K_T2 * advance * advance / (p.diameter * p.diameter) - wanted
         ahead = (-slope + sqrt(fmax(0.0, slope * slope - 4.0 * p.K_T0 * rest))) / (2.0 * p.K_T0)
         back = fmax(0.0, slope * slope - 4.0 * p.K_T0 * wanted / p.astern)
-        astern = (slope - sqrt(back)) / (2.0 * p.K_T0)
+        astern = (-slope - sqrt(back)) / (2.0 * p.K_T0)
         return (where(wanted < 0.0, fmin(0.0, astern), fmax(0.0, ahead)),)
 
 
@@ -154,8 +156,8 @@ class VoithSchneider(Law):
 
     name = "voith_schneider"
     commands = (
-        Command("x", "1", "command in surge, -1...1"),
-        Command("y", "1", "command in sway, -1...1"),
+        Command("surge", "1", "command in surge, -1...1"),
+        Command("sway", "1", "command in sway, -1...1"),
     )
     components = "XY"
     Parameters = Tunnel
@@ -166,8 +168,8 @@ class VoithSchneider(Law):
 
     @staticmethod
     def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
-        x, y = commands
-        return p.F * x, p.F * y
+        surge, sway = commands
+        return p.F * surge, p.F * sway
 
     @staticmethod
     def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
@@ -182,7 +184,7 @@ class Azimuth(NamedTuple):
     k_ahead: Annotated[float, "N.s2", "thrust by n^2", DIVISOR] = 1.0
     k_astern: Annotated[float, "N.s2", "thrust by n^2 where it turns backwards", DIVISOR] = 1.0
     n_max: Annotated[float, "1/s", "highest shaft speed", POSITIVE] = 1.0
-    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns backwards"] = 0.0
+    n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns backwards", ASTERN] = 0.0
     alpha_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 3.2
 
 
@@ -207,14 +209,19 @@ class AzimuthThruster(Law):
 
     @staticmethod
     def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
-        most = bollard_thrust(p.n_max, p)
-        return ((-most, most), (-most, most))
+        most, least = bollard_thrust(p.n_max, p), bollard_thrust(p.n_min, p)
+        aside = most * sin(fmin(p.alpha_max, QUARTER))
+        return ((where(p.alpha_max > QUARTER, -most, least), most), (-aside, aside))
 
     @staticmethod
     def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+        # One that cannot turn round runs backwards; beyond its angles it gives what it can of the force.
         X, Y = forces
-        most = bollard_thrust(p.n_max, p)
-        return atan2(Y, X), bollard_speed(fmin(sqrt(X * X + Y * Y), most), p)
+        way = where((p.alpha_max <= QUARTER) & (X < 0.0), -1.0, 1.0)
+        alpha = clip(atan2(way * Y, way * X), -p.alpha_max, p.alpha_max)
+        thrust = X * cos(alpha) + Y * sin(alpha)
+        most, least = bollard_thrust(p.n_max, p), bollard_thrust(p.n_min, p)
+        return alpha, bollard_speed(clip(thrust, least, most), p)
 
 
 class Foil(NamedTuple):
@@ -230,7 +237,8 @@ class Foil(NamedTuple):
 class Rudder(Law):
     """Rudder in a free flow: a normal force by the square of the flow (Yasukawa and Yoshimura 2015).
 
-    A positive angle of a rudder aft turns the ship to starboard.
+    A positive angle of a rudder aft turns a ship that goes ahead to starboard. What it is asked for is
+    the sway force of its angle; what drift adds is left to the ship, as the force on its hull is.
     """
 
     name = "rudder"
@@ -247,26 +255,29 @@ class Rudder(Law):
     def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (delta,) = commands
         u = (1.0 - p.wake) * flow.u
-        square = u * u + flow.v * flow.v
-        angle = delta - flow.v / where(abs(u) > SMALL, u, SMALL)
-        normal = 0.5 * p.water_density * p.area * p.lift * square * sin(clip(angle, -1.57, 1.57))
+        # U sin(delta - drift angle), which holds astern as well.
+        across = u * sin(delta) - flow.v * cos(delta)
+        speed = sqrt(u * u + flow.v * flow.v)
+        normal = 0.5 * p.water_density * p.area * p.lift * speed * across
         along = (1.0 - p.steering_deduction) * normal * sin(delta)
         return -along, -(1.0 + p.hull_force) * normal * cos(delta)
 
     @staticmethod
-    def _slope(flow: Flow, p: Any) -> Number:
-        """Sway force [N/rad] by the angle, near amidships and without drift."""
-        u = (1.0 - p.wake) * flow.u
-        return -(1.0 + p.hull_force) * 0.5 * p.water_density * p.area * p.lift * u * u
+    def _full(flow: Flow, p: Any) -> Number:
+        """Sway force [N] at an angle of 45 degrees, without drift."""
+        return Rudder.force((0.5 * QUARTER,), Flow(flow.u, 0.0), p)[1]
 
     @staticmethod
     def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
-        most = -Rudder._slope(flow, p) * p.delta_max
+        most = abs(Rudder._full(flow, p)) * sin(2.0 * fmin(p.delta_max, 0.5 * QUARTER))
         return ((-most, most),)
 
     @staticmethod
     def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
-        return (forces[0] / fmin(Rudder._slope(flow, p), -SMALL),)
+        # The force goes with sin(2 delta).
+        full = Rudder._full(flow, p)
+        sine = clip(forces[0] / where(abs(full) > SMALL, full, SMALL), -1.0, 1.0)
+        return (0.5 * atan2(sine, sqrt(1.0 - sine * sine)),)
 
 
 class Given(NamedTuple):

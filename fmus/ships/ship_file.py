@@ -1,26 +1,41 @@
 """Reads the description of a ship: a TOML file, checked as a whole before anything is made of it."""
 
 import json
-import math
+import keyword
+import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PositiveFloat,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from ..actuators import laws as laws  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
-from ..hull import Inertia, term
+from ..effects.thruster_dynamics import LONGEST
+from ..hull import Inertia, mass_matrix
 from ..hull_functions import FUNCTIONS
+from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
 NAME = r"^[a-z][a-z0-9_]*$"
+FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
+REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 
 
 class Strict(BaseModel):
@@ -57,11 +72,22 @@ class Number(Strict):
         return Value(name, self.value, self.origin, share)
 
 
-Given = Finite | Number
+def _form(given: Any) -> str:
+    return "table" if isinstance(given, (dict, Number)) else "number"
+
+
+Given = Annotated[
+    Annotated[Finite, Tag("number")] | Annotated[Number, Tag("table")], Discriminator(_form)
+]
 
 
 def _value(name: str, given: "float | Number") -> Value:
     return (given if isinstance(given, Number) else Number.model_validate({"value": given})).named(name)
+
+
+def _speed(factor: str) -> int:
+    """The place of a factor's speed among u, v and r."""
+    return "uvr".index(factor.strip("|"))
 
 
 class Term(Number):
@@ -73,21 +99,17 @@ class Term(Number):
     @property
     def name(self) -> str:
         """The name of the coefficient, absolute values first, as in Y_absr_v."""
-        rest = self.product.replace(" ", "")
-        sizes = sorted(rest[i + 1] for i in range(len(rest) - 2) if rest[i] == rest[i + 2] == "|")
-        for one in sizes:
-            rest = rest.replace(f"|{one}|", "", 1)
-        coefficient = f"{self.axis}_{''.join(f'abs{one}_' for one in sizes)}{''.join(sorted(rest))}"
-        return coefficient.removesuffix("_")
+        factors = FACTOR.findall(self.product)
+        sizes = [f"abs{x[1]}_" for x in sorted(factors, key=_speed) if len(x) == 3]
+        speeds = [x for x in sorted(factors, key=_speed) if len(x) == 1]
+        return "".join([f"{self.axis}_", *sizes, *speeds]).removesuffix("_")
 
     @model_validator(mode="after")
     def _is_product(self) -> "Term":
-        try:
-            term(self.name)
-        except ValueError:
+        if not self.product or FACTOR.sub("", self.product):
             raise ValueError(
                 f"'{self.product}' is no product of u, v, r, |u|, |v| and |r|, as |u|u or uv is"
-            ) from None
+            )
         return self
 
 
@@ -114,8 +136,8 @@ class ShipTable(Strict):
     name: Annotated[str, Field(pattern=NAME, max_length=40)]
     title: Annotated[str, Field(min_length=1, max_length=100)]
     source: str = ""
-    length: Annotated[float, Field(gt=0.01, lt=1000.0, description="L_pp [m]")]
-    beam: Annotated[float, Field(gt=0.001, lt=200.0, description="[m]")]
+    length: Annotated[Finite, Field(gt=0.01, lt=1000.0, description="L_pp [m]")]
+    beam: Annotated[Finite, Field(gt=0.001, lt=200.0, description="[m]")]
     outline: list[tuple[Finite, Finite]] = Field(
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
@@ -163,7 +185,7 @@ def read_ship(name: str | Path) -> Description:
     Raises:
         DeclarationError: no such ship, or the file is not as it should be.
     """
-    path = find_ship(name)
+    path = find_ship(name).resolve()
     return _read(path, path.stat().st_mtime_ns)
 
 
@@ -195,26 +217,24 @@ def _toml(path: Path) -> Any:
 
 
 def _told(error: ValidationError) -> str:
-    """The first fault of a file in a line, with the nearest right key."""
-    first = error.errors()[0]
-    place = ".".join(str(part)[:40] for part in first["loc"] if part not in ("Number", "float"))
-    hint = ""
-    if first["type"] == "extra_forbidden":
-        inside = first["loc"][:-1]
-        table: type[BaseModel] = ShipTable
-        if inside[:2] == ("hull", "terms"):
-            table = Term
-        elif inside[:1] == ("hull",):
-            table = HullTable
-        elif inside[:1] == ("inertia",):
-            table = Number
-        hint = nearest(str(first["loc"][-1]), table.model_fields)
-        return f"unknown key '{place}'{hint}"
-    return f"{place}: {first['msg'].removeprefix('Value error, ')}"
+    """A fault of a file in a line, with the nearest right key; keys that are not known come first."""
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    what, at = faults[0], faults[0]["loc"]
+    place = ".".join(str(part)[:40] for part in at if part not in ("number", "table"))
+    if what["type"] != "extra_forbidden":
+        return f"{place}: {what['msg'].removeprefix('Value error, ')}".removeprefix(": ")
+    table: type[BaseModel] = ShipTable
+    if at[-2:-1] == ("table",):
+        table = Number
+    elif at[:2] == ("hull", "terms"):
+        table = Term
+    elif at[0] == "hull":
+        table = HullTable
+    return f"unknown key '{place}'{nearest(str(at[-1]), table.model_fields)}"
 
 
 def _description(table: ShipTable) -> Description:
-    actuators = tuple(_actuator(a) for a in table.actuators)
+    actuators = tuple(_actuator(a, Scale(table.length / REFERENCE_LENGTH)) for a in table.actuators)
     _once([a.name for a in actuators], "actuators")
     terms = tuple(t.named(t.name) for t in table.hull.terms)
     _once([t.name for t in terms], "hull.terms")
@@ -225,12 +245,29 @@ def _description(table: ShipTable) -> Description:
         table.length,
         table.beam,
         tuple(table.outline) or _box(table.length, table.beam),
-        _values("inertia", table.inertia, variables(Inertia)),
+        _inertia(table.inertia),
         terms,
         tuple(_function(name, given) for name, given in table.hull.functions.items()),
         actuators,
         table.allocates,
     )
+
+
+def _inertia(given: Mapping[str, Any]) -> tuple[Value, ...]:
+    """Numbers of a ship's inertia.
+
+    Raises:
+        DeclarationError: one is missing, or the ship would gain energy by speeding up.
+    """
+    found = _values("inertia", given, variables(Inertia))
+    missing = [name for name in REQUIRED if name not in given]
+    if missing:
+        raise DeclarationError(f"inertia: {missing[0]} is missing")
+    numbers = dict.fromkeys(Inertia._fields, 0.0) | {v.name: v.value for v in found}
+    (surge, _, _), (_, sway, a), (_, b, yaw) = mass_matrix(Inertia(**numbers))
+    if min(surge, sway, yaw) <= 0.0 or sway * yaw <= 0.25 * (a + b) * (a + b):
+        raise DeclarationError("inertia: the mass matrix of these numbers is not positive definite")
+    return found
 
 
 def _once(names: list[str], where: str) -> None:
@@ -275,7 +312,7 @@ def _among(name: str, known: Mapping[str, Any]) -> str:
     return nearest(name, known) or f"; there are {', '.join(known)}"
 
 
-def _actuator(a: ActuatorTable) -> Part:
+def _actuator(a: ActuatorTable, scale: Scale) -> Part:
     where = f"actuator '{a.name}'"
     if a.law not in Law.known:
         raise DeclarationError(f"{where}: there is no law '{a.law}'{_among(a.law, Law.known)}")
@@ -288,9 +325,11 @@ def _actuator(a: ActuatorTable) -> Part:
         *variables(law.Parameters),
         Variable("x", "m", "place", 0.0),
         Variable("y", "m", "place", 0.0),
-        Variable("lag", "s", "first-order lag", 0.0, Range(0.0)),
+        Variable("lag", "s", "first-order lag", 0.0, scale.limits("s", LONGEST)),
         *rates,
     )
+    if keyword.iskeyword(a.name):
+        raise DeclarationError(f"{where}: a word of Python's own is no name")
     numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
     return Part(a.name, a.law, a.title or a.name.replace("_", " "), _values(where, numbers, declared))
 
@@ -301,10 +340,8 @@ def _checked(where: str, name: str, given: Any) -> "float | Number":
     Raises:
         DeclarationError: it is no number, nor a table with one.
     """
-    if isinstance(given, (int, float)) and not isinstance(given, bool) and math.isfinite(given):
-        return float(given)
     try:
-        return Number.model_validate(given)
+        return TypeAdapter(Given).validate_python(given)
     except ValidationError as error:
         raise DeclarationError(f"{where}: {name}: {_told(error)}") from None
 

@@ -1,0 +1,202 @@
+"""Files that describe ships: what is wrong with one is told in one line, and never ends in a traceback."""
+
+import re
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.command import command
+from support.project import ROOT
+
+from fmus.build.__main__ import main
+from fmus.declare import DeclarationError
+from fmus.ship import ship
+from fmus.ships.ship_file import Term, read_ship, shipped_ships
+
+RIGHT = """
+name = "raft"
+title = "the raft"
+length = 2.0
+beam = 1.0
+
+[inertia]
+m = { value = 50.0, origin = "weighed", std = 0.5 }
+I_z = 20.0
+X_udot = -5.0
+
+[hull]
+terms = [{ axis = "X", product = "u", value = -10.0, share = 0.2 }]
+
+[hull.functions.cross_flow]
+cross_flow_length = 2.0
+
+[[actuators]]
+name = "port"
+law = "fixed_propeller"
+y = -0.4
+n_max = 10.0
+
+[[actuators]]
+name = "starboard"
+law = "fixed_propeller"
+y = 0.4
+n_max = 10.0
+"""
+
+
+def written(folder: Path, text: str | bytes) -> Path:
+    path = folder / "raft.toml"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+def test_the_right_file_is_read(tmp_path: Path) -> None:
+    raft = read_ship(written(tmp_path, RIGHT))
+    assert [a.name for a in raft.actuators] == ["port", "starboard"]
+    m, I_z, _ = raft.inertia
+    assert (m.origin, m.share) == ("weighed", 0.01)
+    assert (I_z.origin, I_z.share) == ("guessed", 0.5)
+    assert ship(description=raft).vessel.params().inertia.Y_vdot == 0.0  # not that of another ship
+
+
+# What is changed in the file -> what the message says, the right key among it.
+CHANGES = [
+    ("beam = 1.0", "baem = 1.0", "unknown key 'baem'; did you mean 'beam'?"),
+    ("length = 2.0", "", "length: Field required"),
+    ("length = 2.0", "lenght = 2.0", "unknown key 'lenght'; did you mean 'length'?"),
+    ("length = 2.0", "length = 0.0", "length: Input should be greater than"),
+    ("length = 2.0", "length = nan", "length: "),
+    ("length = 2.0", "length = inf", "length: "),
+    ("length = 2.0", 'length = "2 m"', "length: Input should be a valid number"),
+    ("beam = 1.0", "beam = true", "beam: Input should be a valid number"),
+    ('"raft"', '"../raft"', "name: "),
+    ("I_z = 20.0", "", "inertia: I_z is missing"),
+    ("m = { value = 50.0", "M = { value = 50.0", "inertia: unknown key 'M'; did you mean 'm'?"),
+    ("X_udot = -5.0", "X_udto = -5.0", "inertia: unknown key 'X_udto'; did you mean 'X_udot'?"),
+    ("value = 50.0", "vlaue = 50.0", "unknown key 'inertia.m.vlaue'; did you mean 'value'?"),
+    ("value = 50.0", "value = -50.0", "inertia: m = -50 kg is out of its range"),
+    ("value = 50.0", "value = nan", "inertia.m.value: Input should be a finite number"),
+    ("std = 0.5", "std = 0.5, share = 0.1", "inertia.m: a number has std or share, not both"),
+    ("std = 0.5", "std = -0.5", "inertia.m.std: Input should be greater than 0"),
+    ("X_udot = -5.0", "X_udot = 60.0", "mass matrix of these numbers is not positive definite"),
+    ("X_udot = -5.0", "x_g = 2.0", "mass matrix of these numbers is not positive definite"),
+    ('product = "u"', 'product = "u^2"', "'u^2' is no product of u, v, r, |u|, |v| and |r|"),
+    ('product = "u"', 'product = "|u"', "'|u' is no product"),
+    ('product = "u"', 'product = ""', "'' is no product"),
+    ('axis = "X"', 'axis = "Z"', "hull.terms.0.axis: "),
+    ('axis = "X"', 'axes = "X"', "unknown key 'hull.terms.0.axes'; did you mean 'axis'?"),
+    ("share = 0.2 }", 'share = 0.2 }, { axis = "X", product = "u", value = 1.0 }', "X_u stands there twice"),
+    ("terms =", "termes =", "unknown key 'hull.termes'; did you mean 'terms'?"),
+    ("cross_flow]", "crossflow]", "there is no 'crossflow'; did you mean 'cross_flow'?"),
+    ("cross_flow_length", "cross_length", "unknown key 'cross_length'; did you mean 'cross_flow_length'?"),
+    ('law = "fixed_propeller"', 'law = "propeler"', "no law 'propeler'; did you mean 'fixed_propeller'?"),
+    ('law = "fixed_propeller"', "", "actuators.0.law: Field required"),
+    ('name = "starboard"', 'name = "port"', "actuators: port stands there twice"),
+    ('name = "port"', 'name = "for"', "actuator 'for': a word of Python's own is no name"),
+    ("n_max = 10.0", "n_mx = 10.0", "actuator 'port': unknown key 'n_mx'; did you mean 'n_max'?"),
+    ("n_max = 10.0", "n_max = -10.0", "n_max = -10 1/s is out of its range"),
+    ("n_max = 10.0", "n_min = 10.0", "n_min = 10 1/s is out of its range"),
+    ("n_max = 10.0", "n_max = nan", "actuator 'port': n_max: Input should be a finite number"),
+    ("n_max = 10.0", "n_max = [1]", "actuator 'port': n_max: Input should be a valid number"),
+    ("n_max = 10.0", "n_max = {vlue = 1.0}", "n_max: unknown key 'vlue'; did you mean 'value'?"),
+    ("n_max = 10.0", "lag = 1e6", "lag = 1e+06 s is out of its range"),
+    # Names of variables that would be there twice.
+    ('name = "port"', 'name = "surge"', "there is an effect 'loss_surge' already"),
+    ('name = "port"', 'name = "plant_starboard"', "thrusters declares plant_starboard_"),
+    ('name = "port"\nlaw = "fixed_propeller"', 'name = "tau"\nlaw = "given_force"', "tau_X"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "says"), CHANGES)
+def test_one_line_says_what_is_wrong(old: str, new: str, says: str, tmp_path: Path) -> None:
+    assert old in RIGHT
+    text = RIGHT.replace(old, new, 1)
+    if "given_force" in new:
+        text = text.replace("n_max = 10.0", "", 1)
+    done = command(main, "vessel", "--ship", written(tmp_path, text))
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "name",
+        "[" * 5000,
+        "a = " + "[" * 3000,
+        b"\x00\xff\xfe",
+        b"\x89PNG\r\n\x1a\n",
+        "x = 1\n" * 200_000,
+        "[[inertia]]",
+        "actuators = 3",
+        'actuators = ["port"]',
+        "hull = 1",
+        "m = 1979-05-27",
+    ],
+    ids=lambda text: repr(text[:12]),
+)
+def test_what_is_no_description_is_told_in_one_line(text: str | bytes, tmp_path: Path) -> None:
+    done = command(main, "vessel", "--ship", written(tmp_path, text))
+    assert done.returncode == 2
+    assert re.fullmatch(r"error: .*raft\.toml.*\n", done.stderr)
+    assert len(done.stderr) < 400
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("oter", "no ship 'oter'; did you mean 'otter'?"),
+        ("../ships/otter", "no ship '../ships/otter'"),
+        ("nowhere.toml", "no such description of a ship: 'nowhere.toml'"),
+        ("", "no ship ''"),
+    ],
+)
+def test_a_ship_that_is_not_there_is_told(name: str, says: str) -> None:
+    done = command(main, "vessel", "--ship", name)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_a_file_that_is_cut_or_garbled_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
+    whole = (ROOT / "ships" / "otter.toml").read_bytes()
+    at = data.draw(st.integers(0, len(whole)))
+    kept = data.draw(st.sampled_from([at, at + 1, at + 7]))
+    garbled = whole[:at] + data.draw(st.binary(max_size=3)) + whole[kept:]
+    with suppress(DeclarationError):
+        read_ship(written(tmp_path, garbled))
+
+
+@pytest.mark.parametrize(
+    ("product", "name"),
+    [
+        ("u", "X_u"),
+        ("|u|u", "X_absu_u"),
+        ("u|u|", "X_absu_u"),
+        ("uuu", "X_uuu"),
+        ("rv", "X_vr"),
+        ("v|r|", "X_absr_v"),
+        ("|r||u|v", "X_absu_absr_v"),
+        ("|u|v|r|", "X_absu_absr_v"),
+        ("|v|", "X_absv"),
+    ],
+)
+def test_a_product_has_one_name_however_it_is_written(product: str, name: str) -> None:
+    assert Term(axis="X", product=product, value=1.0).name == name
+
+
+@pytest.mark.parametrize("name", shipped_ships())
+def test_shipped_ships_say_where_their_numbers_come_from(name: str) -> None:
+    found = read_ship(name)
+    assert found.source
+    parts = [v for part in (*found.functions, *found.actuators) for v in part.values]
+    limits = ("n_max", "n_min", "delta_max", "alpha_max")
+    for v in (*found.inertia, *found.terms, *parts):
+        assert v.value == 0.0 or v.name in limits or v.origin != "guessed", v.name
