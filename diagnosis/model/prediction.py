@@ -24,6 +24,7 @@ from .thrust import Response, commanded_shares, places
 # measurement
 LONGEST_STEP = 0.02
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
+HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 UNSURE = 3.0  # standard deviations of a speed within which it may be none
 CLOSE = 1e-12  # m and rad, to which a true pose is found
 INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
@@ -88,9 +89,11 @@ class Starts:
 
 
 def at_rest(smoothed: Smoothed) -> bool:
-    """Whether a ship hardly moves at the start of a run, or as little as cannot be told from rest."""
+    """Whether a ship hardly moves at the start of a run, for its noise and its usual speeds."""
     first = np.isfinite(smoothed.nu[:, 0]).argmax()
+    usual = np.sqrt(np.nanmean(smoothed.nu**2, axis=0))
     still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
+    still = np.maximum(still, HARDLY * usual)
     return bool((np.abs(smoothed.nu[first]) < still).all())
 
 

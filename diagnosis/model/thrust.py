@@ -56,18 +56,20 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     Args:
         run: its time and power.
         model: whose thrusters act.
-        between: (2 or 1, sets, k, n), what becomes of the commands, :attr:`Response.between_samples`.
+        between: (1 to 3, sets, k, n), what becomes of the commands, :attr:`Response.between_samples`.
         nu: (n, 3), body-fixed velocity.
     """
     layout = model.drive.effects.layout
     power = None if run.power is None else run.power.T
     total = np.zeros((3, run.time.size))
-    for aside, given, acting in zip(places(run), between[0], between[-1], strict=True):
+    points = between[1:] if len(between) > 1 else between
+    for j, (aside, given) in enumerate(zip(places(run), between[0], strict=True)):
         drive = layout.placed(model.drive, aside, power)
         now = layout.running(run.time, *nu.T, tuple(given), drive)
-        force = layout.act(tuple(acting), now, drive)
-        for axis in range(3):
-            total[axis] += force[axis]
+        for acting in points:
+            force = layout.act(tuple(acting[j]), now, drive)
+            for axis in range(3):
+                total[axis] += force[axis] / len(points)
     return total.T
 
 
@@ -105,13 +107,19 @@ class Response:
     def between_samples(self) -> np.ndarray:
         """Means (2, sets, k, n) from each sample to the next: commands that arrive, shares that act.
 
-        Where these are the same there is one of them.
+        Where these are the same there is one of them. Where forces are not in proportion to what acts,
+        and that changes from sample to sample, it is told at the two points of Gauss' rule.
         """
         if not self.slow and self.model.clock == 0.0:
             means = np.array([commanded_shares(self.run, self.model)])
         else:
             ends = np.append(self.run.time, self.run.time[-1] + self._period)
             means = np.array(self.mean(ends[:-1], ends[1:]))
+            if self.slow and self.model.drive.effects.layout.curved:
+                middle = 0.5 * (ends[:-1] + ends[1:])
+                halves = (self.mean(a, b)[1] for a, b in ((ends[:-1], middle), (middle, ends[1:])))
+                off = np.subtract(*halves) / np.sqrt(3.0)
+                means = np.array([means[0], means[1] + off, means[1] - off])
         lasting = means[:1] if (means[0] == means[-1]).all() else means
         return np.ascontiguousarray(np.moveaxis(lasting, 1, -1))
 

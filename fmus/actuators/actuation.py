@@ -284,4 +284,5 @@ def layout(ship: Description) -> Layout:
         believed=lambda c, p: total(forces(ship, c, at_rest, p.allocation)),
         allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
         full=lambda p: largest(ship, p.allocation),
+        curved=True,
     )

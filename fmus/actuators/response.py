@@ -28,6 +28,7 @@ class Layout(NamedTuple):
         full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
         placed: ``placed(b, aside, power)``: the thrusters where they are one of two sets, ``aside`` [m]
             to starboard, at a power of the run or None. Only a ship with two sets has it.
+        curved: whether forces are not in proportion to what acts.
     """
 
     commands: tuple[str, ...]
@@ -37,6 +38,7 @@ class Layout(NamedTuple):
     allocate: Callable[[Triple, Any], tuple[Any, ...]]
     full: Callable[[Any], Triple]
     placed: Callable[[Any, Any, Any], Any] = lambda b, aside, power: b
+    curved: bool = False
 
 
 class ThrusterEffects(NamedTuple):
