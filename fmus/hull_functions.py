@@ -13,7 +13,7 @@ from .ops import Number
 
 FUNCTIONS: dict[str, Callable[..., tuple[Any, Any, Any]]] = {}
 
-STRIPS = 10  # of a hull's length; the force of a turn on the spot is within 1 % of the integral
+STRIPS = 10  # of a hull's length; the moment of a turn on the spot is within 2 % of the integral
 
 
 def hull_function(function: Callable[..., tuple[Any, Any, Any]]) -> Callable[..., tuple[Any, Any, Any]]:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from support.cases import slow
 from support.project import COMPONENTS
+from support.ships import PARTS
+from support.ships import component as part_of_ship
 
 from fmus import ops
 from fmus.base_units import base_exponents
@@ -25,12 +27,17 @@ from fmus.fmi.trace import (
     variable,
 )
 
-every_component = pytest.mark.parametrize("name", COMPONENTS)
+every_component = pytest.mark.parametrize("name", [*COMPONENTS, *PARTS])
 # The two of them that take longest; controller_cl_svd_z2 and controller_cl_win_eps are like them.
 LONGEST = ("controller_cl_svd_eps", "controller_cl_win_eps_all")
 every_component_longest_slow = pytest.mark.parametrize(
-    "name", [slow(n) if n in LONGEST else n for n in COMPONENTS]
+    "name", [slow(n) if n in LONGEST else n for n in (*COMPONENTS, *PARTS)]
 )
+
+
+def component_of(name):
+    """A component of the project, or a part of a described ship."""
+    return COMPONENTS[name] if name in COMPONENTS else part_of_ship(name)
 
 
 def arguments(component, rng, spread=0.5):
@@ -62,7 +69,7 @@ def directly(component, params, inputs, state, h):
 @every_component_longest_slow
 def test_traced_component_computes_what_the_plain_one_does(name):
     """Also proves the style rules: what cannot be traced raises TraceError."""
-    component = COMPONENTS[name]
+    component = component_of(name)
     trace = trace_step(component)
     rng = random.Random(name)
     for _ in range(20):
@@ -73,7 +80,7 @@ def test_traced_component_computes_what_the_plain_one_does(name):
 
 @every_component
 def test_traced_initial_state_is_the_plain_one(name):
-    component = COMPONENTS[name]
+    component = component_of(name)
     trace = trace_init(component)
     params, inputs, _ = arguments(component, random.Random(1))
     state = component.init(packer(component.inputs)(inputs), packer(component.params)(params))
@@ -82,7 +89,7 @@ def test_traced_initial_state_is_the_plain_one(name):
 
 @every_component
 def test_batch_of_arrays_gives_what_single_runs_give(name):
-    component = COMPONENTS[name]
+    component = component_of(name)
     rng = random.Random(name)
     single = [arguments(component, rng) for _ in range(7)]
     template = single[0][2]
@@ -98,7 +105,7 @@ def test_batch_of_arrays_gives_what_single_runs_give(name):
 @every_component
 def test_no_step_changes_nothing(name):
     """A step of h = 0 gives the outputs of the present state and keeps it."""
-    component = COMPONENTS[name]
+    component = component_of(name)
     params, inputs, _ = arguments(component, random.Random(2))
     p, i = packer(component.params)(params), packer(component.inputs)(inputs)
     state = component.init(i, p)
@@ -109,7 +116,7 @@ def test_no_step_changes_nothing(name):
 
 @every_component
 def test_everything_is_declared(name):
-    component = COMPONENTS[name]
+    component = component_of(name)
     for v in component.variables:
         assert v.description, v.name
         base_exponents(v.unit)
@@ -123,7 +130,7 @@ def test_everything_is_declared(name):
 @every_component_longest_slow
 def test_dependencies_hold_against_perturbation(name):
     """An input moves an output within one step if and only if it is declared to."""
-    component = COMPONENTS[name]
+    component = component_of(name)
     declared = output_dependencies(component)
     rng = random.Random(name)
     # A plant's state answers through the integral, which a vanishing step takes away.
@@ -145,7 +152,7 @@ def test_dependencies_hold_against_perturbation(name):
 
 @every_component
 def test_initial_dependencies_hold_against_perturbation(name):
-    component = COMPONENTS[name]
+    component = component_of(name)
     declared = initial_dependencies(component)
     rng = random.Random(name)
 

@@ -10,6 +10,8 @@ from support.cases import slow
 from support.ccode import same_bits
 from support.command import command
 from support.project import COMPONENTS, ROOT
+from support.ships import PARTS
+from support.ships import component as part_of_ship
 
 from fmus.build.__main__ import main
 from fmus.declare import Component, flatten, packer, variables, vector
@@ -61,10 +63,10 @@ def agree(expected, got):
 
 
 @compiled
-@pytest.mark.parametrize("name", [slow(n) if n in LARGE else n for n in COMPONENTS])
+@pytest.mark.parametrize("name", [*[slow(n) if n in LARGE else n for n in COMPONENTS], *PARTS])
 def test_c_gives_the_same_bits(name, tmp_path):
     """Over runs of 15 steps from random parameters: extreme ones, and inputs that are NaN or infinite."""
-    component = COMPONENTS[name]
+    component = COMPONENTS[name] if name in COMPONENTS else part_of_ship(name)
     run = ccode.Compiled(component, tmp_path)
     rng = random.Random(name)
     pack = packer(component.inputs)

@@ -15,6 +15,7 @@ from .response import Layout, Prepared
 
 PASSES = 2  # of the allocation: what the first one clips is asked of the others
 TINY = 1e-9  # share by which a matrix that has no inverse gets one
+NOTHING = 1e-30  # N2, in place of zero where no actuator can push
 
 
 @cache
@@ -220,7 +221,7 @@ def _least(columns: Sequence[Sequence[Any]], weights: Sequence[Any], wanted: Seq
         [sum_of([w * b[i] * b[j] for w, b in zip(weights, columns, strict=True)]) for j in n] for i in n
     ]
     rows = [
-        [x * (1.0 + TINY) + TINY if i == j else x for j, x in enumerate(row)]
+        [x * (1.0 + TINY) + NOTHING if i == j else x for j, x in enumerate(row)]
         for i, row in enumerate(rows)
     ]
     right = list(wanted)

@@ -255,8 +255,8 @@ class Rudder(Law):
     def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (delta,) = commands
         u = (1.0 - p.wake) * flow.u
-        # U sin(delta - drift angle), which holds astern as well.
-        across = u * sin(delta) - flow.v * cos(delta)
+        # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
+        across = u * sin(delta) + flow.v * cos(delta)
         speed = sqrt(u * u + flow.v * flow.v)
         normal = 0.5 * p.water_density * p.area * p.lift * speed * across
         along = (1.0 - p.steering_deduction) * normal * sin(delta)

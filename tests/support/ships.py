@@ -1,0 +1,59 @@
+"""Described ships as tests need them."""
+
+from collections.abc import Mapping
+
+from fmus.actuators.actuation import actuators, parameters
+from fmus.declare import Component
+from fmus.ship import ship
+from fmus.ship_description import Description, Part, Value
+from fmus.ships.ship_file import find_ship, read_ship, shipped_ships
+
+
+def part(name: str, law: str, values: Mapping[str, float]) -> Part:
+    """An actuator, or a function of a hull, with some numbers."""
+    return Part(name, law, name, tuple(Value(key, x, "guessed", 0.5) for key, x in values.items()))
+
+
+def described(
+    *parts: Part, terms: Mapping[str, float] | None = None, functions: tuple[Part, ...] = ()
+) -> Description:
+    """A ship of 2 m with these actuators and damping coefficients."""
+    inertia = {"m": 50.0, "I_z": 20.0, "X_udot": -5.0, "Y_vdot": -30.0, "N_rdot": -10.0}
+    values = tuple(Value(name, x, "guessed", 0.5) for name, x in inertia.items())
+    drag = terms or {"X_u": -20.0, "Y_v": -80.0, "N_r": -30.0}
+    found = tuple(Value(name, x, "guessed", 0.5) for name, x in drag.items())
+    outline = ((1.0, 0.5), (-1.0, 0.5), (-1.0, -0.5))
+    return Description("tried", "a ship", "", 2.0, 1.0, outline, values, found, functions, parts)
+
+
+def believed(ship: Description) -> tuple:
+    """What the allocation believes of a ship's actuators."""
+    return tuple(parameters(a, "", False)() for a in actuators(ship))
+
+
+PROPELLER = {"k_ahead": 0.5, "k_astern": 0.3, "n_max": 10.0, "n_min": -9.0}
+OPEN_WATER = {
+    "diameter": 0.2, "K_T0": 0.4, "K_T1": -0.3, "K_T2": -0.1, "wake": 0.2, "thrust_deduction": 0.1,
+    "astern": 0.7, "n_max": 12.0, "n_min": -8.0,
+}  # fmt: skip
+AZIMUTH = {"k_ahead": 0.5, "k_astern": 0.3, "n_max": 10.0}
+# Every law, in one ship.
+EVERY_LAW = described(
+    part("port", "fixed_propeller", {**PROPELLER, "x": -1.0, "y": -0.4}),
+    part("starboard", "open_water_propeller", {**OPEN_WATER, "x": -1.0, "y": 0.4, "n_rate": 5.0}),
+    part("rudder", "rudder", {"x": -1.1, "area": 0.02, "hull_force": 0.2, "lag": 0.5}),
+    part("pod", "azimuth", {**AZIMUTH, "x": -0.8}),
+    part("bow", "tunnel_thruster", {"x": 0.8, "F": 6.0}),
+    part("vsp", "voith_schneider", {"x": 0.2, "F": 9.0}),
+    part("tug", "given_force", {"F_X": 5.0, "F_Y": 7.0, "x": 0.9}),
+    terms={"X_absu_u": -20.0, "Y_absu_v": -80.0, "N_uuv": -3.0, "N_r": -30.0, "Y_vvr": -1.0},
+    functions=(part("cross_flow", "cross_flow", {"cross_flow_length": 2.0}),),
+)
+SHIPS = {name: read_ship(find_ship(name)) for name in shipped_ships()} | {"every_law": EVERY_LAW}
+PARTS = [f"{name} {part}" for name in SHIPS for part in ("vessel", "thrusters")]
+
+
+def component(name: str) -> Component:
+    """One of :data:`PARTS`, such as ``otter vessel``."""
+    of, which = name.split()
+    return getattr(ship(description=SHIPS[of]), which)

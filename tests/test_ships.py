@@ -1,0 +1,651 @@
+"""Described ships: the physics of their hulls and actuators, and the publications that they are from."""
+
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from support.ships import (
+    AZIMUTH,
+    EVERY_LAW,
+    OPEN_WATER,
+    PROPELLER,
+    SHIPS,
+    believed,
+    described,
+    part,
+)
+
+from fmus import hull_functions
+from fmus.actuators.actuation import actuators, allocate, axes, forces, total
+from fmus.actuators.failings import Working, failings
+from fmus.actuators.law import Flow, Law
+from fmus.declare import group_of, variables
+from fmus.hull import (
+    Damping,
+    HullFunctions,
+    Inertia,
+    coriolis_force,
+    damping_force,
+    described_damping_force,
+    mass_matrix,
+    term_variable,
+)
+from fmus.hull_functions import cross_flow
+from fmus.ship import ship
+from fmus.ship_description import Value
+from fmus.ships.ship_file import Term
+from fmus.signals import Force, Velocity
+from fmus.thrusters.allocation import Allocation, thrust
+from fmus.thrusters.allocation import allocate as allocate_three
+
+speed = st.floats(-2.0, 2.0)
+share = st.floats(0.0, 1.0)
+every_ship = pytest.mark.parametrize("name", SHIPS)
+REST = (0.0, 0.0, 0.0)
+
+
+def params(name):
+    return ship(description=SHIPS[name]).vessel.params()
+
+
+# Hull
+
+
+@given(speed, speed, speed)
+def test_terms_give_the_forces_of_the_groups_of_table_2_1(u, v, r):
+    declared = variables(Damping)
+    terms = group_of("Terms", [term_variable(v.name) for v in declared])
+    found = described_damping_force(u, v, r, terms(*[v.start for v in declared]), HullFunctions())
+    assert found == pytest.approx(damping_force(u, v, r, Damping()), rel=1e-12, abs=1e-12)
+
+
+PRODUCTS = {
+    "u": lambda u, v, r: u,
+    "uv": lambda u, v, r: u * v,
+    "vr": lambda u, v, r: v * r,
+    "uuu": lambda u, v, r: u**3,
+    "|r|r": lambda u, v, r: abs(r) * r,
+    "r|v|": lambda u, v, r: abs(v) * r,
+    "|u||v|": lambda u, v, r: abs(u * v),
+    "uur": lambda u, v, r: u * u * r,
+}
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("product", PRODUCTS)
+@given(speed, speed, speed)
+def test_a_term_is_the_product_of_its_name(product, axis, u, v, r):
+    name = Term(axis="XYN"[axis], product=product, value=1.0).name
+    terms = group_of("Terms", [term_variable(name)])
+    found = described_damping_force(u, v, r, terms(2.5), HullFunctions())
+    expected = [0.0, 0.0, 0.0]
+    expected[axis] = 2.5 * PRODUCTS[product](u, v, r)
+    assert found == pytest.approx(tuple(expected), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("X_u", "N.s/m"), ("Y_absv_r", "N.s2/(m.rad)"), ("N_absr_r", "N.m.s2/rad2"), ("X_uuv", "N.s3/m3")],
+)
+def test_a_term_has_the_unit_of_a_force_over_its_product(name, unit):
+    assert term_variable(name).unit == unit
+
+
+@every_ship
+@given(speed, speed, speed)
+def test_port_and_starboard_are_alike(name, u, v, r):
+    c = params(name).damping
+    X, Y, N = damping_force(u, v, r, c)
+    assert damping_force(u, -v, -r, c) == pytest.approx((X, -Y, -N), rel=1e-12, abs=1e-12)
+
+
+@every_ship
+@given(speed, speed, speed)
+def test_inertia_neither_works_nor_vanishes(name, u, v, r):
+    p = params(name).inertia
+    X, Y, N = coriolis_force(u, v, r, p)
+    size = abs(X * u) + abs(Y * v) + abs(N * r)
+    assert X * u + Y * v + N * r == pytest.approx(0.0, abs=1e-12 * (1.0 + size))
+    M = np.array(mass_matrix(p))
+    assert np.array_equal(M, M.T)
+    assert np.linalg.eigvalsh(M).min() > 0.0
+
+
+def by_integral(v, r, length=2.0, draft=0.3, drag=0.9, density=1000.0):
+    """Force and moment of the cross-flow [N, N m] by adaptive quadrature."""
+    ends = [-0.5 * length, *([-v / r] if r and abs(v / r) < 0.5 * length else []), 0.5 * length]
+
+    def of(power):
+        pieces = [
+            quad(lambda x: x**power * abs(v + x * r) * (v + x * r), a, b)[0] for a, b in pairwise(ends)
+        ]
+        return -0.5 * density * drag * draft * sum(pieces)
+
+    return of(0), of(1)
+
+
+@pytest.mark.parametrize(("v", "r"), [(0.4, 0.0), (0.0, 0.3), (0.1, 0.4), (0.5, -0.2), (-0.2, 1.0)])
+def test_strips_of_the_cross_flow_converge_to_its_integral(v, r, monkeypatch):
+    errors = []
+    for strips in (10, 20, 40):
+        monkeypatch.setattr(hull_functions, "STRIPS", strips)
+        X, Y, N = cross_flow(0.7, v, r, 1000.0, 2.0, 0.3, 0.9)
+        assert X == 0.0
+        exact = by_integral(v, r)
+        size = max(map(abs, exact))
+        errors.append(max(abs(Y - exact[0]), abs(N - exact[1])) / size)
+    assert errors[0] <= 0.0201
+    assert errors[2] < max(1e-12, errors[0] / 8.0)
+
+
+@given(speed, speed)
+def test_cross_flow_only_brakes(v, r):
+    _, Y, N = cross_flow(0.5, v, r)
+    assert Y * v + N * r <= 0.0
+
+
+# Actuators
+
+LAWS = {
+    "fixed_propeller": PROPELLER,
+    "open_water_propeller": OPEN_WATER,
+    "tunnel_thruster": {"F": 3.0},
+    "voith_schneider": {"F": 3.0},
+    "azimuth": AZIMUTH,
+    "rudder": {"area": 0.02, "hull_force": 0.2, "wake": 0.1, "steering_deduction": 0.3},
+    "given_force": {"F_X": 3.0, "F_Y": 2.0},
+}
+FLOWS = [Flow(), Flow(1.0, 0.0), Flow(-0.6, 0.0)]
+every_law = pytest.mark.parametrize("name", LAWS)
+
+
+def test_every_law_is_tested():
+    assert set(LAWS) == set(Law.known) == {a.law for a in EVERY_LAW.actuators}
+
+
+@every_law
+@pytest.mark.parametrize("flow", FLOWS)
+@given(share, share)
+def test_commands_give_the_force_that_is_asked_for_within_reach(name, flow, a, b):
+    law = Law.known[name]
+    p = law.Parameters(**LAWS[name])
+    reach = law.reach(flow, p)
+    asked = [low + s * (high - low) for s, (low, high) in zip((a, b), reach, strict=False)]
+    if name == "azimuth":  # the corners of its reach are beyond a circle
+        asked = [x / 1.5 for x in asked]
+    commands = law.commanded(tuple(asked), flow, p)
+    for c, (low, high) in zip(commands, law.limits(p), strict=True):
+        assert low - 1e-9 <= c <= high + 1e-9
+    given = dict(zip("XY", law.force(commands, flow, p), strict=True))
+    assert [given[axis] for axis in law.components] == pytest.approx(asked, rel=1e-6, abs=1e-6)
+
+
+@every_law
+@given(share, share)
+def test_reach_is_what_commands_within_their_limits_give(name, a, b):
+    law = Law.known[name]
+    p = law.Parameters(**LAWS[name])
+    for flow in FLOWS:
+        spans = law.limits(p)
+        commands = [low + s * (high - low) for s, (low, high) in zip((a, b), spans, strict=False)]
+        given = dict(zip("XY", law.force(tuple(commands), flow, p), strict=True))
+        for axis, (low, high) in zip(law.components, law.reach(flow, p), strict=True):
+            if name == "open_water_propeller" and flow.u > 0.0 and commands[0] > 0.0:
+                assert given[axis] <= high + 1e-9  # a slow propeller that the ship drags along
+            else:
+                assert low - 1e-9 <= given[axis] <= high + 1e-9
+
+
+@every_law
+@given(share, share)
+def test_one_source_serves_floats_and_arrays(name, a, b):
+    law = Law.known[name]
+    p = law.Parameters(**LAWS[name])
+    commands = [low + s * (high - low) for s, (low, high) in zip((a, b), law.limits(p), strict=False)]
+    alone = law.force(tuple(commands), Flow(0.3, 0.1), p)
+    arrays = tuple(np.array([c, c]) for c in commands)
+    together = law.force(arrays, Flow(np.array([0.3, 0.3]), np.array([0.1, 0.1])), p)
+    assert [x[1] for x in together] == pytest.approx(alone, rel=1e-12, abs=1e-15)
+
+
+def test_an_azimuth_that_cannot_turn_round_runs_backwards():
+    law = Law.known["azimuth"]
+    p = law.Parameters(**AZIMUTH, n_min=-8.0, alpha_max=0.6)
+    asked = (-10.0, 2.0)
+    alpha, n = law.commanded(asked, Flow(), p)
+    assert n < 0.0
+    assert abs(alpha) < 0.6
+    assert law.force((alpha, n), Flow(), p) == pytest.approx(asked)
+
+
+@given(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(0.1, 3.0), st.floats(-8.0, 0.0))
+def test_an_azimuth_never_works_against_what_is_asked(X, Y, alpha_max, n_min):
+    law = Law.known["azimuth"]
+    p = law.Parameters(**AZIMUTH, n_min=n_min, alpha_max=alpha_max)
+    got = law.force(law.commanded((X, Y), Flow(), p), Flow(), p)
+    assert got[0] * X + got[1] * Y >= -1e-9
+
+
+@given(st.floats(0.1, 3.0), st.floats(-0.6, 0.6), st.floats(-1.0, 1.0))
+def test_a_rudder_is_a_plate_whose_force_turns_with_the_flow(u, delta, v):
+    law = Law.known["rudder"]
+    p = law.Parameters()
+    ahead = law.force((delta,), Flow(u, v), p)
+    mirrored = law.force((-delta,), Flow(u, -v), p)
+    assert mirrored == pytest.approx((ahead[0], -ahead[1]), abs=1e-12)
+    reversed_flow = law.force((delta,), Flow(-u, -v), p)
+    assert reversed_flow == pytest.approx((-ahead[0], -ahead[1]), abs=1e-12)
+    assert ahead[0] * u + ahead[1] * v <= 1e-12  # it takes energy out of the motion
+    assert ahead[0] * np.cos(delta) == pytest.approx(ahead[1] * np.sin(delta), abs=1e-9)  # normal to it
+
+
+@given(speed, speed, st.floats(-30.0, 30.0), st.floats(-30.0, 30.0))
+def test_a_force_at_a_place_gives_its_moment(x, y, X, Y):
+    tug = described(part("tug", "given_force", {"F_X": 30.0, "F_Y": 30.0, "x": x, "y": y}))
+    tau = total(forces(tug, (X, Y), REST, believed(tug)))
+    assert tau == pytest.approx((X, Y, x * Y - y * X))
+
+
+@every_ship
+@given(st.data())
+def test_commands_beyond_their_limits_count_as_the_limits(name, data):
+    d = SHIPS[name]
+    values = believed(d)
+    limits = [
+        span
+        for a, own in zip(actuators(d), values, strict=True)
+        for span in a.law.limits(a.law.Parameters._make(own[:-2]))
+    ]
+    given = [data.draw(st.floats(-1e3, 1e3)) for _ in limits]
+    kept = [min(max(c, low), high) for c, (low, high) in zip(given, limits, strict=True)]
+    nu = (0.4, 0.1, -0.2)
+    assert total(forces(d, given, nu, values)) == total(forces(d, kept, nu, values))
+
+
+@given(st.floats(-16.0, 16.0), st.floats(-16.0, 16.0))
+def test_mirrored_propellers_turn_the_ship_the_other_way(port, starboard):
+    d = SHIPS["otter"]
+    X, Y, N = total(forces(d, (port, starboard), REST, believed(d)))
+    mirrored = total(forces(d, (starboard, port), REST, believed(d)))
+    assert mirrored == pytest.approx((X, -Y, -N), abs=1e-12)
+
+
+# Allocation
+
+TWO_AZIMUTHS = described(
+    part("port", "azimuth", {**AZIMUTH, "x": -0.9, "y": -0.4}),
+    part("starboard", "azimuth", {**AZIMUTH, "x": -0.9, "y": 0.4}),
+)
+WITH_RUDDER = described(
+    part("main", "fixed_propeller", {**PROPELLER, "x": -1.0}),
+    part("rudder", "rudder", {"x": -1.1, "area": 0.02}),
+    part("bow", "tunnel_thruster", {"x": 0.8, "F": 6.0}),
+)
+LAYOUTS = {
+    "two propellers": (SHIPS["otter"], (0, 2)),
+    "two azimuths": (TWO_AZIMUTHS, (0, 1, 2)),
+    "propeller, rudder, tunnel": (WITH_RUDDER, (0, 1, 2)),
+    "VSP, tunnel": (SHIPS["cse1"], (0, 1, 2)),
+    "CyberShip II": (SHIPS["cybership2"], (0, 1, 2)),
+    "every law": (EVERY_LAW, (0, 1, 2)),
+    "one azimuth": (described(part("pod", "azimuth", {**AZIMUTH, "x": -0.9})), (0, 2)),
+    "rudder behind a propeller": (described(*WITH_RUDDER.actuators[:2]), (0, 2)),
+    "one propeller, not in the middle": (described(part("a", "fixed_propeller", {"y": 0.3})), (0,)),
+    "propeller aside, tunnel amidships": (
+        described(part("a", "fixed_propeller", {"y": 0.3}), part("b", "tunnel_thruster", {})),
+        (0, 1),
+    ),
+    "tunnel forward": (described(part("bow", "tunnel_thruster", {"x": 1.0})), (2,)),
+    "nothing": (described(), ()),
+}
+every_layout = pytest.mark.parametrize("layout", LAYOUTS)
+
+
+@every_layout
+def test_a_ship_is_asked_only_for_what_it_can_give(layout):
+    d, able = LAYOUTS[layout]
+    assert axes(d) == able
+    tau = (0.3, 0.2, -0.1)
+    others = tuple(x if k in able else 1e3 for k, x in enumerate(tau))
+    nu = (0.5, 0.0, 0.0)
+    assert allocate(d, others, nu, believed(d)) == allocate(d, tau, nu, believed(d))
+
+
+@every_layout
+@given(st.data())
+def test_the_allocation_gives_what_is_asked_where_it_can(layout, data):
+    d, able = LAYOUTS[layout]
+    nu = (1.0, 0.0, 0.0)
+    values = believed(d)
+    # A third of what the actuators can give together, which none needs more than all of itself for.
+    pulled = []
+    for a, own in zip(actuators(d), values, strict=True):
+        p = a.law.Parameters._make(own[:-2])
+        reach = a.law.reach(Flow(*nu[:2]), p)
+        asked = [data.draw(st.floats(-0.3, 0.3)) * min(high, -low) for low, high in reach]
+        commands = a.law.commanded(tuple(asked), Flow(*nu[:2]), p)
+        pulled += commands
+    f = forces(d, pulled, nu, values)
+    g = forces(d, allocate(d, total(f), nu, values), nu, values)
+    # A rudder also brakes, which it is not asked for.
+    braked = sum(abs(f.X[a.k]) + abs(g.X[a.k]) for a in actuators(d) if a.part.law == "rudder")
+    for k in able:
+        assert total(g)[k] == pytest.approx(total(f)[k], rel=1e-5, abs=1e-5 + braked)
+
+
+@every_layout
+@given(st.tuples(*[st.floats(-1e6, 1e6)] * 3), st.tuples(speed, speed, speed))
+def test_whatever_is_asked_the_commands_are_finite_and_within_limits(layout, tau, nu):
+    d, _ = LAYOUTS[layout]
+    values = believed(d)
+    given = iter(allocate(d, tau, nu, values))
+    for a, own in zip(actuators(d), values, strict=True):
+        for low, high in a.law.limits(a.law.Parameters._make(own[:-2])):
+            assert low <= next(given) <= high
+
+
+def test_what_a_limit_cuts_off_is_asked_of_the_others():
+    row = described(*[part(f"at_{k}", "given_force", {"y": y}) for k, y in enumerate((-1.0, 0.0, 1.0))])
+    first, _, middle, _, last, _ = allocate(row, (1.2, 0.0, 1.4), REST, believed(row))
+    assert (first, middle, last) == pytest.approx((1.0, 0.6, -0.4), abs=1e-6)
+    tau = total(forces(row, (first, 0.0, middle, 0.0, last, 0.0), REST, believed(row)))
+    assert tau == pytest.approx((1.2, 0.0, 1.4), abs=1e-6)
+
+
+@given(*[st.floats(-1.0, 1.0)] * 3)
+def test_vsp_and_tunnel_are_allocated_as_the_thesis_does(a, b, c):
+    tau = thrust(a, b, c, Allocation())
+    d = SHIPS["cse1"]
+    assert allocate(d, tau, REST, believed(d)) == pytest.approx(
+        allocate_three(*tau, Allocation()), abs=1e-12
+    )
+
+
+# Failings
+
+
+def pushing(d, commands, nu=(0.4, 0.1, -0.2)):
+    """The actuators at work, and what their force depends on."""
+    values = ship(description=d).thrusters.params().plant
+    given = tuple(commands)
+    part_of_full = tuple(min(1.0, max(-1.0, c / 10.0)) for c in given)
+    return forces(d, given, nu, values), Working(5.0, *nu, given, part_of_full)
+
+
+def width_of(d):
+    """How many commands a ship has."""
+    return sum(len(a.law.commands) for a in actuators(d))
+
+
+def without_memory(d):
+    """Each actuator of a ship with each of its failings that has no memory."""
+    for a in actuators(d):
+        for e in failings(a, width_of(d)):
+            if e.memory is None:
+                yield a, e
+
+
+def starts(e, **values):
+    return [values.get(p.name, p.start) for p in e.parameters]
+
+
+def commands_for(width, sign=1.0):
+    return [sign * (0.3 + 0.1 * k) for k in range(width)]
+
+
+@every_ship
+def test_a_failing_at_zero_changes_nothing_and_never_another_actuator(name):
+    d = SHIPS[name]
+    f, now = pushing(d, commands_for(width_of(d)))
+    for a, e in without_memory(d):
+        same = e(f, now, *starts(e))
+        assert (same.X, same.Y) == (f.X, f.Y), e.id
+        assert total(same) == total(f), e.id
+        worse = e(f, now, *starts(e, **{x: 0.7 + 0.2 * k for k, x in enumerate(e.coefficients)}))
+        others = [k for k in range(len(f.X)) if k != a.k]
+        for before, after in zip(f[:4], worse[:4], strict=True):
+            assert [after[k] for k in others] == [before[k] for k in others], e.id
+        assert worse[4:] == f[4:], e.id
+
+
+@every_ship
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_failing_that_is_called_linear_is_linear(name, sign):
+    d = SHIPS[name]
+    f, now = pushing(d, commands_for(width_of(d), sign))
+    for _, e in without_memory(d):
+
+        def tau(scale, e=e):
+            values = {x: scale * (0.2 + 0.1 * (k % 3)) for k, x in enumerate(e.coefficients)}
+            return np.array(total(e(f, now, *starts(e, **values))))
+
+        if e.linear:
+            none, once, twice = tau(0.0), tau(1.0), tau(2.0)
+            assert twice - none == pytest.approx(2.0 * (once - none), abs=1e-9), e.id
+
+
+@every_ship
+def test_a_failing_acts_on_the_axes_that_it_names(name):
+    d = SHIPS[name]
+    f, now = pushing(d, commands_for(width_of(d)))
+    for _, e in without_memory(d):
+        change = np.subtract(
+            total(e(f, now, *starts(e, **dict.fromkeys(e.coefficients, 0.3)))), total(f)
+        )
+        assert all(abs(change[k]) < 1e-12 or "XYN"[k] in e.axis for k in range(3)), e.id
+
+
+@every_ship
+def test_all_force_lost_is_no_force(name):
+    d = SHIPS[name]
+    f, now = pushing(d, commands_for(width_of(d)))
+    for a in actuators(d):
+        found = {e.id: e for e in failings(a, width_of(d))}
+        gone = found[f"loss_{a.part.name}"](f, now, 1.0)
+        assert (gone.X[a.k], gone.Y[a.k]) == (0.0, 0.0)
+        dead = found[f"{a.part.name}_failure"](f, now, 4.0)
+        assert (dead.X[a.k], dead.Y[a.k]) == (0.0, 0.0)
+        assert found[f"{a.part.name}_failure"](f, now, 6.0) == f  # not yet
+
+
+def test_a_turned_force_keeps_its_size():
+    f, now = pushing(SHIPS["cse1"], (0.5, -0.3, 0.2))
+    a = actuators(SHIPS["cse1"])[0]
+    angle = next(e for e in failings(a, 3) if e.id == "angle_vsp")
+    turned = angle(f, now, 0.5 * pi)
+    assert (turned.X[0], turned.Y[0]) == pytest.approx((-f.Y[0], f.X[0]))  # ahead becomes starboard
+
+
+def test_another_place_adds_the_moment_of_the_way():
+    f, now = pushing(SHIPS["cse1"], (0.5, -0.3, 0.2))
+    a = actuators(SHIPS["cse1"])[0]
+    place = next(e for e in failings(a, 3) if e.id == "place_vsp")
+    X, Y, N = total(f)
+    expected = (X, Y, N + 0.03 * f.Y[0] - 0.02 * f.X[0])
+    assert total(place(f, now, 0.03, 0.02)) == pytest.approx(expected)
+
+
+@given(st.floats(0.1, 3.0))
+def test_a_lag_is_of_first_order_and_one_actuators_alone(T):
+    a = actuators(SHIPS["otter"])[1]
+    lag = next(e for e in failings(a, 2) if e.memory)
+    memory, n = lag.memory.start(2), 100
+    for _ in range(n):
+        memory, given = lag(memory, (3.0, 4.0), T / n, T)
+    assert given == pytest.approx((3.0, 4.0 * (1.0 - np.exp(-1.0))))
+
+
+def test_effects_of_a_described_ship_are_its_actuators():
+    ids = set(ship(description=SHIPS["otter"]).effects)
+    assert {"loss_port", "starboard_failure", "lag_port", "X_u", "current", "N_uv"} <= ids
+    assert not any("bow" in name or "vsp" in name for name in ids)
+
+
+# Ships of publications
+
+
+def sailed(d, tau, seconds, h=0.05):
+    """The last state of a ship and of its thrusters, for a request or commands."""
+    s = ship(description=d)
+    vessel, thrusters = s.vessel, s.thrusters
+    p, q = vessel.params(), thrusters.params()
+    request = type(thrusters.inputs().request)(*tau)
+    state, past, out = vessel.init(None, p), thrusters.init(None, q), None
+    for _ in range(round(seconds / h)):
+        nu = Velocity(state.u, state.v, state.r)
+        given = thrusters.inputs(request, nu)
+        past, out = thrusters.advance(past, given, thrusters.prepared(q), h)
+        acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
+        state, _ = vessel.advance(state, acting, vessel.prepared(p), h)
+    return state, out
+
+
+def test_the_otter_is_that_of_its_publication():
+    p = params("otter")
+    assert mass_matrix(p.inertia)[2][2] == pytest.approx(41.6, abs=0.05)
+    d = SHIPS["otter"]
+    X, Y, N = total(forces(d, (99.0, 99.0), REST, believed(d)))
+    assert pytest.approx((24.4 * 9.81, 0.0, 0.0), rel=1e-3) == (X, Y, N)
+    astern, _, _ = total(forces(d, (-99.0, -99.0), REST, believed(d)))
+    assert astern == pytest.approx(-13.6 * 9.81, rel=1e-3)
+    # It leaves out the moment that turns a drifting hull across.
+    drift = damping_force(1.5, 0.4, 0.0, p.damping)[2] - coriolis_force(1.5, 0.4, 0.0, p.inertia)[2]
+    assert drift == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_otter_runs_six_knots_at_full_thrust():
+    state, out = sailed(SHIPS["otter"], (1e4, 0.0, 0.0), 30.0)
+    assert state.u / 0.514444 == pytest.approx(6.0, abs=0.05)
+    assert (state.v, state.r, out.tau_act_N) == pytest.approx(REST, abs=1e-9)
+
+
+def test_the_otter_turns_at_the_published_time_constant():
+    """A small moment: N = 41.614 r + ..., M66 = 41.6, so that the rate settles in about a second."""
+    p = params("otter")
+    assert mass_matrix(p.inertia)[2][2] / -damping_force(0.0, 0.0, 1e-6, p.damping)[2] * 1e-6 == (
+        pytest.approx(1.0, rel=1e-3)
+    )
+
+
+def scaled(d, ratio):
+    """A ship of another size by Froude's law, number by number."""
+    s = ship(description=d)
+    at = type(d.scale)(ratio)
+    units = {v.name: v.unit for part in (s.vessel, s.thrusters) for v in variables(part.params)}
+
+    def of(values, unit_of):
+        return tuple(Value(v.name, v.value * at.factor(unit_of(v.name)), *v[2:]) for v in values)
+
+    def of_actuator(a, name):
+        command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
+        if command is not None:
+            return f"{command.unit}.1/s" if command.unit == "1" else f"{command.unit}/s"
+        return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
+
+    return d._replace(
+        length=d.length * ratio,
+        inertia=of(d.inertia, units.__getitem__),
+        terms=of(d.terms, units.__getitem__),
+        functions=tuple(f._replace(values=of(f.values, units.__getitem__)) for f in d.functions),
+        actuators=tuple(
+            a.part._replace(values=of(a.part.values, lambda name, a=a: of_actuator(a, name)))
+            for a in actuators(d)
+        ),
+    )
+
+
+@pytest.mark.parametrize("ratio", [0.3, 7.0, 160.0])
+@pytest.mark.parametrize(
+    ("name", "tau"),
+    [("otter", (20.0, 1.0, 4.0)), ("otter", (400.0, 0.0, 60.0)), ("cybership2", (2.0, 0.05, 0.1))],
+)
+def test_a_ship_of_another_size_moves_the_same_in_its_own_units(name, tau, ratio):
+    d = SHIPS[name]
+    large = scaled(d, ratio)
+    at = type(d.scale)(ratio)
+    scale = (at.force, at.force, at.moment)
+    state, out = sailed(d, tau, 20.0)
+    again, acting = sailed(
+        large, [x * k for x, k in zip(tau, scale, strict=True)], 20.0 * at.time, 0.05 * at.time
+    )
+    back = [1 / ratio, 1 / ratio, 1.0, 1 / at.speed, 1 / at.speed, 1 / at.rate]
+    assert [x * k for x, k in zip(again[:6], back, strict=True)] == pytest.approx(state[:6], rel=1e-6)
+    assert acting.tau_act_N / at.moment == pytest.approx(out.tau_act_N, rel=1e-6)
+
+
+def test_cybership_2_gives_a_force_on_every_axis():
+    d = SHIPS["cybership2"]
+    assert ship(description=d).fully_actuated
+    _, held = sailed(d, (0.3, 0.05, 0.1), 0.05)
+    assert held[-3:] == pytest.approx((0.3, 0.05, 0.1), abs=1e-6)
+
+
+def test_cybership_2_has_the_lift_of_its_publication_near_amidships():
+    a = actuators(SHIPS["cybership2"])[-1]
+    p = a.law.Parameters._make(believed(SHIPS["cybership2"])[-1][:-2])
+    _, Y = a.law.force((0.01,), Flow(1.0 / (1.0 - p.wake), 0.0), p)
+    slope = -Y / 0.01
+    assert slope == pytest.approx(6.43306, rel=1e-3)
+
+
+def test_cybership_2_turns_by_its_rudders():
+    by_hand = SHIPS["cybership2"]._replace(allocates=False)
+    runs = [sailed(by_hand, (20.0, 20.0, 0.0, delta, delta), 15.0)[0] for delta in (0.2, 0.0, -0.2)]
+    starboard, ahead, port = runs
+    assert ahead.u > 0.5
+    assert (ahead.v, ahead.r) == (0.0, 0.0)
+    assert starboard.r > 0.05
+    assert starboard.v < 0.0  # the stern swings out
+    y_0 = ship(description=by_hand).vessel.params().start.y_0
+    assert port[1:6] == pytest.approx(
+        (2.0 * y_0 - starboard.y, -starboard.psi, starboard.u, -starboard.v, -starboard.r)
+    )
+
+
+# CyberShip Enterprise 1, built in and from its file
+
+
+def test_the_file_of_cse1_says_what_the_components_declare():
+    declared, read = ship(), ship(description=SHIPS["cse1"])
+    mine = {v.name: v for v in variables(read.vessel.params)}
+    for v in (*variables(Inertia), *variables(Damping)):
+        assert mine[v.name].start == v.start, v.name
+        if v.start != 0.0:
+            known = mine[v.name].known
+            assert (known.origin, known.share) == (v.known.origin, v.known.share), v.name
+    theirs = {v.name: v for v in variables(declared.thrusters.params)}
+    mine = {v.name: v for v in variables(read.thrusters.params)}
+    for ours, name in {
+        "plant_F_vsp": "plant_vsp_F",
+        "plant_F_bow": "plant_bow_F",
+        "plant_l_vsp": "plant_vsp_x",
+        "plant_l_bow": "plant_bow_x",
+    }.items():
+        a, b = theirs[ours], mine[name]
+        assert (a.start, a.unit, a.known) == (b.start, b.unit, b.known)
+    assert SHIPS["cse1"].scale.length == 1.0
+
+
+@settings(max_examples=20)
+@given(st.lists(st.tuples(*[st.floats(-0.9, 0.9)] * 3), min_size=3, max_size=3))
+def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
+    declared, read = ship(), ship(description=SHIPS["cse1"])
+    states = [s.vessel.init(None, s.vessel.params()) for s in (declared, read)]
+    pasts = [s.thrusters.init(None, s.thrusters.params()) for s in (declared, read)]
+    for commands in pushes:
+        tau = Force(*thrust(*commands, Allocation()))
+        for _ in range(50):
+            outs = []
+            for k, s in enumerate((declared, read)):
+                q = s.thrusters.params()
+                given = s.thrusters.inputs(tau, Velocity(*states[k][3:6]))
+                pasts[k], out = s.thrusters.step(pasts[k], given, q, 0.02)
+                outs.append(out)
+                acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
+                states[k], _ = s.vessel.step(states[k], acting, s.vessel.params(), 0.02)
+            assert outs[1] == pytest.approx(outs[0], abs=1e-12)
+    assert states[1] == pytest.approx(states[0], rel=1e-12, abs=1e-12)
