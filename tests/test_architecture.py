@@ -5,6 +5,7 @@ an ``__init__`` imports on demand (``lazy_names``).
 """
 
 import ast
+import re
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -361,3 +362,59 @@ ALSO_ELSEWHERE = {"command", "allocation", "ellipse"}
 )
 def test_a_folder_is_a_table_of_contents(folder: Path):
     assert len(list(folder.parent.glob("*.py"))) <= 12
+
+
+# Words for the parts of one ship, in names and texts of the code; docstrings may name it as the reference.
+PARTS = re.compile(
+    r"(?<![a-z])(vsp\d?|bow(?! to)|tunnel|otter|cse1|kvlcc2|gunnerus)(?![a-z])|^(matlab_)?five$",
+    re.IGNORECASE,
+)
+# What knows CyberShip Enterprise 1: readers of its columns and files, its two propellers with commands of
+# their own, pictures of its effects, and the pages of the thesis' analysis.
+OF_ONE_SHIP = {
+    "diagnosis.assessment.closed_loop",
+    "diagnosis.assessment.command_check",
+    "diagnosis.assessment.plausibility",
+    "diagnosis.assessment.readings",
+    "diagnosis.assessment.remainder_text",
+    "diagnosis.assessment.stability",
+    "diagnosis.assessment.windows",
+    "diagnosis.command_line",
+    "diagnosis.data.cleaning",
+    "diagnosis.data.columns",
+    "diagnosis.data.matlab_files",
+    "diagnosis.data.reading",
+    "diagnosis.data.thinning",
+    "diagnosis.data.unit_check",
+    "diagnosis.identification.candidates",
+    "diagnosis.model.prediction",
+    "diagnosis.model.thrust",
+    "diagnosis.model.weak_form",
+    "diagnosis.open_loop.thruster_report",
+    "diagnosis.prediction_error.fit",
+    "diagnosis.prediction_error.shooting",
+    "diagnosis.report.shape",
+}
+
+
+def words(path):
+    """Names and texts of a file's code, docstrings left out."""
+    tree = ast.parse(path.read_text())
+    docs = {
+        node.body[0].value
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in docs:
+            yield node.value
+        for name in ("id", "attr", "arg", "name"):
+            if isinstance(value := getattr(node, name, None), str):
+                yield value
+
+
+@pytest.mark.parametrize("package", ["cosim", "diagnosis"])
+def test_nothing_more_names_the_parts_of_one_ship(package):
+    """What is exempt only gets less: another file that names a thruster or a ship is a step back."""
+    found = {name for name, path in sources(package).items() if any(map(PARTS.search, words(path)))}
+    assert found == {name for name in OF_ONE_SHIP if name.startswith(package)}
