@@ -116,13 +116,13 @@ def full(name: str) -> Callable[[Model], tuple[float, float]]:
     return lambda m: (-m.value(name), m.value(name))
 
 
-# m/s; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
+# m/s, times the scale of the ship; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
 FASTEST = 0.6
 SWEEPS: dict[Picture, Sweep] = {
     "hull surge force over surge speed": Sweep(
         "surge speed u [m/s]",
         "damping in surge [N]",
-        lambda _: (-FASTEST, FASTEST),
+        lambda m: (-FASTEST * m.ship.scale.speed, FASTEST * m.ship.scale.speed),
         hull,
         surge_speed,
     ),
@@ -153,7 +153,7 @@ SWEEPS: dict[Picture, Sweep] = {
     "bow effectiveness over surge speed": Sweep(
         "surge speed |u| [m/s]",
         "bow effectiveness [1]",
-        lambda _: (0.0, FASTEST),
+        lambda m: (0.0, FASTEST * m.ship.scale.speed),
         bow_effectiveness,
         lambda e, m: np.abs(surge_speed(e, m)),
     ),
