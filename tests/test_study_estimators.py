@@ -139,6 +139,16 @@ def test_data_that_is_none_ends_in_exit_code_2(tmp_path, capsys):
         basin.read(tmp_path / "other.mat")
 
 
+def test_measured_runs_are_found_in_the_folder_or_in_its_cse1(tmp_path):
+    (tmp_path / "cse1").mkdir()
+    deep = [tmp_path / "cse1" / name for name in ("a.mat", "b.mat")]
+    for path in reversed(deep):
+        path.touch()
+    assert basin.files(tmp_path) == deep
+    (tmp_path / "c.mat").touch()
+    assert basin.files(tmp_path) == [tmp_path / "c.mat"]
+
+
 @needs_data
 def test_measured_runs_can_be_read():
     full_ahead = []

@@ -1,5 +1,6 @@
 """Where people work: the packages from Python, the command ``cybership``, logs, folders, beliefs."""
 
+import argparse
 import importlib.util
 import json
 import re
@@ -351,3 +352,25 @@ def test_the_version_is_the_same_everywhere():
     version = re.search(r'^version = "(.+)"', project, re.M)[1]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
     assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        n
+        for n, c in SUBCOMMANDS.items()
+        if c.module.startswith(("cosim.", "diagnosis.")) and n != "schema"
+    ],
+)
+def test_help_of_a_command_tells_what_each_argument_is(name, monkeypatch):
+    module = importlib.import_module(SUBCOMMANDS[name].module)
+    if not hasattr(module, "main"):
+        module = importlib.import_module(f"{module.__name__}.__main__")
+
+    def parse(parser, *_):
+        assert [a.dest for a in parser._actions if not a.help] == []
+        raise SystemExit(0)
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", parse)
+    with pytest.raises(SystemExit):
+        module.main([])
