@@ -29,13 +29,17 @@ def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .data import clean, propose  # only now: they take a second to import
     from .gathering import gather
+    from .model import Model, ship_with
 
+    craft = ship_with((), options.ship)
     path = options.file
     beside = path.with_name(f"{path.name}.json")
     if options.write and not options.overwrite and beside.exists():
         raise InputError(f"'{beside}' is there already; --overwrite replaces it")
-    found = propose(path)
-    gather([found.run], advance, options.anyway)  # as load does: refuses what is no ship's motion
+    found = propose(path, craft)
+    gather(
+        [found.run], advance, options.anyway, Model(ship=craft)
+    )  # as load does: refuses what is no ship's motion
     track = clean(found.run, options.anyway)
     counts, seconds = track.counts(), track.run.time[-1] - track.run.time[0]
     shown = [
@@ -61,11 +65,12 @@ def _parser() -> argparse.ArgumentParser:
         description="Look at a measurement, and propose the JSON file beside it: names, units, "
         "separator, decimal mark, lines before the names, encoding.",
         epilog="examples:  %(prog)s my.csv\n"
-        "           %(prog)s my.csv --write\n"
+        "           %(prog)s my.csv --ship otter --write\n"
         "exit codes: 0 done, 2 bad input (nothing is written), 130 interrupted (nothing is written)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="CSV or Parquet file")
+    parser.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")
     parser.add_argument("--write", action="store_true", help="write it, as FILE.json")
     parser.add_argument("--overwrite", action="store_true", help="also over one that is there")
     parser.add_argument(

@@ -1,5 +1,7 @@
 """A described ship through the diagnosis: its commands, its predictions, and what is hidden in its runs."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import diagnosis
 from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
 from cosim import InputError
+from diagnosis import propose_columns
 from diagnosis.data import read, read_frame
 from diagnosis.model import Model, ship_with
 
@@ -30,6 +33,19 @@ def test_commands_are_read_by_actuator_and_unit(ship, run, tmp_path):
     assert from_file.signals == ("port.n", "starboard.n")
     np.testing.assert_allclose(from_table.commands, from_file.commands, rtol=1e-12)
     np.testing.assert_allclose(from_file.commands, run[["port.n", "starboard.n"]], rtol=1e-12)
+
+
+def test_columns_of_a_described_ship_are_proposed(run, tmp_path, capsys):
+    """Commands by nearly their names and in other units are found, and then read as they were meant."""
+    other = run.rename(columns={"port.n": "Port n [rpm]", "starboard.n": "STARBOARD_N"})
+    other["Port n [rpm]"] *= 60.0
+    other.to_csv(tmp_path / "run.csv", index=False)
+    command = [str(tmp_path / "run.csv"), "--ship", "otter", "--write"]
+    assert propose_columns.main(command) == 0
+    told = json.loads((tmp_path / "run.csv.json").read_text())["columns"]
+    assert told == {"port.n": {"name": "Port n [rpm]", "unit": "rpm"}, "starboard.n": "STARBOARD_N"}
+    found = read(tmp_path / "run.csv", of=ship_with((), "otter"))
+    np.testing.assert_allclose(found.commands, run[["port.n", "starboard.n"]], rtol=1e-9)
 
 
 def test_force_of_the_commands_is_that_of_the_two_propellers(ship, run):

@@ -1,7 +1,7 @@
 """The content of the file beside a measurement, proposed by a look at the measurement itself."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,9 +10,23 @@ import numpy as np
 
 from cosim import InputError
 from cosim.errors import nearest
+from fmus.ship import Ship, ship
 
 from .cleaning import in_order, lost, repeated
-from .columns import CALLED, LOG, OPPOSITE, QUANTITY, UNITS, UTF_8, WITH_UNIT, Column, Layout, signals
+from .columns import (
+    CALLED,
+    LOG,
+    OF_UNIT,
+    OPPOSITE,
+    QUANTITY,
+    UNITS,
+    UTF_8,
+    WITH_UNIT,
+    Column,
+    Layout,
+    log_of,
+    signals,
+)
 from .reading import Run, column_names, read
 from .text_layout import bare_unit, table_cells, text_layout
 from .unit_check import OFTENEST, RAREST, doubts, likely_unit
@@ -50,7 +64,7 @@ class Proposal(NamedTuple):
     @property
     def needed(self) -> dict[str, Any]:
         """What has to be told, as JSON holds it; a log of this project needs nothing."""
-        if self.layout is LOG:
+        if self.layout.column("x") == LOG.column("x"):
             return {}
         told = self.layout.model_dump(exclude_defaults=True)
         for signal, column in told.get("columns", {}).items():
@@ -58,16 +72,20 @@ class Proposal(NamedTuple):
         return told
 
 
-def propose(path: Path) -> Proposal:
+def propose(path: Path, of: Ship | None = None) -> Proposal:
     """Look at a file: its text, its names and units, and at the numbers where units are not told.
 
     Args:
         path: a CSV or Parquet file; what is told beside it does not count.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
 
     Raises:
         InputError: no such file, no table of numbers below names, a unit that is not known, or a signal
             without a column.
     """
+    of = of or ship()
+    commands = of.commands or {}
+    quantity = QUANTITY | {name: OF_UNIT[unit] for name, unit in commands.items()}
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
         raise InputError(f"'{path}' is no CSV or Parquet file, of which columns can be told")
     text = Layout()
@@ -78,26 +96,28 @@ def propose(path: Path) -> Proposal:
             raise InputError(f"'{path}' has no table of numbers below a line of names")
         text = found.model_copy(update={"encoding": encoding})
     elif not path.is_file():
-        read(path)  # says so
+        read(path, of=of)  # says so
     names = column_names(path, text)
     if LOG.column("x").name in names:
-        return Proposal(LOG, [], read(path, LOG))
-    columns = _columns(path, names, _units_line(path, text) if text.units_line else [""] * len(names))
+        log = log_of(commands) if commands else LOG
+        return Proposal(log, [], read(path, log, of))
+    units = _units_line(path, text) if text.units_line else [""] * len(names)
+    columns = _columns(path, names, units, quantity)
     told = {signal for signal, column in columns.items() if column.unit}
     layout = text.model_copy(update={"columns": columns})
-    unused = [name for name in names if name not in {layout.column(s).name for s in QUANTITY}]
+    unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     try:
-        signals(layout, names, f"'{path}'")
+        signals(layout, names, f"'{path}'", of.commands)
     except InputError as error:
         more = f"; columns that are no signals as far as is known: {', '.join(unused)}" if unused else ""
         raise InputError(f"{error}{more}") from None
-    run = read(path, layout)
+    run = read(path, layout, of)
     for signal, unit in _seen_units(run):
         if signal not in told:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
     needed = {s: c for s, c in columns.items() if c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
-    return Proposal(layout, unused, read(path, layout))
+    return Proposal(layout, unused, read(path, layout, of))
 
 
 def _encoding(path: Path) -> str:
@@ -116,26 +136,29 @@ def _units_line(path: Path, text: Layout) -> list[str]:
         return table_cells(next(islice(file, text.skip + 1, None)), text.separator)
 
 
-def _columns(path: Path, names: Sequence[str], units: Sequence[str]) -> dict[str, Column]:
+def _columns(
+    path: Path, names: Sequence[str], units: Sequence[str], quantity: Mapping[str, str]
+) -> dict[str, Column]:
     """The columns that names and units tell; of two for one signal, that of its own name or the first.
 
     Raises:
         InputError: a unit that is none of the signal.
     """
     columns: dict[str, Column] = {}
+    meant = MEANT | {_folded(s): (s, False) for s in quantity if s not in QUANTITY}
     pairs = zip(names, units, strict=False)
-    for name, below in sorted(pairs, key=lambda pair: pair[0] not in QUANTITY):
+    for name, below in sorted(pairs, key=lambda pair: pair[0] not in quantity):
         told = WITH_UNIT.fullmatch(name)
         bare, unit = (told[1], told[2]) if told else (name, bare_unit(below))
-        signal, flip = MEANT.get(_folded(bare), ("", False))
+        signal, flip = meant.get(_folded(bare), ("", False))
         if not signal:
             bare, _, unit = bare.rpartition("_")  # as x_mm
-            signal, flip = MEANT.get(_folded(bare), ("", False))
-            if unit not in UNITS.get(QUANTITY.get(signal, ""), {}):
+            signal, flip = meant.get(_folded(bare), ("", False))
+            if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
         if signal in columns:
             continue
-        known = UNITS[QUANTITY[signal]]
+        known = UNITS[quantity[signal]]
         if unit not in NO_UNIT and unit not in known:
             raise InputError(
                 f"'{path}': '{unit}' in the column '{name}' is no unit of {signal}{nearest(unit, known)}"
