@@ -13,6 +13,7 @@ from ..effects import STANDARD, EffectSet
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ship_description import Description
+from ..ships.naming import described_ship
 from . import ledger
 from .cached_fmu import cache_folder, is_whole, make_folder, place, store
 from .finding import ROOT, BuildError, load, which
@@ -32,7 +33,7 @@ def build(
     effects: EffectSet = STANDARD,
     native: Native | None = None,
     overwrite: bool = False,
-    ship: Description | None = None,
+    ship: Description | str | Path | None = None,
 ) -> list[Path]:
     """FMUs that are up to date with the source.
 
@@ -47,7 +48,8 @@ def build(
         effects: that vessel and thrusters are to have.
         native: the platforms to compile for; None means FMUs that run in Python.
         overwrite: whether other files of these names may be replaced in ``out``.
-        ship: that the FMUs are to be made for; None: CyberShip Enterprise 1.
+        ship: that the FMUs are to be made for: a description, its file, or the name of a shipped one;
+            None: CyberShip Enterprise 1.
 
     Returns:
         Path of each FMU, in the order of the names.
@@ -60,7 +62,7 @@ def build(
     out = None if out is None else Path(out)
     if out is not None and out.exists() and not out.is_dir():
         raise BuildError(f"'{out}' is a file, not a folder")
-    of = make_ship(effects, ship)
+    of = make_ship(effects, described_ship(ship))
     built = [_cached(name, of, starts, native, note) for name in _every(_listed(names), starts, of)]
     if starts is not None:
         _tell_unused(starts, [fmu.stem for fmu in built], of, note)
@@ -76,7 +78,7 @@ def export(
     note: Callable[[str], None] = lambda _: None,
     effects: EffectSet = STANDARD,
     overwrite: bool = False,
-    ship: Description | None = None,
+    ship: Description | str | Path | None = None,
 ) -> list[Path]:
     """Components as plain C; arguments and errors are those of :func:`build`.
 
@@ -85,7 +87,7 @@ def export(
     """
     from ..native.export_source import exported_source
 
-    of = make_ship(effects, ship)
+    of = make_ship(effects, described_ship(ship))
     found = [load(*which(name), of)[1] for name in _every(names, starts, of)]
     if starts is not None:
         found = [starts.baked(component) for component in found]
