@@ -15,28 +15,45 @@ from diagnosis.assessment.stability import OperatingRegion, largest_distance
 from diagnosis.compare import main as compare
 from diagnosis.gathering import gather
 from diagnosis.model.uncertainty import omega_std
+from fmus.actuators.law import Law
 from fmus.declare import variables
 from fmus.effects import STANDARD
 from fmus.scale import CSE1, REFERENCE_LENGTH, Scale
-from fmus.ship import Ship, ship
-from fmus.thrusters.thrusters import make as make_thrusters
-from fmus.vessel.vessel import make as make_vessel
+from fmus.ship import ship
+from fmus.ships.ship_file import read_ship, shipped_ships
 
 SIZES = [Scale(length / REFERENCE_LENGTH) for length in (7.0, 320.0)]
-HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"deadband": 0.08}}
+HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"lag": 0.6}}
 
 
+def grown(d, scale):
+    """A description with every number at another size."""
+    units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
+    place = {"x": "m", "y": "m", "lag": "s"}
+
+    def given(values, units):
+        return tuple(v._replace(value=scale.factor(units[v.name]) * v.value) for v in values)
+
+    def actuator(part):
+        declared = {v.name: v.unit for v in variables(Law.known[part.law].Parameters)}
+        return part._replace(values=given(part.values, place | declared))
+
+    length = scale.length
+    return d._replace(
+        length=length * d.length,
+        beam=length * d.beam,
+        outline=tuple((length * x, length * y) for x, y in d.outline),
+        inertia=given(d.inertia, units),
+        terms=given(d.terms, units),
+        functions=tuple(f._replace(values=given(f.values, units)) for f in d.functions),
+        actuators=tuple(map(actuator, d.actuators)),
+    )
+
+
+@cache
 def of_size(scale):
     """The nominal model of a ship that is CyberShip Enterprise 1 at another size."""
-    effects = STANDARD.at(scale)
-    added = {p.name for e in effects.values() for p in e.parameters}
-
-    def grown(component):
-        own = (v for v in variables(component.params) if v.name not in added)
-        return {v.name: scale.factor(v.unit) * v.start for v in own}
-
-    craft = Ship(effects, make_vessel(effects), make_thrusters(effects), scale=scale)
-    return Model(grown(ship().vessel), grown(ship().thrusters), ship=craft)
+    return Model(ship=ship(STANDARD, grown(read_ship("cse1"), scale)))
 
 
 def at_size(run, scale):
@@ -85,7 +102,7 @@ def test_the_same_is_found_in_own_units(scale):
     same, other = learned(CSE1), learned(scale)
     assert other.verdict == same.verdict == "found"
     assert [f.id for f in other.learned.effects] == [f.id for f in same.learned.effects]
-    assert {f.id for f in same.learned.effects} == {"deadband", "current"}
+    assert {f.id for f in same.learned.effects} == {"lag", "current"}
     model, posterior = of_size(scale), other.posterior
     unit = np.array([model.unit(name.partition(".")[2]) for name in posterior.names])
     assert posterior.names == same.posterior.names
@@ -123,31 +140,27 @@ def test_texts_say_the_seconds_of_the_ship(scale, tmp_path):
 
 
 @pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
-def test_effects_begin_end_and_are_tried_at_the_size_of_the_ship(scale):
-    grown = STANDARD.at(scale)
-    assert list(grown) == list(STANDARD)
-    for e in STANDARD.values():
-        for p, q in zip(e.parameters, grown[e.id].parameters, strict=True):
-            factor = scale.factor(p.unit)
-            assert q.start == factor * p.start
-            for side in ("min", "max"):
-                end = getattr(p.range, side)
-                assert getattr(q.range, side) == (None if end is None else factor * end)
-    nominal = ship().parameters
-    values = {v.name: v.start for part in nominal.values() for v in part.values()}
-    larger = of_size(scale)
-    for e in STANDARD.values():
+@pytest.mark.parametrize("name", shipped_ships())
+def test_effects_begin_end_and_are_tried_at_the_size_of_the_ship(scale, name):
+    described = read_ship(name)
+    same, other = ship(STANDARD, described), ship(STANDARD, grown(described, scale))
+    of_same, of_other = (Model(ship=each).values for each in (same, other))
+    assert list(same.effects) == list(other.effects)
+    for e, larger in zip(same.effects.values(), other.effects.values(), strict=True):
         units = {p.name: scale.factor(p.unit) for p in e.parameters}
-        for own, other in zip(
-            e.search.values(values), grown[e.id].search.values(larger.values), strict=True
-        ):
-            assert other == pytest.approx({name: units[name] * x for name, x in own.items()})
+        for p, q in zip(e.parameters, larger.parameters, strict=True):
+            assert q.start == pytest.approx(units[p.name] * p.start)
+            for end, moved in ((p.range.min, q.range.min), (p.range.max, q.range.max)):
+                assert moved == (None if end is None else pytest.approx(units[p.name] * end))
+        pairs = zip(e.search.values(of_same), larger.search.values(of_other), strict=True)
+        for tried, then in pairs:
+            assert then == pytest.approx({n: units[n] * x for n, x in tried.items()})
 
 
 @pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
 def test_closed_loops_are_similar(scale):
     reference = REFERENCES[0]._replace(seconds=60.0)
-    same, other = largest_distance(reference, Model()), largest_distance(reference, of_size(scale))
+    same, other = (largest_distance(reference, of_size(each)) for each in (CSE1, scale))
     assert other / scale.length == pytest.approx(same, rel=1e-6)
 
 

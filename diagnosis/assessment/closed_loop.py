@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs as ControllerInputs
-from fmus.declare import Component, flatten, rebuild
+from fmus.declare import Component, flatten, rebuild, variables
 from fmus.guidance import eight, ellipse
 from fmus.native.python_text import function
 from fmus.native.tape import Kernels, Tape
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs as ObserverInputs
 from fmus.ops import Number, sqrt
-from fmus.scale import CSE1
 from fmus.signals import Estimate, Force, Measurement, Nothing, Target, Velocity
 from fmus.thrusters.chain import Inputs as ThrusterInputs
 
@@ -81,18 +80,20 @@ def closed_loop(
     That function gets the time [s] since controller and thrusters acted last, as CyberShip Enterprise 1
     would count it, and gives the distance [m] between the ship and its target as well.
     """
-    described = model.ship.description is not None
-    time = model.ship.scale.time
-    # Components of a described ship are made for its size: nothing lies between them and the ship.
-    scale = CSE1 if described else model.ship.scale
-    length, inner = scale.length, STEP * time if described else STEP
-    size = model.ship.scale.length
-    start = {name: size * x for name, x in reference.start.items()}
+    scale = model.ship.scale
+    length, time = scale.length, scale.time
+    start = {name: length * x for name, x in reference.start.items()}
     ship = _Part(model.ship.vessel, {**model.vessel, **start})
-    serving = model.ship.serving
-    path = _Part(serving(reference.guidance), {})
-    observer = _Part(serving(mdf.COMPONENT), OBSERVER_WEIGHTS)
-    controller = _Part(serving(adaptive.COMPONENT), {})
+
+    def serving(component: Component, **values: float) -> _Part:
+        """A component made for the ship, at the size of CyberShip Enterprise 1."""
+        made = model.ship.serving(component)
+        own = {v.name: v.start / scale.factor(v.unit) for v in variables(made.params)}
+        return _Part(made, own | values)
+
+    # At that size, as the law feeds the position error back by 1 N/m, Table 4.2.
+    path, observer = serving(reference.guidance), serving(mdf.COMPONENT, **OBSERVER_WEIGHTS)
+    controller = serving(adaptive.COMPONENT)
     drive = _Part(model.ship.thrusters, model.thrusters)
     s, vessel = ship.begin(Force())
     g, target = path.begin(Nothing())
@@ -110,17 +111,17 @@ def closed_loop(
 
     def step(now: Loop, h: float) -> tuple[Loop, Number]:
         s, g, o, c, t = now.states
-        c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h * inner / STEP)
+        c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
         wanted = Force(*(x * f for x, f in zip(demand.tau, scale.forces, strict=True)))
         t, thrust = drive.advance(t, ThrusterInputs(wanted, now.velocity), h * time)
         acting = Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
         s, vessel = ship.advance(s, acting, STEP * time)
-        g, target = path.advance(g, Nothing(), inner)
+        g, target = path.advance(g, Nothing(), STEP)
         x, y = vessel.pose.x - length * target.x_t, vessel.pose.y - length * target.y_t
         poses = (*now.poses[1:], seen(vessel.measured))
         given = thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N
         commanded = Force(*(x / f for x, f in zip(given, scale.forces, strict=True)))
-        o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), inner)
+        o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), STEP)
         velocity = Velocity(*vessel.velocity)
         return Loop((s, g, o, c, t), velocity, target, estimate, poses), sqrt(x * x + y * y)
 

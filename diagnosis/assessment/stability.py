@@ -27,6 +27,7 @@ MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
 # Least difference that counts, share of the dissipation. Chosen: no coefficient is known to 1 %.
 TOLERANCE = 0.01
 DIRECTIONS = 21  # on each edge of a face; chosen, eigenvalues are met within 1 % of their range
+FACES = 6 * DIRECTIONS**2  # motions on the border of a region
 SPEEDS = np.linspace(0.02, 1.0, 25)  # shares of the region's limits; chosen
 COVERAGE = 0.99  # of a measured motion that its operating region holds; chosen
 MIN_REGION = 0.1  # of the default limits; chosen, so that an axis that hardly moves is checked as well
@@ -133,7 +134,7 @@ def check_stability(
         worse = [_motion(everywhere[lowest], float(after.min()), float(before.min()))]
     if not model.ship.fully_actuated:
         advance("coming to rest without thrust")
-        bounded = mass_definite and comes_to_rest(model, everywhere, region, notes)
+        bounded = mass_definite and comes_to_rest(model, everywhere[-FACES:], region, notes)
     else:
         bounded = mass_definite and _bounded(model, nominal, advance, notes)
     return Stability(
@@ -249,7 +250,7 @@ def _motion(nu: np.ndarray, after: float, before: float) -> str:
 
 
 def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, notes: list[str]) -> bool:
-    """Whether a ship without thrust stays near the speeds of its region, whatever motion it begins with.
+    """Whether a ship without thrust stays near the speeds of its region, from whatever motion there.
 
     Args:
         model: its hull, in still water and without what acts from outside.
@@ -287,7 +288,7 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
-        notes.append(f"{reference.name}: more than {bound:g} m from the target")
+        notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
         outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
         undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
         if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
