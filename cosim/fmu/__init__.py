@@ -9,8 +9,9 @@ if TYPE_CHECKING:
     from .instance import Instance
     from .isolated import IsolatedInstance
     from .local import LocalInstance
+    from .outline import Outline
 
-__all__ = ["Instance", "IsolatedInstance", "LocalInstance", "Model", "Variable"]
+__all__ = ["Instance", "IsolatedInstance", "LocalInstance", "Model", "Outline", "Variable"]
 
 __getattr__ = lazy_names(
     __name__,
@@ -19,6 +20,7 @@ __getattr__ = lazy_names(
         "IsolatedInstance": "isolated",
         "LocalInstance": "local",
         "Model": "fmu_model",
+        "Outline": "outline",
         "Variable": "fmu_model",
     },
 )

@@ -19,6 +19,7 @@ from ..conversion import BASE_UNITS, Unit
 from ..errors import InputError
 from ..process.scratch import Scratch
 from . import archive_check
+from .outline import Outline, read_outline
 
 DESCRIPTION = "modelDescription.xml"
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
@@ -82,6 +83,7 @@ class Model:
             version = root.get("fmiVersion")
             if version != "2.0":
                 raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
+            self.outline: Outline | None = read_outline(xml)
             self.description: ModelDescription = read_model_description(str(path), validate=False)
         except InputError:
             raise

@@ -7,6 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import Model, Value, Variable
+from ..fmu.outline import Outline
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -83,6 +84,11 @@ class System:
     def native(self) -> bool | None:
         """Whether the project's own FMUs are compiled; None where there are none."""
         return self.models[self.own[0]].is_native if self.own else None
+
+    @property
+    def outline(self) -> Outline | None:
+        """The ship to draw: that of the first FMU which says so."""
+        return next((model.outline for model in self.models.values() if model.outline), None)
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""
