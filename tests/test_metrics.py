@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cosim.fmu import Outline
+from cosim.formats.outline import Outline
 from cosim.metrics import main
 from cosim.plots import main as plots_main
 from cosim.results import (

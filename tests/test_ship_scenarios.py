@@ -10,8 +10,8 @@ from support.project import COMPONENTS, ROOT
 
 import cosim
 from cosim.campaign.__main__ import main as campaign_main
-from cosim.fmu import Model, Outline
-from cosim.fmu.outline import read_outline
+from cosim.fmu import Model
+from cosim.formats.outline import Outline, read_outline
 from cosim.results import read_options
 from cosim.run import main as run_main
 from diagnosis.compare import main as compare_main
@@ -100,7 +100,7 @@ def test_mistakes_are_one_line(tmp_path, arguments, message):
 def test_the_annotation_of_a_vessel_is_its_outline(described):
     made = ship(description=described).vessel
     root = model_description(made, guid_of("0"), "1")
-    assert read_outline(ElementTree.tostring(root)) == Outline(*made.outline)
+    assert read_outline(root.find("VendorAnnotations")) == Outline(*made.outline)
     corners = np.array(made.outline.corners)
     assert np.ptp(corners[:, 0]) == pytest.approx(made.outline.length, rel=0.1)
     assert sorted(corners[:, 1]) == pytest.approx(sorted(-corners[:, 1]))
@@ -114,9 +114,9 @@ def test_only_a_vessel_is_drawn():
                                           '<Ship name="a" length="1" outline="0,0 1,0"/>',
                                           '<Ship name="a" length="1" outline="0,0 1,nan 1,1"/>'])  # fmt: skip
 def test_an_annotation_that_holds_no_outline_draws_none(ship_element):
-    inner = f'<Tool name="cybership">{ship_element}</Tool>'
-    xml = f"<fmiModelDescription><VendorAnnotations>{inner}</VendorAnnotations></fmiModelDescription>"
-    assert read_outline(xml.encode()) is None
+    tool = f'<Tool name="cybership">{ship_element}</Tool>'
+    annotations = ElementTree.fromstring(f"<VendorAnnotations>{tool}</VendorAnnotations>")
+    assert read_outline(annotations) is None
 
 
 def test_an_axis_of_ships_runs_each(tmp_path):

@@ -9,9 +9,8 @@ if TYPE_CHECKING:
     from .instance import Instance
     from .isolated import IsolatedInstance
     from .local import LocalInstance
-    from .outline import Outline
 
-__all__ = ["Instance", "IsolatedInstance", "LocalInstance", "Model", "Outline", "Variable"]
+__all__ = ["Instance", "IsolatedInstance", "LocalInstance", "Model", "Variable"]
 
 __getattr__ = lazy_names(
     __name__,
@@ -20,7 +19,6 @@ __getattr__ = lazy_names(
         "IsolatedInstance": "isolated",
         "LocalInstance": "local",
         "Model": "fmu_model",
-        "Outline": "outline",
         "Variable": "fmu_model",
     },
 )

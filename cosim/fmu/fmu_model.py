@@ -19,7 +19,6 @@ from ..conversion import BASE_UNITS, Unit
 from ..errors import InputError
 from ..process.scratch import Scratch
 from . import archive_check
-from .outline import Outline, read_outline
 
 DESCRIPTION = "modelDescription.xml"
 NUMERIC = ("Real", "Integer", "Boolean", "Enumeration")
@@ -30,6 +29,15 @@ INT_LIMIT = 2**31
 
 # What a variable can be set to.
 Value = bool | int | float | str
+
+
+def _annotations(xml: bytes) -> ElementTree.Element | None:
+    """What tools have added to a model description; they stand before its variables."""
+    if b"VendorAnnotations" in xml:
+        for _, element in ElementTree.iterparse(io.BytesIO(xml)):
+            if element.tag == "VendorAnnotations":
+                return element
+    return None
 
 
 @dataclass(frozen=True)
@@ -83,7 +91,7 @@ class Model:
             version = root.get("fmiVersion")
             if version != "2.0":
                 raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
-            self.outline: Outline | None = read_outline(xml)
+            self.annotations = _annotations(xml)
             self.description: ModelDescription = read_model_description(str(path), validate=False)
         except InputError:
             raise

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..fmu.outline import Outline
+    from ..formats.outline import Outline
     from ..scenario.roles import Roles
 
 DPI = 120  # chosen

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from ..fmu.outline import Outline
+from ..formats.outline import Outline
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import SIDECAR
 

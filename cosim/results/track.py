@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..fmu.outline import Outline
+from ..formats.outline import Outline
 from ..scenario.roles import Columns
 from .canvas import WIDTH, Run, Runs, arrange, blank, grid, legend
 

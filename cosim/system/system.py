@@ -7,7 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import Model, Value, Variable
-from ..fmu.outline import Outline
+from ..formats.outline import Outline, read_outline
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -88,7 +88,8 @@ class System:
     @property
     def outline(self) -> Outline | None:
         """The ship to draw: that of the first FMU which says so."""
-        return next((model.outline for model in self.models.values() if model.outline), None)
+        outlines = (read_outline(model.annotations) for model in self.models.values())
+        return next((outline for outline in outlines if outline is not None), None)
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

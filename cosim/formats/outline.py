@@ -1,13 +1,11 @@
 """The ship that an FMU is the hull of: an annotation in its model description says how to draw it."""
 
-import io
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-ANNOTATIONS = "VendorAnnotations"
-SHIP = "Tool[@name='cybership']/Ship"
+SHIP = "Tool[@name='cybership']/Ship"  # among the vendor annotations
 MOST_CORNERS = 1000
 
 
@@ -37,15 +35,10 @@ class Outline(NamedTuple):
         return made if usable and made.length > 0.0 else None
 
 
-def read_outline(xml: bytes) -> Outline | None:
-    """The outline in a model description; None where it has none."""
-    if ANNOTATIONS.encode() not in xml:
+def read_outline(annotations: Element | None) -> Outline | None:
+    """The outline in the vendor annotations of an FMU; None where there is none."""
+    ship = None if annotations is None else annotations.find(SHIP)
+    if ship is None:
         return None
-    for _, element in ElementTree.iterparse(io.BytesIO(xml)):
-        if element.tag == ANNOTATIONS:
-            ship = element.find(SHIP)
-            if ship is None:
-                return None
-            corners = [corner.split(",") for corner in ship.get("outline", "").split()]
-            return Outline.read({**ship.attrib, "corners": corners})
-    return None
+    corners = [corner.split(",") for corner in ship.get("outline", "").split()]
+    return Outline.read({**ship.attrib, "corners": corners})
