@@ -43,9 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         runs = {folder.resolve().name: read_log(folder) for folder in options.folders}
         told = {folder.resolve().name: read_options(folder) for folder in options.folders}
-        roles = {label: run.roles for label, run in told.items()}
-        windows = {label: (run.start, run.stop) for label, run in told.items()}
-        drawn = draw(runs, options.out, roles=roles, options=look, windows=windows)
+        drawn = draw(runs, options.out, told, look)
     except InputError as error:
         complain(error)
         return BAD_INPUT

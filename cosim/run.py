@@ -143,6 +143,7 @@ def _scenario(options: argparse.Namespace) -> Scenario:
     settings += [] if options.log is None else [("log.signals", options.log)]
     settings += [("log.format", "parquet")] if options.parquet else []
     settings += [] if options.native is None else [("native", options.native)]
+    settings += [] if options.ship is None else [("ship", options.ship)]
     if settings:
         scenario = with_settings(scenario, settings, Path.cwd(), "--set")
     return scenario if options.stop is None else cut_short(scenario)
@@ -222,6 +223,7 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           %(prog)s scenarios/ellipse.json --parameters model.ssv\n"
         "           %(prog)s ellipse --parameters model.ssv --ensemble 50 --posterior posterior.json\n"
+        "           %(prog)s waypoints --ship my_ship.toml\n"
         "           %(prog)s theirs.json --only-own\n"
         "           %(prog)s scenarios/ellipse.json --set vessel.m=15 --seed 3\n"
         "           %(prog)s scenarios/ellipse.json --set controller=./mine.fmu\n"
@@ -237,6 +239,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--stop", type=_positive, metavar="SECONDS", help="another end")
     parser.add_argument("--step", type=_positive, metavar="SECONDS", help="another base step")
+    parser.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="another ship for FMUs with a bare name: a shipped one, or a description of your own",
+    )
     parser.add_argument("--seed", type=_seed, metavar="N", help="another seed of noise and faults")
     parser.add_argument(
         "--set",

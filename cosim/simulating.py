@@ -65,6 +65,7 @@ def simulate(
     stop: float | None = None,
     step: float | None = None,
     seed: int | None = None,
+    ship: str | Path | None = None,
     log: str | None = None,
     parquet: bool = False,
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the option of the command
@@ -85,6 +86,8 @@ def simulate(
         stop, step: end and base step [s], in place of the scenario's; a run that ends before the window
             of its metrics begins is measured from its start.
         seed: of noise and faults, in place of the scenario's.
+        ship: whose FMUs those with a bare name are, in place of the scenario's: the name of a shipped
+            one, or the ``.toml`` file that describes it, relative to the working directory.
         log: which signals: ``"all"``, or ``"compact"``, what metrics, pictures and the diagnosis need.
         parquet: whether to write ``log.parquet`` in place of ``log.csv``.
         set: values by their paths, as ``{"vessel.m": 15.0, "controller": "./mine.fmu", "stop": 60.0}``;
@@ -113,6 +116,7 @@ def simulate(
     chosen = {"stop": stop, "step": step, "seed": seed, "log.signals": log}
     settings = dict(set or {}) | {path: value for path, value in chosen.items() if value is not None}
     settings |= {"log.format": "parquet"} if parquet else {}
+    settings |= {} if ship is None else {"ship": str(ship)}
     if settings:
         scenario = with_settings(scenario, settings.items(), Path.cwd(), "set")
     if stop is not None:

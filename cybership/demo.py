@@ -17,7 +17,7 @@ from pathlib import Path
 
 import cosim
 from cosim.command import BAD_INPUT, complain, folder_name, program, run_command
-from cosim.results import draw
+from cosim.results import draw, read_options
 
 NEEDED = ("scipy", "jinja2", "pandas")
 # What the plant has and its model does not: scenarios/hidden.ssv.
@@ -79,7 +79,8 @@ def demonstrate(out: Path) -> None:
     for label, believe in beliefs.items():
         metrics = _sail("ellipse_bs", folders[label], hidden, believe, SECONDS).metrics
         print(f"   {label}: distance to the target {1e3 * metrics['e_pos_rms']:.0f} mm RMS")
-    draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out)
+    told = {label: read_options(folder) for label, folder in folders.items()}
+    draw({label: cosim.read_log(folder) for label, folder in folders.items()}, out, told)
 
 
 def _sail(

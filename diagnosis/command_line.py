@@ -13,6 +13,8 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, complain, folder_name, program
 from cosim.interrupts import Held
+from cosim.results import read_options
+from fmus.ships.naming import DEFAULT
 
 from .identification import Prior
 from .progress import Advance, progress
@@ -20,6 +22,7 @@ from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
 INPUTS = ("train", "test", "runs", "run", "model", "effects")
+RUNS = ("train", "test", "runs")  # of these, those that are measured runs
 
 
 def prior(text: str) -> Prior:
@@ -74,7 +77,8 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     made.add_argument(
         "--ship",
         metavar="NAME|FILE.toml",
-        help="the ship that was measured: a shipped one, or a description of your own (cse1)",
+        help="the ship that was measured: a shipped one, or a description of your own (as the logs "
+        "of runs say, else cse1)",
     )
     made.add_argument(
         "--anyway",
@@ -173,6 +177,26 @@ def command_of(name: str) -> str:
     return shlex.join(["python", "-m", f"diagnosis.{name}", *sys.argv[1:]])
 
 
+def _ship_of(options: argparse.Namespace) -> str | None:
+    """The ship that the logs among the runs are of, and say so; None: the usual one, or no log tells.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    paths = [path for name in RUNS for path in getattr(options, name, None) or ()]
+    folders = {path: path if path.is_dir() else path.parent for path in paths}
+    told = {path: ship for path, folder in folders.items() if (ship := read_options(folder).ship)}
+    ships = dict.fromkeys(told.values())
+    if len(ships) > 1:
+        each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
+        raise InputError(f"the runs are of several ships: {each}")
+    ship = next(iter(ships), DEFAULT)
+    if ship == DEFAULT:
+        return None
+    complain(f"the ship is {ship}, as '{next(iter(told))}' says; --ship means another one", "note: ")
+    return ship
+
+
 def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
     """Choose the result folder where there is no ``--out``; returns the inputs in that case."""
     if options.out is not None:
@@ -198,6 +222,8 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     with Held() as interrupts:
         interrupts.allow()
         try:
+            if "ship" in options and options.ship is None:
+                options.ship = _ship_of(options)
             inputs = _place(options)
             with progress(errors) as advance:
                 done = work(options, advance)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from inspect import signature
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 
 class DeclarationError(Exception):
@@ -53,6 +53,20 @@ class Known:
     group: str
     origin: str
     share: float
+
+
+class Outline(NamedTuple):
+    """A ship as tools draw it.
+
+    Attributes:
+        name: of the ship.
+        length: between perpendiculars [m].
+        corners: (forward, to starboard) [m, m] of the waterline, from the body origin.
+    """
+
+    name: str
+    length: float
+    corners: tuple[tuple[float, float], ...]
 
 
 FIXED = "fixed"
@@ -292,6 +306,7 @@ class Component:
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
         any_ship: whether it serves every ship; False where it names the parts of one.
+        outline: of the ship that it is the hull of.
     """
 
     name: str
@@ -310,6 +325,7 @@ class Component:
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
     any_ship: bool = True
+    outline: Outline | None = None
 
     def starting(self, starts: Mapping[str, float]) -> "Component":
         """The same component with other start values of some parameters or inputs."""

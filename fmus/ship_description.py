@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-from .declare import Known, Variable
+from .declare import Known, Outline, Variable
 from .scale import REFERENCE_LENGTH, Scale
 
 
@@ -86,6 +86,11 @@ class Description(NamedTuple):
     def scale(self) -> Scale:
         """Its size beside that of CyberShip Enterprise 1."""
         return Scale(self.length / REFERENCE_LENGTH)
+
+    @property
+    def drawn(self) -> Outline:
+        """What pictures need of it."""
+        return Outline(self.name, self.length, self.outline)
 
     def values(self) -> Mapping[str, Value]:
         """Numbers of the hull, by the name of the parameter."""

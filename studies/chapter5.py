@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import cosim
 from cosim.dispatch import FinishedRun
-from cosim.results import draw
+from cosim.results import draw, read_options
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
 from .outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
@@ -162,7 +162,8 @@ def pictures(report: Report, seconds: float | None, jobs: int | None) -> None:
             read = {name: cosim.read_log(logs / path / kind / name / "0") for name in CONTROLLERS}
             for group, names in (("variants", FOUR), ("against", OLD)):
                 folder = report.folder / f"{path}_{group}_{kind}"
-                draw({short(name): dict(read[name]) for name in names}, folder)
+                told = {short(n): read_options(logs / path / kind / n / "0") for n in names}
+                draw({short(name): dict(read[name]) for name in names}, folder, told)
                 for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
                     caption = f"{path}, {group}, {kind}: {file.replace('_', ' ')} (seed 0)"
                     report.picture(f"{folder.name}/{file}.png", caption)

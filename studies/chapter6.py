@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 import cosim
-from cosim.results import draw
+from cosim.results import draw, read_options
 from diagnosis.model import read_model
 
 from . import sysid4
@@ -45,7 +45,8 @@ def pictures(report: Report, seed: int) -> None:
         name, place = label(trial.name, FAULTY), folder((trial.name, FAULTY))
         logs = report.folder / "logs" / place
         shown = {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS}
-        draw(shown, report.folder / place)
+        told = {LABELS[c]: read_options(logs / c / str(seed)) for c in CONTROLLERS}
+        draw(shown, report.folder / place, told)
         for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
             caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
             report.picture(f"{place}/{file}.png", caption)

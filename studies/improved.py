@@ -13,7 +13,7 @@ import numpy as np
 
 import cosim
 from cosim.dispatch import FinishedRun
-from cosim.results import draw
+from cosim.results import draw, read_options
 from fmus.controller.models import SURGE
 
 from . import sysid4
@@ -198,11 +198,10 @@ def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> 
     coefficients(report, found)
     report.heading("Pictures")
     for sense in ("mdf", "kalman"):
-        read = {
-            n.removeprefix("controller_"): dict(cosim.read_log(logs / sense / n / str(seeds[0])))
-            for n in CONTROLLERS
-        }
-        draw(read, report.folder / sense)
+        folders = {n.removeprefix("controller_"): logs / sense / n / str(seeds[0]) for n in CONTROLLERS}
+        read = {name: dict(cosim.read_log(folder)) for name, folder in folders.items()}
+        told = {name: read_options(folder) for name, folder in folders.items()}
+        draw(read, report.folder / sense, told)
         for file, figure in zip(("trajectory", "errors", "metrics", "forces"), "abcd", strict=True):
             report.picture(
                 f"{sense}/{file}.png", f"{file}, {sense} (seed {seeds[0]}, Fig. 7.17{figure})"

@@ -309,9 +309,10 @@ def test_the_missing_extra_is_named(base, monkeypatch):
     assert "pip install 'cybership[campaign]'" in done.stderr
 
 
-def test_the_shipped_campaign_is_valid():
-    loaded = LoadedCampaign(ROOT / "scenarios" / "campaigns" / "gains.campaign.json")
-    assert len(cases(loaded.campaign)) == 8
+@pytest.mark.parametrize(("name", "runs"), [("gains", 8), ("otter", 6)])
+def test_the_shipped_campaigns_are_valid(name, runs):
+    loaded = LoadedCampaign(ROOT / "scenarios" / "campaigns" / f"{name}.campaign.json")
+    assert len(cases(loaded.campaign)) == runs
 
 
 def dask(*arguments):

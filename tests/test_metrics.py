@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from cosim.formats.outline import Outline
 from cosim.metrics import main
 from cosim.plots import main as plots_main
 from cosim.results import (
@@ -19,9 +20,11 @@ from cosim.results import (
     tracking,
 )
 from cosim.results.picture_files import PictureOptions
+from cosim.results.run_options import RunOptions
 from cosim.scenario import Roles
 
 ROLES = Roles()
+ARROW = Outline("arrow", 3.0, ((2.0, 0.0), (-1.0, 0.5), (-1.0, -0.5)))
 
 KEYS = [
     "e_pos_rms",
@@ -424,11 +427,11 @@ class TestPlots:
         assert np.diff(known) == pytest.approx(30.0 / 5001, rel=1e-9)
 
     def test_hull_is_alike_on_both_sides_and_as_long_and_wide_as_the_ship(self):
-        (corners,) = track.hulls(np.zeros((1, 3)))
+        (corners,) = track.hulls(np.zeros((1, 3)), ARROW.corners)
         mirrored = corners * [-1.0, 1.0]
         assert {tuple(c) for c in corners.tolist()} == {tuple(c) for c in (mirrored + 0.0).tolist()}
-        assert np.ptp(corners, axis=0) == pytest.approx([track.HULL_WIDTH, track.HULL_LENGTH])
-        assert corners[corners[:, 1].argmax()] == pytest.approx([0.0, 0.5 * track.HULL_LENGTH])
+        assert np.ptp(corners, axis=0) == pytest.approx([1.0, 3.0])
+        assert corners[corners[:, 1].argmax()] == pytest.approx([0.0, 2.0])
 
     def test_a_crossing_stays_whole(self):
         angle = np.linspace(0.1, 2.0 * np.pi + 0.1, 3000)
@@ -438,8 +441,8 @@ class TestPlots:
     def test_hull_points_where_the_ship_heads(self):
         log = {"time": np.array([0.0, 1.0]), "vessel.x": np.zeros(2), "vessel.y": np.zeros(2)}
         log["vessel.psi"] = np.full(2, np.pi / 2.0)
-        (east,) = track.outlines(canvas.Run("", log, {}, ROLES), 1.0)
-        assert east[0] == pytest.approx([0.5, 0.0])
+        (east,) = track.outlines(canvas.Run("", log, {}, ROLES), ARROW, 0.5)
+        assert east[0] == pytest.approx([1.0, 0.0])
         assert east[1, 1] < 0.0  # starboard of a ship to the east is south
 
 
@@ -474,7 +477,11 @@ class TestRoles:
     def test_pictures_do_not_depend_on_names(self, tmp_path):
         log = wild()
         drawing.draw({"a": log, "b": wild(2)}, tmp_path / "plain")
-        drawing.draw({"a": self.renamed(log), "b": wild(2)}, tmp_path / "other", roles={"a": self.OTHER})
+        drawing.draw(
+            {"a": self.renamed(log), "b": wild(2)},
+            tmp_path / "other",
+            {"a": RunOptions(roles=self.OTHER)},
+        )
         for name in TestPlots.ALL:
             assert (tmp_path / "plain" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
 

@@ -288,10 +288,10 @@ def test_spikes_are_the_cause_where_they_are():
 def test_whole_study_in_small(tmp_path, monkeypatch):
     draw, sets = chapter6.draw, {}
 
-    def one_set(logs, folder):
+    def one_set(logs, folder, told):
         """Of the four sets of pictures, which differ by their data alone, the first is drawn."""
         sets[folder.relative_to(tmp_path).as_posix()] = (
-            [path.name for path in draw(logs, folder)] if not sets else []
+            [path.name for path in draw(logs, folder, told)] if not sets else []
         )
 
     monkeypatch.setattr(chapter6, "draw", one_set)

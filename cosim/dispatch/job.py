@@ -12,8 +12,8 @@ from ..scenario.schema import Scenario
 from ..system.instance_pool import InstancePool
 from .travelling_files import Files
 
-# Keys of a scenario that change no number of a run.
-WITHOUT_EFFECT = ("name", "description", "log", "native")
+# Keys of a scenario that change no number of a run; a ship does by its FMUs, which have hashes.
+WITHOUT_EFFECT = ("name", "description", "log", "native", "ship")
 
 
 class Row(NamedTuple):

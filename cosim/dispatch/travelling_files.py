@@ -31,8 +31,8 @@ class Files:
         self.origins: dict[str, str] = {}
         self.fmus: dict[str, Model] = {}
         self.identities: dict[str, str] = {}
-        # By path and whether the project's own FMUs are compiled.
-        self._models: dict[tuple[str, bool], Model] = {}
+        # By path, ship, and whether the project's own FMUs are compiled.
+        self._models: dict[tuple[str, str, bool], Model] = {}
         self._tables: dict[Path, str] = {}
 
     def read(self, scenarios: Sequence[Scenario]) -> list[str]:
@@ -45,18 +45,18 @@ class Files:
             InputError: no such FMU, or one that cannot be read.
         """
         notes: list[str] = []
-        for native in (False, True):
-            alike = [s for s in scenarios if compiles(s.native) == native]
+        for kind in dict.fromkeys(map(_kind, scenarios)):
+            alike = [s for s in scenarios if _kind(s) == kind]
             entries = {e.path: e for s in alike for e in s.fmus.values()}
-            new = {path: e for path, e in entries.items() if (path, native) not in self._models}
+            new = {path: e for path, e in entries.items() if (path, *kind) not in self._models}
             if new:
                 found = read_models(alike[0].model_copy(update={"fmus": new}), notes)
                 for path, model in found.items():
-                    self._add(path, native, model, alike[0].folder)
+                    self._models[(path, *kind)] = model
+                    self._add(path, model, alike[0].folder)
         return notes
 
-    def _add(self, path: str, native: bool, model: Model, folder: Path) -> None:
-        self._models[path, native] = model
+    def _add(self, path: str, model: Model, folder: Path) -> None:
         name = f"{model.sha256}.fmu"
         self.paths[name], self.fmus[name] = model.path, model
         self.origins[model.sha256] = path
@@ -66,13 +66,11 @@ class Files:
 
     def models(self, scenario: Scenario) -> dict[str, Model]:
         """The FMU of each instance; :meth:`read` has read them."""
-        return {
-            name: self._models[e.path, compiles(scenario.native)] for name, e in scenario.fmus.items()
-        }
+        return {name: self._models[(e.path, *_kind(scenario))] for name, e in scenario.fmus.items()}
 
     def fmu(self, scenario: Scenario, instance: str) -> str:
         """The name by content of the FMU of an instance; :meth:`read` has read it."""
-        return f"{self._models[scenario.fmus[instance].path, compiles(scenario.native)].sha256}.fmu"
+        return f"{self.models(scenario)[instance].sha256}.fmu"
 
     def table(self, folder: Path, path: str) -> str:
         """The name by content of a table.
@@ -94,6 +92,11 @@ class Files:
         """Remove what was unpacked."""
         for model in self._models.values():
             model.close()
+
+
+def _kind(scenario: Scenario) -> tuple[str, bool]:
+    """What else than its name decides which FMU is meant: the ship, and whether it is compiled."""
+    return scenario.ship_source, compiles(scenario.native)
 
 
 def put(folder: Path, name: str, content: bytes) -> None:

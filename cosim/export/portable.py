@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from ..errors import InputError
 from ..files import file_stems
 from ..fmu.fmu_model import Model, Value, Variable
 from ..formats.elements import parameter_set, write_document
-from ..system.own_fmus import run_builder
+from ..system.own_fmus import builder_options, run_builder
 from ..system.system import Connection, System
 
 # Characters that XML 1.0 cannot hold, not even as a reference (section 2.2).
@@ -172,7 +173,7 @@ def pack(system: System, folder: Path) -> tuple[list[Part], list[str]]:
         baked = name in own
         part = Part(name, model, f"{stem}.fmu", values, baked)
         if values and baked:
-            _bake(part, folder, ("--native",) if system.scenario.native is True else ())
+            _bake(part, folder, builder_options(system.scenario, system.scenario.native is True))
         else:
             shutil.copyfile(model.path, folder / part.file)
         if values and not baked:
@@ -196,7 +197,7 @@ def _is_start(variable: Variable, value: Value) -> bool:
     return float(variable.start) == float(value)
 
 
-def _bake(part: Part, folder: Path, options: tuple[str, ...]) -> None:
+def _bake(part: Part, folder: Path, options: Sequence[str]) -> None:
     """Build the project's FMU again, with other start values and options of the builder."""
     names = {f"{part.model.name}.{v.name}": (v, value) for v, value in part.values}
     work = folder / f".{part.file}"

@@ -31,6 +31,15 @@ INT_LIMIT = 2**31
 Value = bool | int | float | str
 
 
+def _annotations(xml: bytes) -> ElementTree.Element | None:
+    """What tools have added to a model description; they stand before its variables."""
+    if b"VendorAnnotations" in xml:
+        for _, element in ElementTree.iterparse(io.BytesIO(xml)):
+            if element.tag == "VendorAnnotations":
+                return element
+    return None
+
+
 @dataclass(frozen=True)
 class Variable:
     """A variable of an FMU.
@@ -82,6 +91,7 @@ class Model:
             version = root.get("fmiVersion")
             if version != "2.0":
                 raise InputError(f"'{path}' is for FMI {version}; this master runs FMI 2.0")
+            self.annotations = _annotations(xml)
             self.description: ModelDescription = read_model_description(str(path), validate=False)
         except InputError:
             raise

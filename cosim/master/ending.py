@@ -16,7 +16,7 @@ from ..results import log as logs
 from ..results import performance
 from ..results.log_frame import log_frame
 from ..results.picture_files import Drawn
-from ..results.run_options import read_options
+from ..results.run_options import RunOptions, read_options
 from ..system.system import System
 from .loop_surroundings import paused_collector
 from .recorder import Recorder
@@ -79,9 +79,9 @@ class Result:
 
         if name not in drawing.PICTURES:
             raise InputError(f"no picture '{name}'{nearest(name, drawing.PICTURES)}")
-        run, label = read_options(self.folder), self.folder.name
+        label = self.folder.name
         runs = {label: logs.read_log(self.folder)}
-        drawn = drawing.figures(runs, run.start, run.stop, {label: run.roles}, [name])
+        drawn = drawing.figures(runs, {label: read_options(self.folder)}, [name])
         for _, figure in drawn:
             return Drawn(figure)
         raise InputError(f"the log in '{self.folder}' lacks columns to draw {name}")
@@ -134,8 +134,8 @@ def finish(
 
         with paused_collector(), writing(result):  # figures are many small objects, and short-lived
             runs = {system.scenario.name: columns}
-            used = {system.scenario.name: roles}
-            drawn = drawing.draw(runs, result.folder, window.start, window.stop, used)
+            told = RunOptions(window.start, window.stop, roles, system.outline)
+            drawn = drawing.draw(runs, result.folder, {system.scenario.name: told})
             missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
             if missing:
                 show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")

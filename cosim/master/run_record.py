@@ -7,7 +7,7 @@ from ..system.system import System
 
 
 def describe(system: System) -> dict[str, Any]:
-    """Columns, FMUs, the scenario as it was understood, versions."""
+    """Columns, FMUs, the ship to draw, the scenario as it was understood, versions."""
     columns: dict[str, dict[str, str]] = {"time": {"unit": "s", "description": "simulated time"}}
     for name in system.logged:
         variable = system.signals[name].variable
@@ -18,6 +18,7 @@ def describe(system: System) -> dict[str, Any]:
     resolved = system.scenario.model_dump(mode="json", by_alias=True)
     if not system.scenario.roles.model_fields_set:
         del resolved["roles"]  # stated only where the scenario does
+    resolved["ship"] = system.scenario.ship_source
     resolved["connections"] = [[c.source.name, c.target.name] for c in system.connections]
     for name, values in system.parameters.items():
         resolved["fmus"][name]["parameters"] = {v.name: value for v, value in values}
@@ -34,6 +35,7 @@ def describe(system: System) -> dict[str, Any]:
             }
             for name, model in system.models.items()
         },
+        "ship": None if system.outline is None else system.outline._asdict(),
         "order": system.order,
         "scenario": resolved,
         "seed": system.scenario.seed,

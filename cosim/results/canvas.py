@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from ..formats.outline import Outline
     from ..scenario.roles import Roles
 
 DPI = 120  # chosen
@@ -42,6 +43,7 @@ class Run(NamedTuple):
         line: matplotlib's properties of its lines.
         roles: names of the columns.
         start, stop: the part of the run that metrics cover [s]; None is unbounded.
+        outline: of the ship; None draws none.
     """
 
     label: str
@@ -50,6 +52,7 @@ class Run(NamedTuple):
     roles: Roles
     start: float | None = None
     stop: float | None = None
+    outline: Outline | None = None
 
 
 Runs = Sequence[Run]

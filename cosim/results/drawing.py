@@ -2,16 +2,18 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..scenario.roles import DEFAULT_ROLES, Roles
+from ..scenario.roles import Roles
 from .canvas import Run, Runs, save
 from .lines import errors, forces, metrics, model_error
 from .log import Log
 from .performance import MetricsError
 from .picture_files import PictureOptions
+from .run_options import RunOptions
 from .track import trajectory
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ MORE_COLORS = ("tab:orange", "tab:brown", "tab:cyan", "tab:olive", "tab:purple",
 
 
 USUAL = PictureOptions()
-Window = tuple[float | None, float | None]
+NOTHING: Mapping[str, RunOptions] = MappingProxyType({})
 
 
 class Picture(NamedTuple):
@@ -62,21 +64,17 @@ PICTURES = {
 def draw(
     runs: Mapping[str, Log],
     folder: str | Path,
-    start: float | None = None,
-    stop: float | None = None,
-    roles: Mapping[str, Roles] | None = None,
+    told: Mapping[str, RunOptions] = NOTHING,
     options: PictureOptions = USUAL,
-    windows: Mapping[str, Window] | None = None,
 ) -> list[Path]:
     """Draw every picture for which at least one log has the columns.
 
     Args:
         runs: label -> log; several logs are laid over each other.
         folder: for the files, made when missing.
-        start, stop: the part of the runs that the picture of the metrics covers [s]; None is all.
-        roles: label -> columns to use, where they are not the default ones.
+        told: label -> its columns, the part that its metrics cover, and its ship, where these are known;
+            see :func:`~cosim.results.read_options`.
         options: format, size and style.
-        windows: label -> first and last time of its metrics [s], in place of ``start`` and ``stop``.
 
     Returns:
         The files written, among trajectory.png, errors.png, metrics.png, forces.png and
@@ -89,7 +87,7 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with options.applied():
-        for name, figure in figures(runs, start, stop, roles, windows=windows):
+        for name, figure in figures(runs, told):
             file = folder / f"{name}.{options.format}"
             save(options.sized(figure), file, options.dpi)
             written.append(file)
@@ -98,22 +96,19 @@ def draw(
 
 def figures(
     runs: Mapping[str, Log],
-    start: float | None = None,
-    stop: float | None = None,
-    roles: Mapping[str, Roles] | None = None,
+    told: Mapping[str, RunOptions] = NOTHING,
     names: Sequence[str] = tuple(PICTURES),
-    windows: Mapping[str, Window] | None = None,
 ) -> "Iterator[tuple[str, Figure]]":
     """Name and figure of the pictures for which at least one log has the columns; see :func:`draw`."""
     for name in names:
         picture = PICTURES[name]
         able: list[Run] = []
         for k, (label, log) in enumerate(runs.items()):
-            own = (roles or {}).get(label, DEFAULT_ROLES)
-            part = _usable(log, picture.choices, own)
+            own = told.get(label, RunOptions())
+            part = _usable(log, picture.choices, own.roles)
             if part is not None:
-                window = (windows or {}).get(label, (start, stop))
-                able.append(Run(label.replace("$", r"\$"), part, _line(k), own, *window))
+                named = label.replace("$", r"\$")
+                able.append(Run(named, part, _line(k), own.roles, own.start, own.stop, own.outline))
         if not able:
             continue
         try:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
+from ..formats.outline import Outline
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import SIDECAR
 
@@ -14,18 +15,24 @@ class RunOptions(NamedTuple):
     Attributes:
         start, stop: the part of the run that its metrics cover [s]; None is unbounded.
         roles: columns that metrics and pictures read.
+        outline: of the ship; None where its FMUs do not say.
+        ship: whose FMUs the project's were: a name, or the path of a description; None where not told.
     """
 
     start: float | None = None
     stop: float | None = None
     roles: Roles = DEFAULT_ROLES
+    outline: Outline | None = None
+    ship: str | None = None
 
 
 def read_options(folder: Path) -> RunOptions:
     """Options of the run in a result folder; the defaults where its ``log.json`` does not state them."""
     try:
-        scenario = json.loads((folder / SIDECAR).read_text())["scenario"]
-        window = scenario["metrics"]
-        return RunOptions(window["from"], window["to"], Roles.model_validate(scenario.get("roles", {})))
+        told = json.loads((folder / SIDECAR).read_text())
+        scenario, window = told["scenario"], told["scenario"]["metrics"]
+        roles = Roles.model_validate(scenario.get("roles", {}))
+        outline = Outline.read(told.get("ship") or {})
+        return RunOptions(window["from"], window["to"], roles, outline, scenario.get("ship"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return RunOptions()

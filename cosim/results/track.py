@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..formats.outline import Outline
 from ..scenario.roles import Columns
 from .canvas import WIDTH, Run, Runs, arrange, blank, grid, legend
 
@@ -13,11 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_PATH = 20000  # points of a trajectory; chosen: many laps need more than a line over time
-# The outline that is drawn for a ship: that of CyberShip Enterprise 1 [m].
-HULL_LENGTH = 1.105
-HULL_WIDTH = 0.248
-# Corners of the hull seen from above, forward and to starboard of its middle, in lengths and widths.
-HULL = ((0.5, 0.0), (0.22, 0.5), (-0.5, 0.42), (-0.5, -0.42), (0.22, -0.5))
 OUTLINES = 12  # ships drawn along a path, chosen
 SCALES = (1.0, 0.5, 0.25, 0.125, 0.05, 0.02, 0.01)  # of those ships
 # Longest ship, as a share of the picture: in its own length unless the track is hardly longer; chosen
@@ -64,29 +60,30 @@ def once(paths: Sequence[Path], size: float) -> Path:
     return np.where(again, np.nan, x), np.where(again, np.nan, y)
 
 
-def hulls(poses: np.ndarray, length: float = HULL_LENGTH) -> np.ndarray:
+def hulls(poses: np.ndarray, outline: Sequence[tuple[float, float]]) -> np.ndarray:
     """The hull from above at some poses.
 
     Args:
         poses: (n, 3), north, east [m] and heading [rad].
-        length: of the hull [m].
+        outline: its corners (forward, to starboard) [m, m].
 
     Returns:
         Corners, east then north [m]: (n, corners, 2).
     """
     x, y, psi = np.asarray(poses).T[:, :, None]
-    forward, starboard = length * np.array(HULL).T * [[1.0], [HULL_WIDTH / HULL_LENGTH]]
+    forward, starboard = np.array(outline).T
     north = x + np.cos(psi) * forward - np.sin(psi) * starboard
     east = y + np.sin(psi) * forward + np.cos(psi) * starboard
     return np.stack([east, north], axis=2)
 
 
-def outlines(run: Run, length: float) -> np.ndarray:
+def outlines(run: Run, outline: Outline, scale: float) -> np.ndarray:
     """Hulls at equal distances in time, except where one is drawn already.
 
     Args:
         run: with time [s] and pose [m, m, rad].
-        length: of the drawn hull [m].
+        outline: of the ship.
+        scale: of the drawn hull.
 
     Returns:
         Corners, east then north [m]: (at most OUTLINES, corners, 2).
@@ -94,10 +91,11 @@ def outlines(run: Run, length: float) -> np.ndarray:
     time = run.log["time"]
     rows = np.searchsorted(time, np.linspace(time[0], time[-1], OUTLINES)).clip(0, time.size - 1)
     drawn: list[np.ndarray] = []
+    length = scale * outline.length
     for pose in np.stack([run.log[name][rows] for name in run.roles.pose], axis=1):
         if not any(np.all(np.abs(pose - other) < (length, length, 1.0)) for other in drawn):
             drawn.append(pose)
-    return hulls(np.array(drawn), length)
+    return hulls(np.array(drawn), scale * np.array(outline.corners))
 
 
 def _limits(values: Sequence[np.ndarray]) -> tuple[float, float]:
@@ -127,18 +125,20 @@ def trajectory(runs: Runs) -> "Figure":
         ylim=(north - 0.5 * tall, north + 0.5 * tall),
         aspect="equal",
     )
-    scale = next((s for s in SCALES if s * HULL_LENGTH < OUTLINE_SHARE * size), SCALES[-1])
+    longest = max((run.outline.length for run in runs if run.outline), default=0.0)
+    scale = next((s for s in SCALES if s * longest < OUTLINE_SHARE * size), SCALES[-1])
     for run, path in zip(runs, paths, strict=True):
         x, y = _along(*path, size / 1000.0)
         panel.plot(y, x, label=run.label, **{**run.line, "linewidth": 1.8})
-        ships = PolyCollection(
-            list(outlines(run, scale * HULL_LENGTH)),
-            facecolors=(run.line["color"], 0.15 / len(runs)),
-            edgecolors=run.line["color"],
-            linewidths=0.7,
-            zorder=2.5,
-        )
-        panel.add_collection(ships, autolim=False)
+        if run.outline is not None:
+            ships = PolyCollection(
+                list(outlines(run, run.outline, scale)),
+                facecolors=(run.line["color"], 0.15 / len(runs)),
+                edgecolors=run.line["color"],
+                linewidths=0.7,
+                zorder=2.5,
+            )
+            panel.add_collection(ships, autolim=False)
     for k, (north_0, east_0) in enumerate((x[0], y[0]) for x, y in paths):
         panel.plot(
             east_0,
@@ -153,7 +153,8 @@ def trajectory(runs: Runs) -> "Figure":
         _target(panel, targets, size)
     period = (runs[0].log["time"][-1] - runs[0].log["time"][0]) / (OUTLINES - 1)
     ratio = "full length" if scale == 1.0 else f"1:{1.0 / scale:g}"
-    panel.set_title(f"ships drawn {ratio}, every {period:.3g} s", loc="right", fontsize=8, color="0.4")
+    told = f"ships drawn {ratio}, every {period:.3g} s" if longest else ""
+    panel.set_title(told, loc="right", fontsize=8, color="0.4")
     legend(figure, panel, len(runs) + 2)
     return arrange(figure)
 

@@ -52,6 +52,12 @@ def _fmu_path(path: str) -> str:
     return path
 
 
+def _ship_name(name: str) -> str:
+    if not name.strip() or not name.isprintable() or len(name) > 1000:
+        raise ValueError(f"{name[:100]!r} is neither the name of a ship nor that of a .toml file")
+    return name
+
+
 def _table_path(path: str) -> str:
     if not path.isprintable() or not path.endswith(".csv") or len(path) > 1000:
         raise ValueError(f"{path[:100]!r} is not the name of a .csv file")
@@ -154,6 +160,11 @@ class Scenario(Strict):
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
+    ship: Annotated[str, AfterValidator(_ship_name)] = Field(
+        "cse1",
+        description="whose FMUs those with a bare name are: a shipped ship, or the .toml file that "
+        "describes one, relative to the scenario",
+    )
     native: bool | Literal["auto"] = Field(
         "auto",
         description="auto: compile the project's own FMUs, those with a bare name, and the step loop, "
@@ -192,6 +203,11 @@ class Scenario(Strict):
     def folder(self) -> Path:
         """The folder to which paths in the scenario are relative."""
         return self._folder
+
+    @property
+    def ship_source(self) -> str:
+        """The ship by its name, or by the whole path of the file that describes it."""
+        return str(self._folder / self.ship) if self.ship.endswith(".toml") else self.ship
 
     @property
     def notes(self) -> list[str]:

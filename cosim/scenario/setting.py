@@ -116,7 +116,9 @@ def _known(node: Any, key: str, path: str) -> Any:
 
 
 def _located(place: tuple[str, ...], value: Any, folder: Path) -> Any:
-    """A value with the files that it names made absolute; a bare name of an FMU stays one."""
+    """A value with the files that it names made absolute; a bare name of an FMU or ship stays one."""
+    if place == ("ship",) and isinstance(value, str) and value.endswith(".toml"):
+        return os.path.abspath(folder / value)
     if place[0] != "fmus":
         return value
     if len(place) == 2 and isinstance(value, dict):

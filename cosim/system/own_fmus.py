@@ -12,6 +12,8 @@ from ..fmu.fmu_model import Model
 from ..interrupts import INTERRUPTED
 from ..scenario.schema import Scenario
 
+USUAL_SHIP = Scenario.model_fields["ship"].default
+
 
 def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     """Instance -> FMU; instances of one file share it.
@@ -26,10 +28,10 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     bare = {e.path for e in scenario.fmus.values() if PurePath(e.path).name == e.path}
     # A bare name is the project's own FMU; only one that the project lacks may be a file in the folder.
     beside = sorted(name for name in bare if (scenario.folder / name).is_file())
-    paths = _own_fmus(sorted(bare.difference(beside)), compiles(scenario.native), warnings)
+    paths = _own_fmus(sorted(bare.difference(beside)), scenario, warnings)
     for name in beside:
         try:
-            paths |= _own_fmus([name], compiles(scenario.native), warnings)
+            paths |= _own_fmus([name], scenario, warnings)
             warnings.append(f"'{name}' beside the scenario is not used; './{name}' would mean that file")
         except InputError:
             paths[name] = scenario.folder / name
@@ -43,13 +45,24 @@ def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     return found
 
 
-def _own_fmus(names: Sequence[str], native: bool, warnings: list[str]) -> dict[str, Path]:
-    """Paths of the project's own FMUs, built if need be; compiled ones where the scenario wants them."""
+def _own_fmus(names: Sequence[str], scenario: Scenario, warnings: list[str]) -> dict[str, Path]:
+    """Paths of the project's own FMUs for a scenario, built if need be."""
     if not names:
         return {}
-    options = ("--native",) if native else ()
+    options = builder_options(scenario, compiles(scenario.native))
     built = run_builder(*options, "--", *names, warnings=warnings)
     return dict(zip(names, map(Path, built), strict=True))
+
+
+def builder_options(scenario: Scenario, native: bool) -> list[str]:
+    """What the builder is told of the FMUs of a scenario.
+
+    Args:
+        scenario: names the ship.
+        native: whether to compile.
+    """
+    ship = [] if scenario.ship == USUAL_SHIP else [f"--ship={scenario.ship_source}"]
+    return ["--native", *ship] if native else ship
 
 
 def run_builder(*arguments: str | Path, warnings: list[str] | None = None) -> list[str]:

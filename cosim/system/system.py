@@ -7,6 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import Model, Value, Variable
+from ..formats.outline import Outline, read_outline
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -83,6 +84,12 @@ class System:
     def native(self) -> bool | None:
         """Whether the project's own FMUs are compiled; None where there are none."""
         return self.models[self.own[0]].is_native if self.own else None
+
+    @property
+    def outline(self) -> Outline | None:
+        """The ship to draw: that of the first FMU which says so."""
+        outlines = (read_outline(model.annotations) for model in self.models.values())
+        return next((outline for outline in outlines if outline is not None), None)
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

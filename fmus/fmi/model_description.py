@@ -4,9 +4,10 @@ import uuid
 from xml.etree.ElementTree import Element, SubElement
 
 from ..base_units import base_exponents
-from ..declare import Component, Variable, width
+from ..declare import Component, Outline, Variable, width
 from .trace import initial_dependencies, output_dependencies
 
+TOOL = "cybership"  # whose vendor annotations these are
 LOG_CATEGORIES = {
     "logStatusWarning": "A value was refused or replaced.",
     "logStatusError": "A step failed; the state is the one before it.",
@@ -60,6 +61,8 @@ def model_description(
     for name, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=text)
     SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize="0.01")
+    if component.outline is not None:
+        _annotation(root, component.outline)
     _variables(root, component)
     return root
 
@@ -69,6 +72,13 @@ def _units(root: Element, component: Component) -> None:
     for unit in sorted({v.unit for v in component.variables}):
         exponents = {base: str(e) for base, e in base_exponents(unit).items()}
         SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
+
+
+def _annotation(root: Element, outline: Outline) -> None:
+    """What tools draw of the ship: corners ``forward,starboard`` [m] with blanks between."""
+    tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
+    corners = " ".join(f"{x!r},{y!r}" for x, y in outline.corners)
+    SubElement(tool, "Ship", name=outline.name, length=repr(outline.length), outline=corners)
 
 
 def _variables(root: Element, component: Component) -> None:

@@ -166,7 +166,8 @@ def find_ship(name: str | Path) -> Path:
     path = Path(name)
     if path.suffix == ".toml":
         if not path.is_file():
-            raise DeclarationError(f"no such description of a ship: '{path}'")
+            hint = nearest(path.name, [p.name for p in path.parent.glob("*.toml")])
+            raise DeclarationError(f"no such description of a ship: '{path}'{hint}")
         return path
     for folder in FOLDERS:
         if (folder / f"{name}.toml").is_file() and Path(str(name)).name == str(name):

@@ -11,6 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import (
     FIXED,
     Component,
+    Outline,
     Variable,
     bundle,
     group_of,
@@ -38,6 +39,7 @@ from ..hull import (
 )
 from ..hull_functions import FUNCTIONS
 from ..ops import Number, finite, when, wrap
+from ..scale import REFERENCE_LENGTH
 from ..ship_description import Description, Part, Value
 from ..signals import Force, Measurement, Velocity
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
@@ -45,6 +47,14 @@ from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 _TOWED = len(TowedDamping._fields)
 _ROTATIONAL = _TOWED + len(RotationalDamping._fields)
 _EXTRA = _ROTATIONAL + len(ExtraDamping._fields)
+
+
+# As long and wide as the waterline of the model ship.
+CSE1_OUTLINE = Outline(
+    "cse1",
+    REFERENCE_LENGTH,
+    ((0.5525, 0.0), (0.2431, 0.124), (-0.5525, 0.10416), (-0.5525, -0.10416), (0.2431, -0.124)),
+)
 
 
 class Start(NamedTuple):
@@ -345,6 +355,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         hold_nonfinite=False,
         prepare=prepare,
         prepared_step=prepared_step,
+        outline=CSE1_OUTLINE if ship is None else ship.drawn,
     )
 
 

@@ -1,0 +1,44 @@
+"""The ship that an FMU is the hull of: an annotation in its model description says how to draw it."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element
+
+SHIP = "Tool[@name='cybership']/Ship"  # among the vendor annotations
+MOST_CORNERS = 1000
+
+
+class Outline(NamedTuple):
+    """A ship as it is drawn.
+
+    Attributes:
+        name: of the ship.
+        length: between perpendiculars [m].
+        corners: (forward, to starboard) [m, m] of the waterline, from the point that poses are of.
+    """
+
+    name: str
+    length: float
+    corners: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def read(cls, told: Mapping[str, Any]) -> "Outline | None":
+        """An outline from the entries of JSON; None if these are of none."""
+        try:
+            corners = tuple((float(x), float(y)) for x, y in told["corners"])
+            made = cls(str(told["name"]), float(told["length"]), corners)
+        except (KeyError, TypeError, ValueError):
+            return None
+        numbers = [made.length, *(number for corner in corners for number in corner)]
+        usable = 3 <= len(corners) <= MOST_CORNERS and all(map(math.isfinite, numbers))
+        return made if usable and made.length > 0.0 else None
+
+
+def read_outline(annotations: Element | None) -> Outline | None:
+    """The outline in the vendor annotations of an FMU; None where there is none."""
+    ship = None if annotations is None else annotations.find(SHIP)
+    if ship is None:
+        return None
+    corners = [corner.split(",") for corner in ship.get("outline", "").split()]
+    return Outline.read({**ship.attrib, "corners": corners})
