@@ -1,5 +1,6 @@
 """Files that describe ships: what is wrong with one is told in one line, and never ends in a traceback."""
 
+import json
 import re
 from contextlib import suppress
 from pathlib import Path
@@ -10,9 +11,12 @@ from hypothesis import strategies as st
 from support.command import command
 from support.project import ROOT
 
+from fmus.actuators.law import Law
 from fmus.build.__main__ import main
-from fmus.declare import DeclarationError
+from fmus.declare import DeclarationError, parameters_of, variables
+from fmus.hull_functions import FUNCTIONS
 from fmus.ship import ship
+from fmus.ships.__main__ import main as schema_main
 from fmus.ships.ship_file import Term, read_ship, shipped_ships
 
 RIGHT = """
@@ -200,3 +204,55 @@ def test_shipped_ships_say_where_their_numbers_come_from(name: str) -> None:
     limits = ("n_max", "n_min", "delta_max", "alpha_max")
     for v in (*found.inertia, *found.terms, *parts):
         assert v.value == 0.0 or v.name in limits or v.origin != "guessed", v.name
+
+
+PAGE = (ROOT / "docs" / "ship.md").read_text(encoding="utf-8")
+
+
+def test_published_schema_is_that_of_the_code() -> None:
+    printed = command(schema_main).stdout
+    assert (ROOT / "docs" / "ship.schema.json").read_text(encoding="utf-8") == printed
+    json.loads(printed)
+
+
+def test_the_page_shows_what_is_in_the_file_of_the_otter() -> None:
+    blocks = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    shown = [line for block in blocks for line in block.splitlines()]
+    shipped = (ROOT / "ships" / "otter.toml").read_text(encoding="utf-8")
+    assert len(shown) > 30
+    assert not [line for line in shown if line.partition(" = ")[0] != "source" and line not in shipped]
+
+
+@pytest.mark.parametrize("law", Law.known)
+def test_the_page_has_the_parameters_of_a_law_with_their_units(law: str) -> None:
+    (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{law}` |")]
+    _, commands, _, numbers = row.split(" | ")
+    assert re.findall(r"`(\w+)`", commands) == [c.name for c in Law.known[law].commands]
+    told = {
+        name: unit
+        for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) \[(.+?)\]", numbers)
+        for name in re.findall(r"`(\w+)`", names)
+    }
+    assert told == {v.name: v.unit for v in variables(Law.known[law].Parameters)}
+
+
+def test_the_page_has_the_parameters_of_each_function() -> None:
+    for name, function in FUNCTIONS.items():
+        (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| `{name}` |")]
+        for v in parameters_of(name, 3, function):
+            assert f"`{v.name}` [{v.unit}]" in row
+
+
+def test_python_of_the_page_ship_md_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (text,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    exec(compile(text, "ship.md", "exec"), {})
+    assert capsys.readouterr().out.strip() == re.findall(r"print\(.*# (.*)", text)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_ships())
+def test_shipped_ships_are_built(name: str, tmp_path: Path) -> None:
+    path = ROOT / "ships" / f"{name}.toml"
+    done = command(main, "--ship", path, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {"vessel.fmu", "thrusters.fmu", "controller_bs.fmu"} <= {p.name for p in tmp_path.iterdir()}

@@ -1,6 +1,5 @@
 """Reads the description of a ship: a TOML file, checked as a whole before anything is made of it."""
 
-import json
 import keyword
 import re
 from collections.abc import Mapping
@@ -142,7 +141,7 @@ class ShipTable(Strict):
         [], description="corners of the waterline, forward and to starboard of the origin [m, m]"
     )
     allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
-    inertia: dict[str, Given]
+    inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
     hull: HullTable = HullTable()
     actuators: list[ActuatorTable] = []
 
@@ -345,8 +344,3 @@ def _checked(where: str, name: str, given: Any) -> "float | Number":
         return TypeAdapter(Given).validate_python(given)
     except ValidationError as error:
         raise DeclarationError(f"{where}: {name}: {_told(error)}") from None
-
-
-def schema_text() -> str:
-    """The published schema of a ship's description."""
-    return json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n"
