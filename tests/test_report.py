@@ -34,6 +34,8 @@ from diagnosis.report import (
 from diagnosis.report.content import coefficients
 from diagnosis.report.profiles import QUANTITIES, binned_errors, heading
 from fmus.effects import STANDARD
+from fmus.ship import ship
+from fmus.ships.naming import described_ship
 
 HIDDEN = {"thrust_curve_deadband": 0.1, "thrust_curve_astern": -0.3}
 EVIL = "<script>alert(1)</script> & $x_1$ \" id=\"body' onload='x"
@@ -542,17 +544,20 @@ def test_all_coefficients_before_and_after_as_files(evaluations, tmp_path):
     assert r"vessel.Y\_r" in text
 
 
-def test_ships_have_their_own_length_where_they_fit(data):
-    """On a track of some metres; within a window of centimetres there is none."""
-    for spread, fits in ((3.0, True), (0.3, False)):
+@pytest.mark.parametrize("name", ["cse1", "otter"])
+def test_ships_have_their_own_outline_where_it_fits(name):
+    """On a track of some lengths; within a window of a third of a length there is none."""
+    craft = ship(description=described_ship(name))
+    outline = np.array(craft.vessel.outline.corners)
+    for lengths, fits in ((3.0, True), (0.3, False)):
+        spread = lengths * craft.vessel.outline.length
         _, panel = tracks._map(np.array([[0.0, 0.0], [spread, spread]]))
-        tracks._ships(panel, np.array([[1.0, 2.0, 0.5]]))
+        tracks._ships(panel, np.array([[1.0, 2.0, 0.5]]), craft)
         assert bool(panel.patches) is fits
-        for ship in panel.patches:
-            corners = ship.get_xy()
-            assert np.linalg.norm(corners[:, None] - corners, axis=2).max() == pytest.approx(
-                1.105, rel=0.01
-            )
+        for drawn in panel.patches:
+            corners = drawn.get_xy()[:-1]  # closed
+            apart = [np.linalg.norm(c[:, None] - c, axis=2) for c in (corners, outline)]
+            assert apart[0] == pytest.approx(apart[1])
 
 
 def test_a_fall_stands_below_its_numbers_and_not_in_a_column_of_its_own(report):

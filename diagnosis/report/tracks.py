@@ -7,6 +7,7 @@ import numpy as np
 
 from cosim.results import hulls
 from fmus.ops import wrap
+from fmus.ship import Ship
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
@@ -44,7 +45,7 @@ def track(e: Evaluation, learned: bool) -> "Figure":
             panel.plot(east, north, color=colour, lw=1.0, alpha=0.85, label=label)
         starts = measured[np.r_[0, breaks(window)]]
         panel.plot(starts[:, 1], starts[:, 0], ".", color=INK, ms=4.0)
-        _ships(panel, starts, e)
+        _ships(panel, starts, e.model.ship)
     legend(figure, panel, 3)
     return figure
 
@@ -158,7 +159,7 @@ def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
         panel.plot(predicted[-1:, 1], predicted[-1:, 0], "o", color=colour, ms=4.5)
     panel.plot(measured[:1, 1], measured[:1, 0], ".", color=INK, ms=8.0)
     panel.plot(measured[-1:, 1], measured[-1:, 0], "o", color=INK, ms=4.5, mfc="none")
-    _ships(panel, measured[[0, -1]], e)
+    _ships(panel, measured[[0, -1]], e.model.ship)
     legend(figure, panel, 3)
     return figure
 
@@ -203,10 +204,10 @@ def _models(e: Evaluation, learned: bool) -> list[tuple[PredictionError, str, st
     return [(e.before, BEFORE, "before"), (e.after, AFTER, "after")]
 
 
-def _ships(panel: "Axes", poses: np.ndarray, e: Evaluation) -> None:
+def _ships(panel: "Axes", poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim()))
-    outline = e.model.ship.vessel.outline
+    outline = of.vessel.outline
     for corners in () if outline is None else hulls(poses, outline.corners):
         if np.ptp(corners, axis=0).max() < SHIP * room:
             panel.fill(*corners.T, fc="none", ec=INK, lw=0.5, alpha=0.4)
