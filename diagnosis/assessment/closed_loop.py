@@ -1,7 +1,7 @@
 """Closed-loop simulation of a model on the reference paths, in one process and without files.
 
 A ship of another size sails the paths of its size, held by the same controller with gains of its size:
-what observer, controller and path get and give is scaled by Froude's law (:mod:`fmus.scale`).
+observer, controller and path are made for it (:mod:`fmus.ships.sizing`).
 
 Vessel and thrusters have the parameters of a model; observer, controller and paths are those of
 ``scenarios/ellipse.json`` and ``scenarios/eight.json``, without noise and freezes.
@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs as ControllerInputs
-from fmus.declare import Component, flatten, rebuild, variables
+from fmus.declare import Component, flatten, rebuild
 from fmus.guidance import eight, ellipse
 from fmus.native.python_text import function
 from fmus.native.tape import Kernels, Tape
@@ -77,51 +77,38 @@ def closed_loop(
 ) -> tuple[Loop, Callable[[Loop, float], tuple[Loop, Number]]]:
     """A closed loop at its start, and the function that advances it by STEP.
 
-    That function gets the time [s] since controller and thrusters acted last, as CyberShip Enterprise 1
-    would count it, and gives the distance [m] between the ship and its target as well.
+    That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
+    between the ship and its target as well.
     """
-    scale = model.ship.scale
-    length, time = scale.length, scale.time
+    length, h_path = model.ship.scale.length, STEP * model.ship.scale.time
     start = {name: length * x for name, x in reference.start.items()}
     ship = _Part(model.ship.vessel, {**model.vessel, **start})
-
-    def serving(component: Component, **values: float) -> _Part:
-        """A component made for the ship, at the size of CyberShip Enterprise 1."""
-        made = model.ship.serving(component)
-        own = {v.name: v.start / scale.factor(v.unit) for v in variables(made.params)}
-        return _Part(made, own | values)
-
-    # At that size, as the law feeds the position error back by 1 N/m, Table 4.2.
-    path, observer = serving(reference.guidance), serving(mdf.COMPONENT, **OBSERVER_WEIGHTS)
-    controller = serving(adaptive.COMPONENT)
+    serving = model.ship.serving
+    path = _Part(serving(reference.guidance), {})
+    observer = _Part(serving(mdf.COMPONENT), OBSERVER_WEIGHTS)
+    controller = _Part(serving(adaptive.COMPONENT), {})
     drive = _Part(model.ship.thrusters, model.thrusters)
     s, vessel = ship.begin(Force())
     g, target = path.begin(Nothing())
-
-    def seen(pose: Measurement) -> Measurement:
-        return Measurement(pose.x_m / length, pose.y_m / length, pose.psi_m)
-
-    pose = seen(vessel.measured)
-    measured = ObserverInputs(pose, Force())
+    measured = ObserverInputs(vessel.measured, Force())
     o, estimate = observer.begin(measured)
     c, _ = controller.begin(ControllerInputs(estimate, target))
     t, _ = drive.begin(ThrusterInputs())
-    late = max(1, 1 + round(model.clock / (STEP * time)))
-    first = Loop((s, g, o, c, t), Velocity(*vessel.velocity), target, estimate, (pose,) * late)
+    late = max(1, 1 + round(model.clock / h_path))
+    velocity = Velocity(*vessel.velocity)
+    first = Loop((s, g, o, c, t), velocity, target, estimate, (vessel.measured,) * late)
 
     def step(now: Loop, h: float) -> tuple[Loop, Number]:
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
-        wanted = Force(*(x * f for x, f in zip(demand.tau, scale.forces, strict=True)))
-        t, thrust = drive.advance(t, ThrusterInputs(wanted, now.velocity), h * time)
+        t, thrust = drive.advance(t, ThrusterInputs(demand.tau, now.velocity), h)
         acting = Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
-        s, vessel = ship.advance(s, acting, STEP * time)
-        g, target = path.advance(g, Nothing(), STEP)
-        x, y = vessel.pose.x - length * target.x_t, vessel.pose.y - length * target.y_t
-        poses = (*now.poses[1:], seen(vessel.measured))
-        given = thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N
-        commanded = Force(*(x / f for x, f in zip(given, scale.forces, strict=True)))
-        o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), STEP)
+        s, vessel = ship.advance(s, acting, h_path)
+        g, target = path.advance(g, Nothing(), h_path)
+        x, y = vessel.pose.x - target.x_t, vessel.pose.y - target.y_t
+        poses = (*now.poses[1:], vessel.measured)
+        commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
+        o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), h_path)
         velocity = Velocity(*vessel.velocity)
         return Loop((s, g, o, c, t), velocity, target, estimate, poses), sqrt(x * x + y * y)
 
@@ -152,9 +139,9 @@ def distances(reference: Reference, model: Model) -> Iterator[float]:
     first, step = closed_loop(reference, model)
     now, distance = step(first, 0.0)
     yield distance
-    tape, values = Tape(Kernels()), flatten(now)
+    tape, values, h = Tape(Kernels()), flatten(now), STEP * model.ship.scale.time
     names = [f"s{k}" for k in range(len(values))]
-    after, further = step(rebuild(now, [tape.variable(name) for name in names]), STEP)
+    after, further = step(rebuild(now, [tape.variable(name) for name in names]), h)
     advance = function(tape.recording([*flatten(after), further]), tape.kernels, *names)
     for _ in range(round(reference.seconds / STEP) - 1):
         *values, distance = advance(*values)

@@ -1,9 +1,13 @@
 """Components for a described ship: what they believe of it, and all else to its size."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
-from ..declare import Component, Variable, redeclared, variables
+from ..declare import Component, Variable, flatten, packer, redeclared, variables
 from ..hull import Damping, Inertia
+from ..ops import Number
+from ..scale import Scale
 from ..ship_description import Description
 
 ESTIMATE = "estimate at the start of "
@@ -12,12 +16,16 @@ ESTIMATE = "estimate at the start of "
 def sized(component: Component, ship: Description) -> Component:
     """A component for a ship: parameters that a hull has too are the ship's, the others to its scale.
 
+    The law itself works at the size of CyberShip Enterprise 1: what it gets and gives is converted by
+    Froude's law, so that its constants are to scale, too.
+
     Args:
         component: made for CyberShip Enterprise 1, such as a controller.
         ship: that it is to serve.
     """
     nominal = {v.name: v for v in [*variables(Inertia), *variables(Damping)]}
     given = {name: v.value for name, v in ship.values().items()}
+    scale = ship.scale
 
     def for_ship(v: Variable) -> Variable:
         named = v.description.removeprefix(ESTIMATE)
@@ -25,6 +33,43 @@ def sized(component: Component, ship: Description) -> Component:
         known = name in nominal and nominal[name].unit == v.unit
         if known and (v.start != 0.0 or named == v.description):
             return replace(v, start=given.get(name, 0.0))
-        return ship.scale.of(v)
+        return scale.of(v)
 
-    return replace(component, params=redeclared(component.params, for_ship))
+    params, inputs = (_converted(group, scale, -1) for group in (component.params, component.inputs))
+    outputs = _converted(component.outputs, scale, 1)
+    law = component.prepared_step or component.step
+
+    def init(i: Any, p: Any) -> Any:
+        return component.init(inputs(i), params(p))
+
+    def prepare(p: Any) -> Any:
+        return component.prepared(params(p))
+
+    def prepared_step(s: Any, i: Any, b: Any, h: Number) -> tuple[Any, Any]:
+        s, o = law(s, inputs(i), b, h / scale.time)
+        return s, outputs(o)
+
+    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Any, Any]:
+        return prepared_step(s, i, prepare(p), h)
+
+    return replace(
+        component,
+        params=redeclared(component.params, for_ship),
+        init=init,
+        step=step,
+        prepare=prepare,
+        prepared_step=prepared_step,
+        max_step=None if component.max_step is None else component.max_step * scale.time,
+    )
+
+
+def _converted(group: type[Any], scale: Scale, power: int) -> Callable[[Any], Any]:
+    """The function that converts values of a group from the reference size to a ship's, or back (-1)."""
+    factors = [scale.factor(v.unit) ** power for v in variables(group)]
+    pack = packer(group)
+
+    def convert(values: Any) -> Any:
+        pairs = zip(flatten(values), factors, strict=True)
+        return pack([x if f == 1.0 else x * f for x, f in pairs])
+
+    return convert

@@ -351,7 +351,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         init=init,
         step=step,
         sampled=False,
-        max_step=0.02,
+        max_step=0.02 * (ship.scale.time if ship else 1.0),
         hold_nonfinite=False,
         prepare=prepare,
         prepared_step=prepared_step,
