@@ -65,7 +65,7 @@ def parameters(
     for v in variables(component.params):
         off = 0.0 if wrong is None or v.known is None else WRONG * wrong.standard_normal()
         values[v.name] = v.start * (1.0 + off)
-    return packer(component.params)(list((values | given).values()))
+    return packer(component.params)(list({**values, **given}.values()))
 
 
 def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) -> pd.DataFrame:

@@ -101,6 +101,7 @@ PUBLIC_TO_DIAGNOSIS = (
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
 # components and effects of a user's own. A module without ``__all__`` offers what it defines.
 PUBLIC_OF_FMUS = (
+    "fmus.actuators.response",
     "fmus.build",
     "fmus.declare",
     "fmus.effects",

@@ -56,7 +56,15 @@ def diagnosis_content(
     """
     learned, comparison, prior = diagnosis.learned, diagnosis.comparison, diagnosis.prior
     effects, possibilities = _effects(diagnosis)
-    suspects = [result_keys.SuspectResult.model_validate(x) for x in learned.suspects]
+    suspects = [
+        result_keys.SuspectResult(
+            name=s.name,
+            z=s.z,
+            value=s.value,
+            description=diagnosis.start.declared(s.name).description,
+        )
+        for s in learned.suspects
+    ]
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
         sentence=headline(

@@ -26,7 +26,7 @@ MOST_NAMED = 4  # of the coefficients; chosen
 
 
 def _names(suspects: Sequence[SuspectResult]) -> str:
-    names = [s.name for s in suspects]
+    names = [f"{s.name} ({s.description})" if s.description else s.name for s in suspects]
     more = [f"{len(names) - MOST_NAMED} others"] if len(names) > MOST_NAMED else []
     *most, last = [*names[:MOST_NAMED], *more]
     return f"{', '.join(most)} and {last}" if most else last

@@ -198,11 +198,12 @@ class WithdrawnResult(Part):
 
 
 class SuspectResult(Part):
-    """A nominal coefficient that is likely wrong: its new total, how far off [prior std]."""
+    """A nominal coefficient that is likely wrong: its new total, how far off [prior std], what it is."""
 
     name: str
     z: Number
     value: Number
+    description: str = ""
 
 
 class RankedResult(Part):
