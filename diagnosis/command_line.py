@@ -184,8 +184,8 @@ def _ship_of(options: argparse.Namespace) -> str | None:
         InputError: they are of several ships.
     """
     paths = [path for name in RUNS for path in getattr(options, name, None) or ()]
-    folders = {path: path if path.is_dir() else path.parent for path in paths}
-    told = {path: ship for path, folder in folders.items() if (ship := read_options(folder).ship)}
+    logs = {path: read_options(path if path.is_dir() else path.parent) for path in paths}
+    told = {path: log.ship or log.outline.name for path, log in logs.items() if log.outline}
     ships = dict.fromkeys(told.values())
     if len(ships) > 1:
         each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
@@ -222,7 +222,7 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     with Held() as interrupts:
         interrupts.allow()
         try:
-            if "ship" in options and options.ship is None:
+            if "ship" in vars(options) and options.ship is None:
                 options.ship = _ship_of(options)
             inputs = _place(options)
             with progress(errors) as advance:

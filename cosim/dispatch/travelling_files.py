@@ -32,7 +32,7 @@ class Files:
         self.fmus: dict[str, Model] = {}
         self.identities: dict[str, str] = {}
         # By path, ship, and whether the project's own FMUs are compiled.
-        self._models: dict[tuple[str, str, bool], Model] = {}
+        self._models: dict[tuple[str, str | None, bool], Model] = {}
         self._tables: dict[Path, str] = {}
 
     def read(self, scenarios: Sequence[Scenario]) -> list[str]:
@@ -94,7 +94,7 @@ class Files:
             model.close()
 
 
-def _kind(scenario: Scenario) -> tuple[str, bool]:
+def _kind(scenario: Scenario) -> tuple[str | None, bool]:
     """What else than its name decides which FMU is meant: the ship, and whether it is compiled."""
     return scenario.ship_source, compiles(scenario.native)
 

@@ -16,7 +16,7 @@ class RunOptions(NamedTuple):
         start, stop: the part of the run that its metrics cover [s]; None is unbounded.
         roles: columns that metrics and pictures read.
         outline: of the ship; None where its FMUs do not say.
-        ship: whose FMUs the project's were: a name, or the path of a description; None where not told.
+        ship: whose FMUs the project's were: a name, or the path of a description; None: the usual ship.
     """
 
     start: float | None = None

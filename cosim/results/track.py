@@ -12,6 +12,7 @@ from .canvas import WIDTH, Run, Runs, arrange, blank, grid, legend
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 MAX_PATH = 20000  # points of a trajectory; chosen: many laps need more than a line over time
 OUTLINES = 12  # ships drawn along a path, chosen
@@ -60,7 +61,7 @@ def once(paths: Sequence[Path], size: float) -> Path:
     return np.where(again, np.nan, x), np.where(again, np.nan, y)
 
 
-def hulls(poses: np.ndarray, outline: Sequence[tuple[float, float]]) -> np.ndarray:
+def hulls(poses: np.ndarray, outline: "ArrayLike") -> np.ndarray:
     """The hull from above at some poses.
 
     Args:

@@ -160,10 +160,10 @@ class Scenario(Strict):
     fmus: dict[Annotated[str, AfterValidator(_instance_name)], FmuEntry] = Field(
         min_length=1, description="instances by name"
     )
-    ship: Annotated[str, AfterValidator(_ship_name)] = Field(
-        "cse1",
+    ship: Annotated[str, AfterValidator(_ship_name)] | None = Field(
+        None,
         description="whose FMUs those with a bare name are: a shipped ship, or the .toml file that "
-        "describes one, relative to the scenario",
+        "describes one, relative to the scenario (the usual one)",
     )
     native: bool | Literal["auto"] = Field(
         "auto",
@@ -205,9 +205,11 @@ class Scenario(Strict):
         return self._folder
 
     @property
-    def ship_source(self) -> str:
-        """The ship by its name, or by the whole path of the file that describes it."""
-        return str(self._folder / self.ship) if self.ship.endswith(".toml") else self.ship
+    def ship_source(self) -> str | None:
+        """The ship by its name, or by the whole path of its file; None: the usual one."""
+        if self.ship is None or not self.ship.endswith(".toml"):
+            return self.ship
+        return str(self._folder / self.ship)
 
     @property
     def notes(self) -> list[str]:

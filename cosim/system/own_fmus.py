@@ -12,8 +12,6 @@ from ..fmu.fmu_model import Model
 from ..interrupts import INTERRUPTED
 from ..scenario.schema import Scenario
 
-USUAL_SHIP = Scenario.model_fields["ship"].default
-
 
 def read_models(scenario: Scenario, warnings: list[str]) -> dict[str, Model]:
     """Instance -> FMU; instances of one file share it.
@@ -61,7 +59,7 @@ def builder_options(scenario: Scenario, native: bool) -> list[str]:
         scenario: names the ship.
         native: whether to compile.
     """
-    ship = [] if scenario.ship == USUAL_SHIP else [f"--ship={scenario.ship_source}"]
+    ship = [] if scenario.ship is None else [f"--ship={scenario.ship_source}"]
     return ["--native", *ship] if native else ship
 
 
