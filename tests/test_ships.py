@@ -23,6 +23,7 @@ from fmus import hull_functions
 from fmus.actuators.actuation import actuators, allocate, axes, forces, total
 from fmus.actuators.failings import Working, failings
 from fmus.actuators.law import Flow, Law
+from fmus.actuators.response import at_rest, command_response
 from fmus.declare import group_of, variables
 from fmus.hull import (
     Damping,
@@ -649,3 +650,17 @@ def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
                 states[k], _ = s.vessel.step(states[k], acting, s.vessel.params(), 0.02)
             assert outs[1] == pytest.approx(outs[0], abs=1e-12)
     assert states[1] == pytest.approx(states[0], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(("alpha_max", "way"), [(3.2, 0.4), (3.0, 0.4 - 2.0 * pi)])
+def test_an_azimuth_turns_by_the_shorter_way_where_it_can(alpha_max, way):
+    """From one side of astern to the other: through astern, or all around where a stop is in between."""
+    pod = part("pod", "azimuth", {**AZIMUTH, "x": -0.9, "alpha_max": alpha_max, "alpha_rate": 0.5})
+    drive = ship(description=described(pod)).nominal_drive
+    first, last, h = pi - 0.2, 0.2 - pi, 0.01
+    past, turned = at_rest(drive.effects)._replace(limited=(first, 0.0)), [first]
+    for _ in range(round(abs(way) / 0.5 / h) + 1):
+        past, (alpha, _) = command_response(past, (last, 0.0), drive, h)
+        turned.append(alpha)
+    assert turned[1] - first == pytest.approx(0.5 * h * np.sign(way))
+    assert turned[-1] - first == pytest.approx(way)

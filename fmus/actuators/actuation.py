@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from ..declare import Known, Range, Variable, group_of, variables
 from ..hull import Triple
-from ..ops import Number, clip, fmax, where
+from ..ops import Number, clip, fmax, where, wrap
 from ..ship_description import Description
 from . import laws as laws  # registers the laws
 from .failings import Actuator, Pushing, Working
@@ -82,8 +82,8 @@ def law_of(a: Actuator, values: Any) -> tuple[Any, Any, Any]:
 
 def within(a: Actuator, commands: Sequence[Any], p: Any) -> tuple[Any, ...]:
     """Commands brought within their limits."""
-    limits = a.law.limits(p)
-    return tuple([clip(c, low, high) for c, (low, high) in zip(commands, limits, strict=True)])
+    each = zip(commands, a.law.limits(p), a.round, strict=True)
+    return tuple([clip(wrap(c) if angle else c, low, high) for c, (low, high), angle in each])
 
 
 def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
@@ -286,4 +286,5 @@ def layout(ship: Description) -> Layout:
         allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
         full=lambda p: largest(ship, p.allocation),
         curved=True,
+        round=tuple([angle for a in actuators(ship) for angle in a.round]),
     )

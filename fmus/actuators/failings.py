@@ -5,9 +5,10 @@ parameters end in the name of the actuator.
 """
 
 from collections.abc import Callable
+from math import pi
 from typing import Any, NamedTuple
 
-from ..declare import POSITIVE, Range, Variable
+from ..declare import POSITIVE, Range, Variable, variables
 from ..effects.curve import NODES, interpolate, node_parameters
 from ..effects.effect import Effect, Memory, Search, Wording, effect
 from ..effects.families import Family
@@ -18,6 +19,7 @@ from ..ops import Number, clip, cos, exp, fmax, sin, where
 from ..scale import Scale
 from ..ship_description import Part
 from .law import Flow, Law
+from .response import way
 
 ANY = Range()
 SHARE = Range(-1.0, 1.0)
@@ -81,6 +83,17 @@ class Actuator(NamedTuple):
     def commands(self) -> slice:
         """Where its commands lie among those of the ship."""
         return slice(self.first, self.first + len(self.law.commands))
+
+    @property
+    def round(self) -> tuple[bool, ...]:
+        """For each command whether it is an angle that goes round."""
+        starts = {v.name: v.start for v in variables(self.law.Parameters)}
+        return tuple(
+            [
+                bool(c.angle_limit) and self.part.number(c.angle_limit, starts[c.angle_limit]) >= pi
+                for c in self.law.commands
+            ]
+        )
 
     @property
     def axis(self) -> str:
@@ -423,7 +436,10 @@ def slow(a: Actuator, width: int) -> Effect:
         before: tuple[Any, ...], wanted: tuple[Any, ...], h: Number, lag: Number
     ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         share = 1.0 - exp(-h / fmax(lag, 1e-9))
-        moved = [x + share * (w - x) for x, w in zip(before[own], wanted[own], strict=True)]
+        moved = [
+            x + share * way(x, w, angle)
+            for x, w, angle in zip(before[own], wanted[own], a.round, strict=True)
+        ]
         after = (*wanted[: own.start], *moved, *wanted[own.stop :])
         return after, after
 

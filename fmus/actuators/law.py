@@ -12,11 +12,15 @@ Span = tuple[Any, Any]
 
 
 class Command(NamedTuple):
-    """One command of an actuator."""
+    """One command of an actuator; an angle has the name of the parameter that limits it to either side.
+
+    Where that limit is half a turn or more, the angle goes round by the shorter way.
+    """
 
     name: str
     unit: str
     description: str
+    angle_limit: str = ""
 
 
 class Flow(NamedTuple):

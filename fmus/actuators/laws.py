@@ -192,7 +192,10 @@ class AzimuthThruster(Law):
     """Propeller that turns about a vertical axis: its thrust at a bollard, at an angle from ahead."""
 
     name = "azimuth"
-    commands = (Command("alpha", "rad", "angle of the thrust, from ahead to starboard"), SHAFT_SPEED)
+    commands = (
+        Command("alpha", "rad", "angle of the thrust, from ahead to starboard", "alpha_max"),
+        SHAFT_SPEED,
+    )
     components = "XY"
     limiting = ("n_max", "n_min", "alpha_max")
     Parameters = Azimuth

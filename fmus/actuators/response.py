@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ..effects import EffectSet, Memory
 from ..effects.group import Group, Member, group
 from ..hull import Triple
-from ..ops import Number, clip, when
+from ..ops import Number, clip, when, wrap
 
 
 class Layout(NamedTuple):
@@ -29,6 +29,7 @@ class Layout(NamedTuple):
         placed: ``placed(b, aside, power)``: the thrusters where they are one of two sets, ``aside`` [m]
             to starboard, at a power of the run or None. Only a ship with two sets has it.
         curved: whether forces are not in proportion to what acts.
+        round: for each command whether it is an angle that goes round; empty: none is.
     """
 
     commands: tuple[str, ...]
@@ -39,6 +40,7 @@ class Layout(NamedTuple):
     full: Callable[[Any], Triple]
     placed: Callable[[Any, Any, Any], Any] = lambda b, aside, power: b
     curved: bool = False
+    round: tuple[bool, ...] = ()
 
 
 class ThrusterEffects(NamedTuple):
@@ -142,10 +144,15 @@ def remember(
     return tuple(found), signals
 
 
-def rate_limited(before: Number, wanted: Number, rate: Number, h: Number) -> Number:
+def way(before: Number, wanted: Number, angle: bool) -> Number:
+    """From a command to another one; of an angle that goes round the shorter way [rad]."""
+    return wrap(wanted - before) if angle else wanted - before
+
+
+def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle: bool) -> Number:
     """A command that moves from ``before`` towards the wanted one at no more than ``rate`` a second."""
     most = rate * h
-    return before + clip(wanted - before, -most, most)
+    return before + clip(way(before, wanted, angle), -most, most)
 
 
 def command_response(
@@ -154,10 +161,15 @@ def command_response(
     """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
     memories, given = remember(s.memories, commands, "command", b, h)
     rates = b.params.rate if len(b.params.rate) == len(given) else (b.params.rate[0],) * len(given)
+    angles = b.effects.layout.round or (False,) * len(given)
     given = tuple(
         [
-            when(rate > 0.0, lambda x=x, w=w, rate=rate: rate_limited(x, w, rate, h), lambda w=w: w)
-            for x, w, rate in zip(s.limited, given, rates, strict=True)
+            when(
+                rate > 0.0,
+                lambda x=x, w=w, rate=rate, angle=angle: rate_limited(x, w, rate, h, angle),
+                lambda w=w: w,
+            )
+            for x, w, rate, angle in zip(s.limited, given, rates, angles, strict=True)
         ]
     )
     return Past(s.t + h, memories, given), given
