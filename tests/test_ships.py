@@ -261,7 +261,8 @@ def test_commands_beyond_their_limits_count_as_the_limits(name, data):
         for a, own in zip(actuators(d), values, strict=True)
         for span in a.law.limits(a.law.Parameters._make(own[:-2]))
     ]
-    given = [data.draw(st.floats(-1e3, 1e3)) for _ in limits]
+    goes_round = ship(description=d).layout.round
+    given = [data.draw(st.floats(-3.0, 3.0) if angle else st.floats(-1e3, 1e3)) for angle in goes_round]
     kept = [min(max(c, low), high) for c, (low, high) in zip(given, limits, strict=True)]
     nu = (0.4, 0.1, -0.2)
     assert total(forces(d, given, nu, values)) == total(forces(d, kept, nu, values))
