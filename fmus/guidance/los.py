@@ -10,8 +10,8 @@ of Marine Craft Hydrodynamics and Motion Control, 2nd ed., Wiley, 2021, ch. 12; 
 T. I. Fossen, "Integral LOS path following for curved paths based on a monotone cubic Hermite spline
 parametrization", IEEE Trans. Control Systems Technology 22, 2014). The integral finds the heading that
 holds the ship on the leg in a current; without it (``integral`` = 0, LOS) the ship lies off the leg.
-Delta may grow with the speed. kappa is ``integral`` times the speed wanted: that puts the damping ratio
-of the cross-track error at 0.5 / sqrt(integral), whatever speed and size.
+Delta may grow with the speed. kappa is ``integral`` times the speed wanted: a ship that turns at once
+then has the damping ratio 0.5 / sqrt(integral) in its cross-track error, whatever its speed and size.
 
 The next leg begins inside the circle of acceptance of a way point, or abreast of it; of the integral the
 part across that leg is kept, which is what is known of a current there. With ``loop`` = 1 the last way
