@@ -9,7 +9,8 @@ from support.project import COMPONENTS
 
 from fmus.declare import flatten, packer, variables
 
-GUIDANCE = [name for name in COMPONENTS if name.startswith("guidance_")]
+# Those that follow nothing but time.
+GUIDANCE = [n for n, c in COMPONENTS.items() if n.startswith("guidance_") and not variables(c.inputs)]
 
 
 def follow(name, seconds, h=0.01, **parameters):

@@ -43,9 +43,10 @@ def test_shipped_scenario_runs_through(path, tmp_path):
     result = cosim.simulate(cosim.load_scenario(path), tmp_path, pictures=True)
     assert result.status == "done"
     assert result.warnings == []
-    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind, and what is
-    # not told to the controller of the Otter is its drag.
-    assert result.metrics["e_pos_max"] < (2.5 if path.stem.startswith("otter") else 0.5)
+    # No run loses the ship; the fault of the experiments leaves it a third of a metre behind, what is not
+    # told to the controller of the Otter is its drag, and a new leg begins a circle of acceptance away.
+    most = {"otter_waypoints": 2.5, "otter_los": 8.0}
+    assert result.metrics["e_pos_max"] < most.get(path.stem, 0.5)
     assert len(list(tmp_path.glob("*.png"))) == 5
     assert not list(Path(tmp_path).glob("*.part"))
 

@@ -17,6 +17,7 @@ from support.ships import (
     believed,
     described,
     part,
+    scaled,
 )
 
 from fmus import hull_functions
@@ -37,7 +38,6 @@ from fmus.hull import (
 )
 from fmus.hull_functions import cross_flow
 from fmus.ship import ship
-from fmus.ship_description import Value
 from fmus.ships.ship_file import Term
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import Allocation, thrust
@@ -530,33 +530,6 @@ def test_the_otter_turns_at_the_published_time_constant():
     p = params("otter")
     assert mass_matrix(p.inertia)[2][2] / -damping_force(0.0, 0.0, 1e-6, p.damping)[2] * 1e-6 == (
         pytest.approx(1.0, rel=1e-3)
-    )
-
-
-def scaled(d, ratio):
-    """A ship of another size by Froude's law, number by number."""
-    s = ship(description=d)
-    at = type(d.scale)(ratio)
-    units = {v.name: v.unit for part in (s.vessel, s.thrusters) for v in variables(part.params)}
-
-    def of(values, unit_of):
-        return tuple(Value(v.name, v.value * at.factor(unit_of(v.name)), *v[2:]) for v in values)
-
-    def of_actuator(a, name):
-        command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
-        if command is not None:
-            return f"{command.unit}.1/s" if command.unit == "1" else f"{command.unit}/s"
-        return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
-
-    return d._replace(
-        length=d.length * ratio,
-        inertia=of(d.inertia, units.__getitem__),
-        terms=of(d.terms, units.__getitem__),
-        functions=tuple(f._replace(values=of(f.values, units.__getitem__)) for f in d.functions),
-        actuators=tuple(
-            a.part._replace(values=of(a.part.values, lambda name, a=a: of_actuator(a, name)))
-            for a in actuators(d)
-        ),
     )
 
 

@@ -55,6 +55,7 @@ def sized(component: Component, ship: Description) -> Component:
     return replace(
         component,
         params=redeclared(component.params, for_ship),
+        inputs=redeclared(component.inputs, scale.of),
         init=init,
         step=step,
         prepare=prepare,

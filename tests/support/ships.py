@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from fmus.actuators.actuation import actuators, parameters
-from fmus.declare import Component
+from fmus.declare import Component, variables
 from fmus.ship import ship
 from fmus.ship_description import Description, Part, Value
 from fmus.ships.ship_file import find_ship, read_ship, shipped_ships
@@ -24,6 +24,33 @@ def described(
     found = tuple(Value(name, x, "guessed", 0.5) for name, x in drag.items())
     outline = ((1.0, 0.5), (-1.0, 0.5), (-1.0, -0.5))
     return Description("tried", "a ship", "", 2.0, 1.0, outline, values, found, functions, parts)
+
+
+def scaled(d: Description, ratio: float) -> Description:
+    """A ship of another size by Froude's law, number by number."""
+    s = ship(description=d)
+    at = type(d.scale)(ratio)
+    units = {v.name: v.unit for part in (s.vessel, s.thrusters) for v in variables(part.params)}
+
+    def of(values, unit_of):
+        return tuple(Value(v.name, v.value * at.factor(unit_of(v.name)), *v[2:]) for v in values)
+
+    def of_actuator(a, name):
+        command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
+        if command is not None:
+            return f"{command.unit}.1/s" if command.unit == "1" else f"{command.unit}/s"
+        return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
+
+    return d._replace(
+        length=d.length * ratio,
+        inertia=of(d.inertia, units.__getitem__),
+        terms=of(d.terms, units.__getitem__),
+        functions=tuple(f._replace(values=of(f.values, units.__getitem__)) for f in d.functions),
+        actuators=tuple(
+            a.part._replace(values=of(a.part.values, lambda name, a=a: of_actuator(a, name)))
+            for a in actuators(d)
+        ),
+    )
 
 
 def believed(ship: Description) -> tuple:

@@ -1,0 +1,157 @@
+"""Autopilot: heading by a PID law with a reference model, speed by a PI law; no force in sway.
+
+For ships that cannot push sideways (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion
+Control, 2nd ed., Wiley, 2021, ch. 15). The heading wanted passes a reference model of third order,
+
+    psi_d''' + (2 zeta + 1) w psi_d'' + (2 zeta + 1) w^2 psi_d' + w^3 psi_d = w^3 psi_t,
+
+whose rate settles at no more than ``r_max``: the error that drives it is limited, so nothing winds up.
+The moment is feed-forward of the reference, by the believed yaw inertia m and damping d, and
+
+    tau_N = m w^2 (psi_d - psi) + (2 zeta w m - d) (r_d - r) + integral,
+
+which gives the closed loop the natural frequency w and the damping ratio zeta, unless the hull alone
+damps more. The speed wanted is the target's velocity along its heading; it passes a reference model of
+first order, and the surge force is feed-forward and a PI law of the same kind. All is tuned in
+frequencies, so it fits any ship whose inertia and damping are told.
+
+The integrals follow the force that acts where the thrusters tell it (anti-windup by back-calculation).
+The references start from the ship's own heading, rate and speed, so there is no jolt at the start.
+
+An input that is NaN or infinite keeps its last finite value.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import POSITIVE, Component, Range, group_of, variables
+from ..frames import rotate_to_body
+from ..hull import Damping, Inertia, mass_matrix
+from ..ops import Number, clip, cos, fmax, sin, where, wrap
+from ..signals import Force, Target
+from .backstepping import HELD, Demand, Errors, Inputs, acting
+
+FREQUENCY = Range(0.001, 10.0)
+RATIO = Range(0.1, 10.0)
+OWN_AXIS = ("X_u", "X_absu_u", "X_uuu", "N_r", "N_absr_r")
+KnownDamping = group_of("KnownDamping", [v for v in variables(Damping) if v.name in OWN_AXIS])
+
+
+class Params(NamedTuple):
+    omega_psi: Annotated[float, "rad/s", "natural frequency of the heading", FREQUENCY] = 0.7
+    zeta_psi: Annotated[float, "1", "damping ratio of the heading", RATIO] = 1.0
+    omega_u: Annotated[float, "rad/s", "natural frequency of the speed", FREQUENCY] = 0.3
+    zeta_u: Annotated[float, "1", "damping ratio of the speed", RATIO] = 1.0
+    integral: Annotated[
+        float, "1", "integral gain of the heading, over natural frequency and K_P", Range(0.0, 1.0)
+    ] = 0.1
+    omega_d: Annotated[float, "rad/s", "natural frequency of the heading reference", FREQUENCY] = 1.0
+    zeta_d: Annotated[float, "1", "damping ratio of the heading reference", RATIO] = 1.0
+    r_max: Annotated[float, "rad/s", "rate at which the heading reference settles", POSITIVE] = 0.1
+    omega_u_d: Annotated[float, "rad/s", "pole of the speed reference", FREQUENCY] = 0.2
+    inertia: Inertia = Inertia()
+    damping: Any = KnownDamping()
+
+
+class Reference(NamedTuple):
+    """Heading [rad], yaw rate [rad/s], yaw acceleration, and speed [m/s] to be held."""
+
+    psi: Any = 0.0
+    r: Any = 0.0
+    r_dot: Any = 0.0
+    u: Any = 0.0
+
+
+class State(NamedTuple):
+    """Reference, integral parts of surge force and yaw moment [N, N m], force asked for last."""
+
+    reference: Reference = Reference()
+    surge: Any = 0.0
+    yaw: Any = 0.0
+    tau: Force = Force()
+
+
+class Outputs(NamedTuple):
+    demand: Demand = Demand()
+    psi_d: Annotated[float, "rad", "heading reference, continuous over turns"] = 0.0
+    r_d: Annotated[float, "rad/s", "yaw rate reference"] = 0.0
+    r_d_dot: Annotated[float, "rad/s2", "yaw acceleration reference"] = 0.0
+    u_d: Annotated[float, "m/s", "speed reference"] = 0.0
+
+
+def wanted_speed(t: Target) -> Number:
+    """Velocity of the target along its own heading [m/s]."""
+    return t.x_t_dot * cos(t.psi_t) + t.y_t_dot * sin(t.psi_t)
+
+
+def follow(d: Reference, t: Target, p: Params, h: Number) -> Reference:
+    """The reference after h [s]."""
+    w = p.omega_d
+    k = 2.0 * p.zeta_d + 1.0
+    most = k * p.r_max / w  # the error at which the rate settles at r_max
+    error = clip(wrap(t.psi_t - d.psi), -most, most)
+    jerk = w * (w * (w * error - k * d.r) - k * d.r_dot)
+    r_dot = d.r_dot + h * jerk
+    r = d.r + h * r_dot
+    return Reference(d.psi + h * r, r, r_dot, d.u + h * p.omega_u_d * (wanted_speed(t) - d.u))
+
+
+def law(s: State, i: Inputs, p: Params) -> Outputs:
+    """The force of a state, and what it is made of."""
+    e, t, d, c = i.estimate, i.target, s.reference, p.damping
+    (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
+    turn, r, u = wrap(d.psi - e.psi_hat), d.r - e.r_hat, d.u - e.u_hat
+    K_P_u = fmax(2.0 * p.zeta_u * p.omega_u * m_u + c.X_u, 0.0)
+    K_D = fmax(2.0 * p.zeta_psi * p.omega_psi * m_r + c.N_r, 0.0)
+    K_P = m_r * p.omega_psi * p.omega_psi
+    lX = m_u * p.omega_u_d * (wanted_speed(t) - d.u) + K_P_u * u + s.surge
+    lN = m_r * d.r_dot + K_P * turn + K_D * r + s.yaw
+    nX = 0.0 - (c.X_u + c.X_absu_u * abs(d.u) + c.X_uuu * d.u * d.u) * d.u
+    nN = 0.0 - (c.N_r + c.N_absr_r * abs(d.r)) * d.r
+    ahead, aside = rotate_to_body(e.psi_hat, e.x_hat - t.x_t, e.y_hat - t.y_t)
+    errors = Errors(ahead, aside, 0.0 - turn, 0.0 - u, e.v_hat, 0.0 - r)
+    force = Force(lX + nX, 0.0, lN + nN)
+    return Outputs(
+        Demand(force, lX, 0.0, lN, nX, 0.0, nN, errors, 0.0 - s.surge, 0.0, 0.0 - s.yaw),
+        d.psi,
+        d.r,
+        d.r_dot,
+        d.u,
+    )
+
+
+def init(i: Inputs, p: Params) -> State:
+    e = i.estimate
+    s = State(Reference(e.psi_hat, e.r_hat, 0.0, e.u_hat))
+    return s._replace(tau=law(s, i, p).demand.tau)
+
+
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
+    e = i.estimate
+    d = follow(s.reference, i.target, p, h)
+    acted = acting(i.applied, s.tau)
+    (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
+    w_u, w = p.omega_u, p.omega_psi
+    K_I_u, K_I = m_u * w_u * w_u, p.integral * w * m_r * w * w
+    seen = where(e.frozen > 0.5, 0.0, h)  # of a frozen measurement nothing adds up
+    s = State(
+        d,
+        s.surge + seen * (K_I_u * (d.u - e.u_hat) + w_u * (acted.tau_X - s.tau.tau_X)),
+        s.yaw + seen * (K_I * wrap(d.psi - e.psi_hat) + w * (acted.tau_N - s.tau.tau_N)),
+        s.tau,
+    )
+    out = law(s, i, p)
+    asked = Force(*[where(h > 0.0, new, old) for new, old in zip(out.demand.tau, s.tau, strict=True)])
+    return s._replace(tau=asked), out
+
+
+COMPONENT = Component(
+    name="controller_heading",
+    description="Autopilot: heading and speed, without force in sway",
+    params=Params,
+    state=State,
+    inputs=Inputs,
+    outputs=Outputs,
+    init=init,
+    step=step,
+    held=HELD,
+)
