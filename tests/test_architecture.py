@@ -373,7 +373,6 @@ PARTS = re.compile(
 # What knows CyberShip Enterprise 1: readers of its columns and files, its two propellers with commands of
 # their own, pictures of its effects, and the pages of the thesis' analysis.
 OF_ONE_SHIP = {
-    "cosim.scenario.schema",
     "diagnosis.assessment.command_check",
     "diagnosis.assessment.plausibility",
     "diagnosis.assessment.readings",
