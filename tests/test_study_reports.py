@@ -149,7 +149,7 @@ def test_report_of_chapter_5(tmp_path, monkeypatch, figures, read):
 
     monkeypatch.setattr(chapter5, "run_each", run_each)
     monkeypatch.setattr(chapter5, "run_all", lambda contents, *_: asked.update(dict.fromkeys(contents)))
-    monkeypatch.setattr(chapter5, "draw", lambda logs, folder: drawn.update({folder.name: set(logs)}))
+    monkeypatch.setattr(chapter5, "draw", lambda logs, folder, _: drawn.update({folder.name: set(logs)}))
     text, results = written(chapter5.study(tmp_path, range(5), 60.0, None), tmp_path)
     assert [len(asked["eight", c, FOUR[0]]) for c in ("mdf", "true", "mdf, stale", PRINTED)] == [
         5,
@@ -198,7 +198,7 @@ def test_report_of_chapter_6(tmp_path, monkeypatch, read):
         return found_by(settings, seeds, analyse)
 
     monkeypatch.setattr(chapter6_runs, "run_all", run_all)
-    monkeypatch.setattr(chapter6, "draw", lambda logs, folder: drawn.append((folder.name, set(logs))))
+    monkeypatch.setattr(chapter6, "draw", lambda logs, folder, _: drawn.append((folder.name, set(logs))))
     text, results = written(chapter6.study(tmp_path, range(5), 0.5, 3), tmp_path)
     trials_, rest, spiked, eight, delayed, stores = asked
     assert trials_ == (4 * 2 * 4, [0], tmp_path / "logs", 3), "logs of the first seed stay"
@@ -372,7 +372,7 @@ def test_report_of_the_improved_controller(tmp_path, monkeypatch, figures, read)
 
     monkeypatch.setattr(improved, "run_all", runs)
     monkeypatch.setattr(improved, "run_each", runs)
-    monkeypatch.setattr(improved, "draw", lambda logs, folder: drawn.append(set(logs)))
+    monkeypatch.setattr(improved, "draw", lambda logs, folder, _: drawn.append(set(logs)))
     text, results = written(improved.study(tmp_path, range(3), 198.0, None), tmp_path)
     assert len(results["laps"]["mdf"][improved.IMPROVED]) == 3
     assert len(results["laps"]["true"][improved.IMPROVED]) == 1
