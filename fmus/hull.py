@@ -193,6 +193,12 @@ def term(name: str) -> tuple[int, tuple[tuple[bool, int], ...]]:
     return "XYN".index(found[1]), tuple([(bool(sign), "uvr".index(speed)) for sign, speed in factors])
 
 
+def product(name: str) -> str:
+    """The product of speeds that a coefficient's name tells: of ``X_absu_u`` it is ``|u|u``."""
+    _, factors = term(name)
+    return "".join([f"|{'uvr'[k]}|" if sign else "uvr"[k] for sign, k in factors])
+
+
 def term_variable(name: str) -> Variable:
     """The declaration of the coefficient of a product of speeds."""
     axis, factors = term(name)
@@ -205,9 +211,8 @@ def term_variable(name: str) -> Variable:
     seconds = len(factors)
     force = "N.m" if axis == 2 else "N"
     unit = f"{force}.s{seconds if seconds > 1 else ''}/{f'({below})' if '.' in below else below}"
-    words = "".join([f"|{'uvr'[k]}|" if sign else "uvr"[k] for sign, k in factors])
     what = ("surge force", "sway force", "yaw moment")[axis]
-    return Variable(name, unit, f"{what}, {words}", 0.0)
+    return Variable(name, unit, f"{what}, {product(name)}", 0.0)
 
 
 def term_force(name: str, value: Number, u: Number, v: Number, r: Number) -> Triple:

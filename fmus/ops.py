@@ -164,6 +164,12 @@ def sign(x: Number) -> Number:
     return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
 
 
+def signed_root(x: Number) -> Number:
+    """The number whose square, with its sign, is x."""
+    size = sqrt(abs(x))
+    return where(x < 0.0, -size, size)
+
+
 def power(x: Number, exponent: Number) -> Number:
     """x^exponent of x >= 0 and an exponent > 0 that need be no whole number."""
     return exp(exponent * log(fmax(x, TINY)))

@@ -18,6 +18,7 @@ Columns that it does not name keep their names and SI units.
 
 import codecs
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -49,7 +50,7 @@ UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
     "command": {"1": 1.0, "%": 1e-2},
-    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.15915494309189535},
+    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
 }
 # Quantity of a described ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}

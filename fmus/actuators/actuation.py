@@ -9,7 +9,7 @@ from ..hull import Triple
 from ..ops import Number, clip, fmax, where, wrap
 from ..ship_description import Description
 from . import laws as laws  # registers the laws
-from .failings import Actuator, Pushing, Working
+from .failings import Actuator, Pushing, Working, goes_round
 from .law import Flow, Law
 from .response import Layout, Prepared
 
@@ -25,7 +25,7 @@ def actuators(ship: Description) -> tuple[Actuator, ...]:
     first = 0
     for k, part in enumerate(ship.actuators):
         law = Law.known[part.law]
-        found.append(Actuator(k, first, part, law, ship.scale))
+        found.append(Actuator(k, first, part, law, ship.scale, goes_round(part, law)))
         first += len(law.commands)
     return tuple(found)
 
@@ -237,7 +237,7 @@ def _least(columns: Sequence[Sequence[Any]], weights: Sequence[Any], wanted: Seq
 
 
 def sum_of(values: Sequence[Any]) -> Any:
-    """The sum of some numbers, from the first to the last."""
+    """The sum of some numbers, one after the other: ``sum`` compensates floats from Python 3.12 on."""
     found: Any = 0.0
     for x in values:
         found = found + x

@@ -5,24 +5,24 @@ parameters end in the name of the actuator.
 """
 
 from collections.abc import Callable
-from math import pi
+from math import degrees, pi
 from typing import Any, NamedTuple
 
 from ..declare import POSITIVE, Range, Variable, variables
+from ..effects.actuator import SHARE, limited, reduced
 from ..effects.curve import NODES, interpolate, node_parameters
 from ..effects.effect import Effect, Memory, Search, Wording, effect
 from ..effects.families import Family
-from ..effects.outages import inside, outage_parameters, pairs_of, spans
+from ..effects.outages import INSTANT, inside, outage_parameters, pairs_of, spans
 from ..effects.text import Found, lost, number, peak, percent, towards
-from ..effects.thruster_dynamics import FORGOTTEN, LONGEST, TIMES
-from ..ops import Number, clip, cos, exp, fmax, sin, where
+from ..effects.thruster_dynamics import FORGOTTEN, LONGEST, TIMES, share_reached
+from ..ops import Number, cos, fmax, sin, where
 from ..scale import Scale
 from ..ship_description import Part
 from .law import Flow, Law
 from .response import way
 
 ANY = Range()
-SHARE = Range(-1.0, 1.0)
 # Shares of full force, or of the effect of full speed, to try.
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
 SPEED_LOSSES = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 15.0)  # s/m at the size of the reference ship
@@ -70,30 +70,39 @@ def pushed(f: Pushing, k: int, X: Any, Y: Any) -> Pushing:
     return f._replace(X=with_one(f.X, k, X), Y=with_one(f.Y, k, Y))
 
 
+def scaled(f: Pushing, k: int, gain: Any) -> Pushing:
+    """The forces with those of actuator k times a gain."""
+    return pushed(f, k, f.X[k] * gain, f.Y[k] * gain)
+
+
+def stopped(f: Pushing, k: int, dead: Any) -> Pushing:
+    """The forces without those of actuator k where it is dead."""
+    return pushed(f, k, where(dead, 0.0, f.X[k]), where(dead, 0.0, f.Y[k]))
+
+
 class Actuator(NamedTuple):
-    """An actuator of a ship: its number, its first command, its description, and its ship's size."""
+    """An actuator of a ship.
+
+    Attributes:
+        k: its number.
+        first: number of its first command among those of the ship.
+        part: its description.
+        law: that it follows.
+        scale: of its ship.
+        round: for each of its commands whether it is an angle that goes round.
+    """
 
     k: int
     first: int
     part: Part
     law: type[Law]
     scale: Scale
+    round: tuple[bool, ...]
 
     @property
     def commands(self) -> slice:
         """Where its commands lie among those of the ship."""
         return slice(self.first, self.first + len(self.law.commands))
-
-    @property
-    def round(self) -> tuple[bool, ...]:
-        """For each command whether it is an angle that goes round."""
-        starts = {v.name: v.start for v in variables(self.law.Parameters)}
-        return tuple(
-            [
-                bool(c.angle_limit) and self.part.number(c.angle_limit, starts[c.angle_limit]) >= pi
-                for c in self.law.commands
-            ]
-        )
 
     @property
     def axis(self) -> str:
@@ -112,6 +121,13 @@ class Actuator(NamedTuple):
             f"the {title} alone, at several commands, at rest and at speed",
             {title: f"the {title} at rest and at speed, small and large commands"},
         )
+
+
+def goes_round(part: Part, law: type[Law]) -> tuple[bool, ...]:
+    """For each command of an actuator whether it is an angle that goes round."""
+    starts = {v.name: v.start for v in variables(law.Parameters)}
+    limits = [c.angle_limit for c in law.commands]
+    return tuple([bool(name) and part.number(name, starts[name]) >= pi for name in limits])
 
 
 def declared(
@@ -155,7 +171,7 @@ def loss(a: Actuator) -> Effect:
         description=f"force lost by the {title}",
     )
     def function(f: Pushing, now: Working, share: Number) -> Pushing:
-        return pushed(f, k, f.X[k] * (1.0 - share), f.Y[k] * (1.0 - share))
+        return scaled(f, k, 1.0 - share)
 
     return function
 
@@ -181,8 +197,7 @@ def speed_loss(a: Actuator) -> Effect:
         description=f"{title} less effective with surge speed",
     )
     def function(f: Pushing, now: Working, slope: Number) -> Pushing:
-        left = fmax(0.0, 1.0 - slope * abs(now.u))
-        return pushed(f, k, f.X[k] * left, f.Y[k] * left)
+        return scaled(f, k, fmax(0.0, 1.0 - slope * abs(now.u)))
 
     return function
 
@@ -206,8 +221,7 @@ def failure(a: Actuator) -> Effect:
         description=f"{title} dead from a time on",
     )
     def function(f: Pushing, now: Working, since: Number) -> Pushing:
-        dead = (since > 0.0) & (now.t >= since - 1e-9)
-        return pushed(f, k, where(dead, 0.0, f.X[k]), where(dead, 0.0, f.Y[k]))
+        return stopped(f, k, (since > 0.0) & (now.t >= since - INSTANT))
 
     return function
 
@@ -231,8 +245,7 @@ def outage(a: Actuator) -> Effect:
         description=f"{title} dead during intervals",
     )
     def function(f: Pushing, now: Working, *intervals: Number) -> Pushing:
-        dead = inside(now.t, intervals)
-        return pushed(f, k, where(dead, 0.0, f.X[k]), where(dead, 0.0, f.Y[k]))
+        return stopped(f, k, inside(now.t, intervals))
 
     return function
 
@@ -252,9 +265,6 @@ def clipped(a: Actuator) -> list[Effect]:
     if full == 0.0:
         return []
     band, limit = f"deadband_{a.part.name}", f"saturation_{a.part.name}"
-
-    def reduced(f: Number, d: Number) -> Number:
-        return f - clip(f, -d, d)
 
     @declared(
         a,
@@ -288,8 +298,7 @@ def clipped(a: Actuator) -> list[Effect]:
         description=f"real limit of the {title}, lower than that of its commands",
     )
     def saturation(f: Pushing, now: Working, most: Number) -> Pushing:
-        kept = [where(most > 0.0, clip(g, -most, most), g) for g in (f.X[k], f.Y[k])]
-        return pushed(f, k, *kept)
+        return pushed(f, k, limited(f.X[k], most), limited(f.Y[k], most))
 
     return [dead_band, saturation]
 
@@ -333,7 +342,7 @@ def turned(a: Actuator) -> Effect:
         "XYN",
         parameter(name, "rad", f"angle of the {title}'s force to starboard of the assumed one", SHARE),
         lambda f: (
-            f"The {title} pushes {57.29578 * abs(f[name]):.3g}° to "
+            f"The {title} pushes {degrees(abs(f[name])):.3g}° to "
             f"{'starboard' if f[name] > 0.0 else 'port'} of where the model believes."
         ),
         formula="(X cos a - Y sin a, Y cos a + X sin a)",
@@ -406,8 +415,7 @@ def curve(a: Actuator) -> Effect:
     )
     def function(f: Pushing, now: Working, *values: Number) -> Pushing:
         *heights, span = values
-        gain = 1.0 + interpolate(now.part[place], -span, span, heights)
-        return pushed(f, k, f.X[k] * gain, f.Y[k] * gain)
+        return scaled(f, k, 1.0 + interpolate(now.part[place], -span, span, heights))
 
     return function
 
@@ -435,7 +443,7 @@ def slow(a: Actuator, width: int) -> Effect:
     def function(
         before: tuple[Any, ...], wanted: tuple[Any, ...], h: Number, lag: Number
     ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        share = 1.0 - exp(-h / fmax(lag, 1e-9))
+        share = share_reached(h, lag)
         moved = [
             x + share * way(x, w, angle)
             for x, w, angle in zip(before[own], wanted[own], a.round, strict=True)

@@ -3,7 +3,7 @@
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Range
-from ..ops import Number, atan2, clip, cos, fmax, fmin, power, sin, sqrt, where
+from ..ops import Number, atan2, clip, cos, fmax, fmin, power, signed_root, sin, sqrt, where
 from .law import Command, Flow, Law, Span
 
 DIVISOR = Range(min=1e-6)
@@ -11,12 +11,6 @@ ASTERN = Range(max=0.0)
 SMALL = 1e-12  # in place of zero, by which nothing can be divided
 QUARTER = 1.5707963267948966  # of a turn [rad]
 SHAFT_SPEED = Command("n", "1/s", "shaft speed")
-
-
-def signed_root(x: Number) -> Number:
-    """The number whose square with its sign is x."""
-    size = sqrt(abs(x))
-    return where(x < 0.0, -size, size)
 
 
 class Bollard(NamedTuple):
@@ -79,17 +73,11 @@ class OpenWater(NamedTuple):
     n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
-class OpenWaterPropeller(Law):
+class OpenWaterPropeller(FixedPropeller):
     """Propeller with an open-water curve, wake and thrust deduction (Yasukawa and Yoshimura 2015)."""
 
     name = "open_water_propeller"
-    commands = (SHAFT_SPEED,)
-    components = "X"
     Parameters = OpenWater
-
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
-        return ((p.n_min, p.n_max),)
 
     @staticmethod
     def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:

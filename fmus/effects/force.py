@@ -1,11 +1,10 @@
 """Forces by the ship's motion: a change of each damping coefficient, and a free curve over speed."""
 
-import re
 from collections.abc import Callable
 from math import degrees
 
 from ..declare import Range, Variable, packer, variables, width
-from ..hull import Damping, Triple, damping_force, term_force
+from ..hull import Damping, Triple, damping_force, product, term_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
 from .effect import Effect, Motion, Search, Wording, effect
@@ -55,11 +54,6 @@ MOTION = {
     "rv": "Turning while drifting sideways",
     "ruv": "Turning while going ahead and drifting sideways",
 }
-
-
-def product(field: str) -> str:
-    """The product that a coefficient's name tells: ``absu_u`` of ``X_absu_u`` is ``|u|u``."""
-    return re.sub(r"abs(.)_?", r"|\1|", field.partition("_")[2])
 
 
 def change(k: int, ship: Motion, delta: Number) -> Triple:

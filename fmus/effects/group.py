@@ -1,9 +1,9 @@
 """Effects that act together in one component: their parameters as one NamedTuple class."""
 
 from collections.abc import Iterable
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from ..declare import Variable, vector
+from ..declare import Variable, group_of
 from ..ops import Number, when
 from .effect import Effect
 
@@ -59,10 +59,7 @@ def group(typename: str, chosen: Iterable[Effect]) -> Group:
         found += e.parameters
         which = tuple(k for k, p in enumerate(e.parameters, first) if p.name in e.coefficients)
         members.append(Member(e, slice(first, len(found)), which))
-    fields = [(p.name, p.unit, p.description, p.start) for p in found]
-    made = vector(typename, fields)
-    made.__annotations__ = {p.name: Annotated[(float, p.unit, p.description, p.range)] for p in found}
-    return Group(made, tuple(members))
+    return Group(group_of(typename, found), tuple(members))
 
 
 def _any(coefficients: Iterable[int], values: Any) -> Number:

@@ -16,6 +16,11 @@ FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier comman
 LONGEST = Range(0.0, 60.0)  # s
 
 
+def share_reached(h: Number, lag: Number) -> Number:
+    """Share of its way that a first-order lag [s] has gone after h [s], for an input that is held."""
+    return 1.0 - exp(-h / fmax(lag, 1e-9))
+
+
 @effect(
     "lag",
     "actuator",
@@ -51,7 +56,7 @@ def lag(
     lag: Annotated[float, "s", "first-order lag of all thrusters", LONGEST] = 0.0,
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """First-order lag, exact at the step's end for an input that is held over it."""
-    share = 1.0 - exp(-h / fmax(lag, 1e-9))
+    share = share_reached(h, lag)
     after = tuple([x + share * (w - x) for x, w in zip(before, wanted, strict=True)])
     return after, after
 

@@ -17,7 +17,8 @@ from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclare
 from ..effects import EffectSet
 from ..ops import Number, finite, when
 from ..ship_description import Description
-from ..signals import Force, Velocity
+from ..signals import Velocity
+from .chain import Inputs
 
 
 class Applied(NamedTuple):
@@ -80,7 +81,7 @@ def described(effects: EffectSet, ship: Description) -> Component:
     )
     commands: Any = commands_of(ship)
     if ship.allocates:
-        inputs = bundle("Inputs", request=Force(), velocity=Velocity())
+        inputs: type[Any] = Inputs
         outputs: Any = group_of("Outputs", [*variables(commands), *variables(Applied)])
     else:
         inputs = bundle("Inputs", request=commands(), velocity=Velocity())

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..effects import Running
 from ..hull import Triple
-from ..ops import Number, sqrt, where
+from ..ops import signed_root
 from .chain import thrusters
 from .thrusters import Line
 
@@ -19,17 +19,11 @@ def squared(now: Running, p: Any) -> Triple:
     return abs(x) * x, abs(y) * y, abs(bow) * bow
 
 
-def root(share: Number) -> Number:
-    """The command that gives a share of full force."""
-    size = sqrt(abs(share))
-    return where(share < 0.0, -size, size)
-
-
 make = thrusters(
     "thrusters_propeller",
     "Thrust allocation, and thrusters whose force grows with the square of the command",
     Line,
     squared,
-    root,
+    signed_root,
 )
 COMPONENT = make()
