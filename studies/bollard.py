@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from cosim import InputError
 from cosim.errors import nearest
 from diagnosis import Model
-from fmus.effects import Running
 from fmus.thrusters import chain
 
 PULLS = Path("cse1_static", "vsp_surge_bollard.csv")
@@ -71,7 +70,9 @@ def surge_force(model: Model, command: np.ndarray) -> np.ndarray:
         (n,) [N].
     """
     none = np.zeros_like(command)
-    X, _, _ = chain.act((command, none, none), Running(u_vsp_x=command), model.drive)
+    commands = (command, none, none)
+    now = chain.running(0.0, 0.0, 0.0, 0.0, commands, model.drive)
+    X, _, _ = chain.act(commands, now, model.drive)
     return np.broadcast_to(X, command.shape)
 
 

@@ -392,7 +392,6 @@ OF_ONE_SHIP = {
     "diagnosis.open_loop.thruster_report",
     "diagnosis.prediction_error.fit",
     "diagnosis.prediction_error.shooting",
-    "diagnosis.report.shape",
 }
 
 

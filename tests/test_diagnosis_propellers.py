@@ -7,6 +7,7 @@ from test_diagnosis_selection import learn
 
 from diagnosis import Model, Run, integrals
 from diagnosis.data.reading import ASIDE, force, propellers
+from fmus.actuators.response import total
 from fmus.effects import STANDARD, Running, Thrust
 from fmus.signals import Force
 from fmus.thrusters import chain
@@ -46,42 +47,43 @@ def voyage(seconds=90.0, **values):
     return integrals(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))
 
 
+AT = (-0.4575, -0.4575, 0.3875)
+
+
 def act(name, now, **values):
-    """Thrust of an effect on one of 0.5 N ahead and 0.2 N to starboard."""
+    """Thrust of an effect on propellers of 0.5 N ahead and 0.2 N to starboard, and a bow of 0.1 N."""
     e = STANDARD[name]
-    return e(Thrust(0.5, 0.2, 0.1), now, *[values.get(p.name, p.start) for p in e.parameters])
+    f = Thrust((0.5, 0.5, 0.0), (0.2, 0.2, 0.1), AT, (*ASIDE, 0.0), (0.5, 0.5, 1.0))
+    return e(f, now, *[values.get(p.name, p.start) for p in e.parameters])
 
 
 def test_cross_forces_are_mirrored_and_cancel_but_for_a_turn():
-    port, starboard, both = (
-        act("cross_vsp", Running(aside=a), cross_vsp_sway=0.3, cross_vsp_surge=0.1)
-        for a in (*ASIDE, 0.0)
-    )
-    assert (port.vsp_y, starboard.vsp_y, both.vsp_y) == pytest.approx((0.05, 0.35, 0.2))
-    assert (port.vsp_x, starboard.vsp_x, both.vsp_x) == pytest.approx((0.52, 0.48, 0.5))
+    found = act("cross_vsp", Running(), cross_vsp_sway=0.3, cross_vsp_surge=0.1)
+    np.testing.assert_allclose(found.Y, (0.05, 0.35, 0.1))
+    np.testing.assert_allclose(found.X, (0.52, 0.48, 0.0))
     # Port ahead and starboard astern turn the bow to starboard.
-    assert both.turn == pytest.approx(0.055 * 0.1 * 0.2)
+    turn = AT[0] * 0.2 + AT[2] * 0.1 + 0.055 * 0.1 * 0.2
+    np.testing.assert_allclose(total(found), (0.5, 0.3, turn))
 
 
 def test_inflow_takes_force_from_where_the_water_comes():
-    turning = Running(u=0.2, v=0.0, r=0.1, u_vsp_x=-0.5, u_vsp_y=0.5, aside=-0.055, l_vsp=-0.4575)
+    turning = Running(u=0.2, v=0.0, r=0.1, part=(-0.5, 0.5, 0.0))
     found = act("inflow_vsp", turning, inflow_vsp_x=1.0, inflow_vsp_y=1.0)
-    assert found.vsp_x == pytest.approx(0.5 - 0.5 * (0.2 + 0.0055))
-    assert found.vsp_y == pytest.approx(0.2 + 0.5 * 0.04575)
-    assert act("inflow_vsp", turning._replace(u_vsp_x=0.0, u_vsp_y=0.0), inflow_vsp_x=1.0)[:2] == (
-        0.5,
-        0.2,
-    )
+    assert found.X[0] == pytest.approx(0.5 - 0.5 * (0.2 + 0.0055))
+    assert found.X[1] == pytest.approx(0.5 - 0.5 * (0.2 - 0.0055))
+    np.testing.assert_allclose(found.Y, (0.2 + 0.5 * 0.04575, 0.2 + 0.5 * 0.04575, 0.1))
+    still = act("inflow_vsp", turning._replace(part=(0.0, 0.0, 0.0)), inflow_vsp_x=1.0)
+    assert (still.X, still.Y) == ((0.5, 0.5, 0.0), (0.2, 0.2, 0.1))
 
 
 def test_exponent_matters_at_part_power_only():
     exponents = {"exponent_vsp": 1.0, "exponent_bow": 0.5}
-    full = act("power_exponent", Running(), **exponents)
-    assert full[:3] == pytest.approx((0.5, 0.2, 0.1))
-    part = act("power_exponent", Running(power_vsp=0.5, power_bow=0.25), **exponents)
-    assert part[:3] == pytest.approx((0.25, 0.1, 0.05))
-    none = act("power_exponent", Running(power_vsp=0.0, power_bow=0.0), **exponents)
-    assert np.isfinite(none[:3]).all()
+    full = act("power_exponent", Running(power=(1.0, 1.0, 1.0)), **exponents)
+    assert (*full.X, *full.Y) == pytest.approx((0.5, 0.5, 0.0, 0.2, 0.2, 0.1))
+    part = act("power_exponent", Running(power=(0.5, 0.5, 0.25)), **exponents)
+    assert (*part.X, *part.Y) == pytest.approx((0.25, 0.25, 0.0, 0.1, 0.1, 0.05))
+    none = act("power_exponent", Running(power=(0.0, 0.0, 0.0)), **exponents)
+    assert np.isfinite((*none.X, *none.Y)).all()
 
 
 @pytest.mark.slow

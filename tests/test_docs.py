@@ -42,6 +42,8 @@ def defined(path):
     for node in ast.parse((ROOT / path).read_text(encoding="utf-8")).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
+        if isinstance(node, ast.Assign):
+            found |= {target.id for target in node.targets if isinstance(target, ast.Name)}
         if isinstance(node, ast.ClassDef):
             members = [m.name for m in node.body if isinstance(m, ast.FunctionDef)]
             members += [m.target.id for m in node.body if isinstance(m, ast.AnnAssign)]

@@ -41,12 +41,14 @@ BELL = '''
 from typing import Annotated
 from fmus.declare import POSITIVE
 from fmus.effects import effect
+from fmus.effects.cse1 import BOW
+from fmus.effects.devices import changed
 from fmus.ops import exp
 
 @effect("bow_bell", kind="actuator", axis="YN", formula="f_bow exp(-(k u)^2)", linear=False, needs=("bow",))
 def bow_bell(f, now, bow_bell: Annotated[float, "s/m", "bow force lost at speed", POSITIVE] = 0.0):
     """The bow thruster fades with the speed."""
-    return f._replace(bow=f.bow * exp(-bow_bell * bow_bell * now.u * now.u))
+    return changed(f, [BOW], lambda x: x * exp(-bow_bell * bow_bell * now.u * now.u))
 '''
 
 MOMENT = '''

@@ -21,11 +21,12 @@ from support.ships import (
 )
 
 from fmus import hull_functions
-from fmus.actuators.actuation import actuators, allocate, axes, forces, total
-from fmus.actuators.failings import Working, failings
+from fmus.actuators.actuation import actuators, allocate, axes, forces
+from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law
-from fmus.actuators.response import at_rest, command_response
+from fmus.actuators.response import at_rest, command_response, total
 from fmus.declare import group_of, variables
+from fmus.effects import Running
 from fmus.hull import (
     Damping,
     HullFunctions,
@@ -375,7 +376,7 @@ def pushing(d, commands, nu=(0.4, 0.1, -0.2)):
     values = ship(description=d).thrusters.params().plant
     given = tuple(commands)
     part_of_full = tuple(min(1.0, max(-1.0, c / 10.0)) for c in given)
-    return forces(d, given, nu, values), Working(5.0, *nu, given, part_of_full)
+    return forces(d, given, nu, values), Running(5.0, *nu, given, part_of_full)
 
 
 def width_of(d):
@@ -386,7 +387,7 @@ def width_of(d):
 def without_memory(d):
     """Each actuator of a ship with each of its failings that has no memory."""
     for a in actuators(d):
-        for e in failings(a, width_of(d)):
+        for e in failings(a):
             if e.memory is None:
                 yield a, e
 
@@ -446,7 +447,7 @@ def test_all_force_lost_is_no_force(name):
     d = SHIPS[name]
     f, now = pushing(d, commands_for(width_of(d)))
     for a in actuators(d):
-        found = {e.id: e for e in failings(a, width_of(d))}
+        found = {e.id: e for e in failings(a)}
         gone = found[f"loss_{a.part.name}"](f, now, 1.0)
         assert (gone.X[a.k], gone.Y[a.k]) == (0.0, 0.0)
         dead = found[f"{a.part.name}_failure"](f, now, 4.0)
@@ -457,7 +458,7 @@ def test_all_force_lost_is_no_force(name):
 def test_a_turned_force_keeps_its_size():
     f, now = pushing(SHIPS["cse1"], (0.5, -0.3, 0.2))
     a = actuators(SHIPS["cse1"])[0]
-    angle = next(e for e in failings(a, 3) if e.id == "angle_vsp")
+    angle = next(e for e in failings(a) if e.id == "angle_vsp")
     turned = angle(f, now, 0.5 * pi)
     assert (turned.X[0], turned.Y[0]) == pytest.approx((-f.Y[0], f.X[0]))  # ahead becomes starboard
 
@@ -465,7 +466,7 @@ def test_a_turned_force_keeps_its_size():
 def test_another_place_adds_the_moment_of_the_way():
     f, now = pushing(SHIPS["cse1"], (0.5, -0.3, 0.2))
     a = actuators(SHIPS["cse1"])[0]
-    place = next(e for e in failings(a, 3) if e.id == "place_vsp")
+    place = next(e for e in failings(a) if e.id == "place_vsp")
     X, Y, N = total(f)
     expected = (X, Y, N + 0.03 * f.Y[0] - 0.02 * f.X[0])
     assert total(place(f, now, 0.03, 0.02)) == pytest.approx(expected)
@@ -474,7 +475,7 @@ def test_another_place_adds_the_moment_of_the_way():
 @given(st.floats(0.1, 3.0))
 def test_a_lag_is_of_first_order_and_one_actuators_alone(T):
     a = actuators(SHIPS["otter"])[1]
-    lag = next(e for e in failings(a, 2) if e.memory)
+    lag = next(e for e in failings(a) if e.memory)
     memory, n = lag.memory.start(2), 100
     for _ in range(n):
         memory, given = lag(memory, (3.0, 4.0), T / n, T)

@@ -20,7 +20,8 @@ class Bow(NamedTuple):
 def fading(now: Running, p: Bow) -> Triple:
     """Shares of full force."""
     slow = p.bow_exp * now.u
-    return now.u_vsp_x, now.u_vsp_y, now.u_bow * exp(-slow * slow)
+    x, y, bow = now.given
+    return x, y, bow * exp(-slow * slow)
 
 
 make = thrusters("other_thrusters", "Thrusters whose bow fades with the surge speed", Bow, fading, same)

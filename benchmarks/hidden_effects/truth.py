@@ -13,7 +13,6 @@ import numpy as np
 from scipy.signal import lfilter
 
 from fmus.declare import packer, variables
-from fmus.effects import Running
 from fmus.frames import rotate_to_body
 from fmus.hull import Inertia, mass_matrix
 from fmus.signals import Force
@@ -136,11 +135,12 @@ def thrust(m: Motion, nu: np.ndarray, values: Values) -> np.ndarray:
         shares = np.where((m.time >= delay)[:, None], held(m.time, shares, delay), 0.0)
     if "backlash" in values:
         shares = followed(shares, values["backlash"])
-    now = Running(m.time, *nu.T, *shares.T)
+    ready = THRUSTERS.prepared(p)
+    now = chain.running(m.time, *nu.T, tuple(shares.T), ready)
     if lag:
         step = 1.0 - np.exp(-STEP / lag)
         shares = lfilter([step], [1.0, step - 1.0], shares, axis=0)
-    tau = chain.act(tuple(shares.T), now, THRUSTERS.prepared(p))
+    tau = chain.act(tuple(shares.T), now, ready)
     return np.column_stack(np.broadcast_arrays(*tau))
 
 

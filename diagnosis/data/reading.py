@@ -14,7 +14,7 @@ import pandas as pd
 
 from cosim import InputError
 from cosim.errors import nearest
-from fmus.effects.single_propellers import ASIDE
+from fmus.effects.cse1 import ASIDE
 from fmus.ship import Ship, ship
 from fmus.thrusters.allocation import Allocation, thrust
 

@@ -6,18 +6,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.effects import Effect, Motion, Running, Thrust
+from fmus.effects import Effect, Motion
+from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
-from fmus.effects.single_propellers import ASIDE, PICTURES
 from fmus.hull import damping_force
 
 from ..assessment.evaluation import Evaluation
 from ..model import Model
-from ..model.thrust import commanded_shares
+from ..model.thrust import commanded_shares, places
 
 COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
 POINTS = 401
-Force = Callable[[np.ndarray, Callable[..., Any], Model], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,128 +48,107 @@ class Sweep(NamedTuple):
 
     Attributes:
         over, what: labels of the axes, with units.
-        reach: ends of the horizontal axis, by the model.
-        force: the shape over x (n,), with an effect, of a model.
+        reach: ends of the horizontal axis.
+        force: the shape over x (n,), of a model.
         data: where the data of a run lie on the horizontal axis.
     """
 
     over: str
     what: str
-    reach: Callable[[Model], tuple[float, float]]
-    force: Force
-    data: Callable[[Evaluation, Model], np.ndarray]
-
-
-def surge_speed(e: Evaluation, _: Model) -> np.ndarray:
-    u = e.smoothed.nu[:, 0]
-    return u[np.isfinite(u)]
-
-
-def command(k: int, sets: slice = slice(None)) -> Callable[[Evaluation, Model], np.ndarray]:
-    """The k-th command of sets of thrusters, by default of all; the bow thruster is of the first."""
-    sets = sets if k < 2 else slice(1)
-    return lambda e, m: commanded_shares(e.integrals.run, m)[:, sets, k].T.ravel()
-
-
-def force_commanded(name: str, k: int) -> Callable[[Evaluation, Model], np.ndarray]:
-    return lambda e, m: m.value(name) * command(k)(e, m)
-
-
-def hull(u: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    nominal = damping_force(u, 0.0, 0.0, m.hull.params.damping)[0]
-    return nominal + effect(Motion(u=u))[0]
-
-
-def vsp_surge(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    return effect(Thrust(vsp_x=m.value("plant_F_vsp") * c), Running(u_vsp_x=c)).vsp_x
-
-
-def vsp_sway(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    return effect(Thrust(vsp_y=m.value("plant_F_vsp") * c), Running(u_vsp_y=c)).vsp_y
-
-
-def one_vsp(k: int, way: str) -> Force:
-    """The force of VSP k + 1 over its command, in the direction ``x`` or ``y``."""
-    law = {"x": vsp_surge, "y": vsp_sway}[way]
-
-    def force(c: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-        return law(c, lambda f, now: effect(f, now._replace(aside=ASIDE[k])), m)
-
-    return force
-
-
-def vsp_given(f: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    return effect(Thrust(vsp_x=f), Running()).vsp_x
-
-
-def bow_given(f: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    return effect(Thrust(bow=f), Running()).bow
-
-
-def bow_effectiveness(u: np.ndarray, effect: Callable[..., Any], m: Model) -> np.ndarray:
-    return effect(Thrust(bow=1.0 + 0.0 * u), Running(u=u)).bow
-
-
-def full(name: str) -> Callable[[Model], tuple[float, float]]:
-    """From full force astern or to port to full force ahead or to starboard [N]."""
-    return lambda m: (-m.value(name), m.value(name))
+    reach: tuple[float, float]
+    force: Callable[[np.ndarray, Model], Any]
+    data: Callable[[Evaluation], np.ndarray]
 
 
 # m/s, times the scale of the ship; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
 FASTEST = 0.6
-SWEEPS: dict[Picture, Sweep] = {
-    "hull surge force over surge speed": Sweep(
-        "surge speed u [m/s]",
-        "damping in surge [N]",
-        lambda m: (-FASTEST * m.ship.scale.speed, FASTEST * m.ship.scale.speed),
-        hull,
-        surge_speed,
-    ),
-    "VSP surge force over command": Sweep(
-        "VSP command in surge [1]",
-        "VSP surge force [N]",
-        lambda _: (-1.0, 1.0),
-        vsp_surge,
-        command(0),
-    ),
-    "VSP sway force over command": Sweep(
-        "VSP command in sway [1]",
-        "VSP sway force [N]",
-        lambda _: (-1.0, 1.0),
-        vsp_sway,
-        command(1),
-    ),
-    **{
-        picture: Sweep(
-            f"VSP {k + 1} command in {(way := {'x': 'surge', 'y': 'sway'}[axis])} [1]",
-            f"VSP {k + 1} {way} force [N]",
-            lambda _: (-1.0, 1.0),
-            one_vsp(k, axis),
-            command("xy".index(axis), slice(k, k + 1)),
-        )
-        for (k, axis), picture in PICTURES.items()
-    },
-    "bow effectiveness over surge speed": Sweep(
-        "surge speed |u| [m/s]",
-        "bow effectiveness [1]",
-        lambda m: (0.0, FASTEST * m.ship.scale.speed),
-        bow_effectiveness,
-        lambda e, m: np.abs(surge_speed(e, m)),
-    ),
-    "VSP force given over commanded": Sweep(
-        "VSP force commanded [N]",
-        "VSP force given [N]",
-        full("plant_F_vsp"),
-        vsp_given,
-        force_commanded("plant_F_vsp", 0),
-    ),
-    "bow force given over commanded": Sweep(
-        "bow force commanded [N]",
-        "bow force given [N]",
-        full("plant_F_bow"),
-        bow_given,
-        force_commanded("plant_F_bow", 2),
-    ),
+
+
+def surge_speed(e: Evaluation) -> np.ndarray:
+    u = e.smoothed.nu[:, 0]
+    return u[np.isfinite(u)]
+
+
+def given(p: Picture, m: Model, command: Any, u: Any = 0.0) -> Any:
+    """The force [N] of the actuator that a picture shows, by its command and the surge speed [m/s]."""
+    layout, drive = m.drive.effects.layout, m.drive
+    commands = with_one((0.0 * command,) * len(layout.commands), p.command, command)
+    f = layout.thrust(commands, layout.running(0.0, u, 0.0, 0.0, commands, drive), drive)
+    return (f.X if p.axis == "X" else f.Y)[p.members[0]]
+
+
+def commands(p: Picture, m: Model) -> Callable[[Evaluation], np.ndarray]:
+    """The commands in a run of the actuators that a picture shows."""
+
+    def of(e: Evaluation) -> np.ndarray:
+        run = e.integrals.run
+        sets = zip(places(run), np.moveaxis(commanded_shares(run, m)[..., p.command], 1, 0), strict=True)
+        layout = m.drive.effects.layout
+        shown = []
+        for aside, given in sets:
+            now = layout.running(0.0, 0.0, 0.0, 0.0, (0.0,) * len(layout.commands), m.drive)
+            f = layout.thrust(now.given, now, layout.placed(m.drive, aside, None))
+            if any(f.gain[k] for k in p.members):
+                shown.append(given)
+        return np.concatenate(shown)
+
+    return of
+
+
+def _over_command(p: Picture, e: Effect, m: Model) -> Sweep:
+    way = {"X": "surge", "Y": "sway"}[p.axis]
+    span = m.drive.effects.layout.limits(m.drive.params)[p.command]
+    over, what = f"{p.whose}: command in {way}", f"{p.whose}: {way} force [N]"
+    return Sweep(over, what, span, lambda c, m: given(p, m, c), commands(p, m))
+
+
+def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
+    low, high = m.drive.effects.layout.limits(m.drive.params)[p.command]
+    full = float(given(p, m, high))
+
+    # The nominal force over the command is inverted by interpolation.
+    c = np.linspace(low, high, POINTS)
+    nominal = np.broadcast_to(given(p, m, c), c.shape)
+    order = np.argsort(nominal, kind="stable")
+
+    def force(f: np.ndarray, learned: Model) -> np.ndarray:
+        return given(p, learned, np.interp(f, nominal[order], c[order]))
+
+    def data(e: Evaluation) -> np.ndarray:
+        return given(p, m, commands(p, m)(e))
+
+    over, what = f"{p.whose}: force commanded [N]", f"{p.whose}: force given [N]"
+    return Sweep(over, what, (float(nominal.min()), full), force, data)
+
+
+def _effectiveness(p: Picture, e: Effect, m: Model) -> Sweep:
+    _, most = m.drive.effects.layout.limits(m.drive.params)[p.command]
+
+    def share(u: np.ndarray, learned: Model) -> np.ndarray:
+        nominal = np.broadcast_to(given(p, m, most, u), u.shape)
+        left = np.broadcast_to(given(p, learned, most, u), u.shape)
+        return np.divide(left, nominal, out=np.ones_like(u), where=nominal != 0.0)
+
+    over, what = "surge speed |u| [m/s]", f"{p.whose}: effectiveness [1]"
+    fastest = FASTEST * m.ship.scale.speed
+    return Sweep(over, what, (0.0, fastest), share, lambda e: np.abs(surge_speed(e)))
+
+
+def _damping(p: Picture, e: Effect, m: Model) -> Sweep:
+    def force(u: np.ndarray, learned: Model) -> np.ndarray:
+        nominal = damping_force(u, 0.0, 0.0, m.hull.params.damping)[0]
+        return nominal + e(Motion(u=u), *[learned.value(v.name) for v in e.parameters])[0]
+
+    fastest = FASTEST * m.ship.scale.speed
+    over, what = "surge speed u [m/s]", "damping in surge [N]"
+    return Sweep(over, what, (-fastest, fastest), force, surge_speed)
+
+
+SWEEPS: dict[str, Callable[[Picture, Effect, Model], Sweep]] = {
+    "damping over speed": _damping,
+    "force over command": _over_command,
+    "force given": _force_given,
+    "effectiveness over speed": _effectiveness,
 }
 
 
@@ -187,9 +165,10 @@ def curves(
     model = evaluations[0].model
     declared = model.ship.effects
     drawn = [
-        _curve(e, declared[e["id"]], SWEEPS[picture], evaluations, model)
+        _curve(e, effect, SWEEPS[picture.what](picture, effect, model), evaluations, model)
         for e in effects
-        for picture in declared[e["id"]].wording.pictures
+        for effect in (declared[e["id"]],)
+        for picture in effect.wording.pictures
     ]
     return [c for c in drawn if not np.allclose(c.learned, c.nominal)]
 
@@ -202,12 +181,14 @@ def _curve(
     model: Model,
 ) -> Curve:
     coefficients = found["coefficients"]
-    covered = np.concatenate([sweep.data(e, model) for e in evaluations])
-    x = np.linspace(*sweep.reach(model), POINTS)
+    of_effect = {v.name for v in effect.parameters}
+    covered = np.concatenate([sweep.data(e) for e in evaluations])
+    x = np.linspace(*sweep.reach, POINTS)
 
     def by(value: Callable[[Mapping[str, Any]], float]) -> np.ndarray:
-        given = {name: value(c) for name, c in coefficients.items()}
-        return np.broadcast_to(sweep.force(x, _with(effect, given), model), x.shape)
+        wanted = {name: value(c) for name, c in coefficients.items() if name in of_effect}
+        learned = model.plus({name: v - model.value(name) for name, v in wanted.items()})
+        return np.broadcast_to(sweep.force(x, learned), x.shape)
 
     sure = None
     if effect.linear:  # in weights that are never negative
@@ -216,14 +197,6 @@ def _curve(
     low, high = np.quantile(covered, COMMON)
     where = float(low), float(high)
     return Curve(effect.id, sweep.over, sweep.what, x, nominal, learned, sure, where)
-
-
-def _with(effect: Effect, given: Mapping[str, float]) -> Callable[..., Any]:
-    """The effect's function with parameters by name, the others as they start."""
-    function = effect.function
-    assert function is not None
-    values = [given.get(p.name, p.start) for p in effect.parameters]
-    return lambda *at: function(*at, *values)
 
 
 def _bound(coefficient: Mapping[str, Any], end: int) -> float:

@@ -5,13 +5,14 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from ..declare import Known, Range, Variable, group_of, variables
+from ..effects import Running, Thrust
 from ..hull import Triple
 from ..ops import Number, clip, fmax, where, wrap
 from ..ship_description import Description
 from . import laws as laws  # registers the laws
-from .failings import Actuator, Pushing, Working, goes_round
+from .failings import Actuator, goes_round
 from .law import Flow, Law
-from .response import Layout, Prepared
+from .response import Layout, Prepared, total
 
 PASSES = 2  # of the allocation: what the first one clips is asked of the others
 TINY = 1e-9  # share by which a matrix that has no inverse gets one
@@ -91,7 +92,7 @@ def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
     return Flow(u - y * r, v + x * r)
 
 
-def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) -> Pushing:
+def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) -> Thrust:
     """The force of each actuator, nothing wrong with it.
 
     Args:
@@ -108,16 +109,7 @@ def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) 
         Y.append(f_y)
         xs.append(x)
         ys.append(y)
-    return Pushing(tuple(X), tuple(Y), tuple(xs), tuple(ys))
-
-
-def total(f: Pushing) -> Triple:
-    """tau [N, N, N m] of the forces of all actuators."""
-    X, Y, N = 0.0, 0.0, 0.0
-    for f_x, f_y, x, y in zip(f.X, f.Y, f.x, f.y, strict=True):
-        X, Y, N = X + f_x, Y + f_y, N + x * f_y - y * f_x
-    N = N + f.dx * Y - f.dy * X
-    return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
+    return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), (1.0,) * len(X))
 
 
 class Component(NamedTuple):
@@ -257,34 +249,41 @@ def largest(ship: Description, values: Any) -> Triple:
 
 def working(
     ship: Description, t: Number, u: Number, v: Number, r: Number, commands: Any, values: Any
-) -> Working:
+) -> Running:
     """What the force of a ship's actuators may depend on."""
     part: list[Any] = []
     for a, own in zip(actuators(ship), values, strict=True):
         p, _, _ = law_of(a, own)
         for c, (low, high) in zip(commands[a.commands], a.law.limits(p), strict=True):
             part.append(clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0))
-    return Working(t, u, v, r, tuple(commands), tuple(part))
+    return Running(t, u, v, r, tuple(commands), tuple(part), (1.0,) * len(ship.actuators))
 
 
 @cache
 def layout(ship: Description) -> Layout:
     """How the commands of a ship become a force, with what is wrong with its actuators."""
 
-    def act(acting: Any, now: Working, b: Prepared) -> Triple:
+    def thrust(acting: Any, now: Running, b: Prepared) -> Thrust:
         f = forces(ship, acting, (now.u, now.v, now.r), b.params.plant)
         for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
             f = member.apply(acts, b.params.wrong, f, f, now)
-        return total(f)
+        return f
 
     at_rest = (0.0, 0.0, 0.0)
     return Layout(
         commands=tuple(map(variable, command_names(ship))),
         running=lambda t, u, v, r, c, b: working(ship, t, u, v, r, c, b.params.plant),
-        act=act,
+        thrust=thrust,
         believed=lambda c, p: total(forces(ship, c, at_rest, p.allocation)),
         allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
         full=lambda p: largest(ship, p.allocation),
+        limits=lambda p: tuple(
+            [
+                span
+                for a, own in zip(actuators(ship), p.plant, strict=True)
+                for span in a.law.limits(law_of(a, own)[0])
+            ]
+        ),
         curved=True,
         round=tuple([angle for a in actuators(ship) for angle in a.round]),
     )

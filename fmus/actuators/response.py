@@ -10,10 +10,21 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-from ..effects import EffectSet, Memory
+from ..effects import EffectSet, Memory, Running, Thrust
+from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
 from ..hull import Triple
-from ..ops import Number, clip, when, wrap
+from ..ops import Number, clip, when
+
+
+def total(f: Thrust) -> Triple:
+    """tau [N, N, N m] of the forces of all actuators."""
+    X, Y, N = 0.0, 0.0, 0.0
+    for gain, f_x, f_y, x, y in zip(f.gain, f.X, f.Y, f.x, f.y, strict=True):
+        f_x, f_y = gain * f_x, gain * f_y
+        X, Y, N = X + f_x, Y + f_y, N + x * f_y - y * f_x
+    N = N + f.dx * Y - f.dy * X
+    return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
 
 
 class Layout(NamedTuple):
@@ -22,10 +33,11 @@ class Layout(NamedTuple):
     Attributes:
         commands: names of their variables, in the order of all tuples of commands and shares.
         running: ``running(t, u, v, r, commands, b)``: what a thruster's force may depend on.
-        act: ``act(shares, running, b)``: tau [N, N, N m], effects included.
+        thrust: ``thrust(shares, running, b)``: the force of each actuator, effects included.
         believed: ``believed(commands, params)``: tau that the allocation expects of commands at rest.
         allocate: ``allocate(tau, params)``: the commands, or shares of full force, that give a force.
         full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
+        limits: ``limits(params)``: the lowest and the highest value of each command.
         placed: ``placed(b, aside, power)``: the thrusters where they are one of two sets, ``aside`` [m]
             to starboard, at a power of the run or None. Only a ship with two sets has it.
         curved: whether forces are not in proportion to what acts.
@@ -34,13 +46,18 @@ class Layout(NamedTuple):
 
     commands: tuple[str, ...]
     running: Callable[..., Any]
-    act: Callable[[Any, Any, Any], Triple]
+    thrust: Callable[[Any, Any, Any], Thrust]
     believed: Callable[[Any, Any], Triple]
     allocate: Callable[[Triple, Any], tuple[Any, ...]]
     full: Callable[[Any], Triple]
+    limits: Callable[[Any], tuple[tuple[Any, Any], ...]]
     placed: Callable[[Any, Any, Any], Any] = lambda b, aside, power: b
     curved: bool = False
     round: tuple[bool, ...] = ()
+
+    def act(self, shares: Any, now: Running, b: Any) -> Triple:
+        """tau [N, N, N m], effects included, of :attr:`thrust`."""
+        return total(self.thrust(shares, now, b))
 
 
 class ThrusterEffects(NamedTuple):
@@ -142,11 +159,6 @@ def remember(
         otherwise = idle, signals
         found[k], signals = member.apply(b.slow[k], b.params.dynamics, otherwise, found[k], signals, h)
     return tuple(found), signals
-
-
-def way(before: Number, wanted: Number, angle: bool) -> Number:
-    """From a command to another one; of an angle that goes round the shorter way [rad]."""
-    return wrap(wanted - before) if angle else wanted - before
 
 
 def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle: bool) -> Number:

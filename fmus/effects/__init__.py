@@ -1,18 +1,14 @@
 """What the real ship may have and the nominal model lacks: one declaration each, see :mod:`.effect`."""
 
 from . import (
-    actuator,
+    all_thrusters,
+    cse1,
     environment,
     force,
     inertia,
     linear_map,
     measurement,
-    outages,
-    propellers,
     scaling,
-    single_propellers,
-    thrust_curves,
-    thruster_dynamics,
 )
 from .effect import (
     EACH_VSP,
@@ -48,20 +44,14 @@ __all__ = [
 
 # The effects of this project. Those of the thrusters act in this order.
 STANDARD = EffectSet(
-    e
-    for module in (
-        thrust_curves,
-        single_propellers,
-        propellers,
-        actuator,
-        outages,
-        thruster_dynamics,
-        environment,
-        force,
-        linear_map,
-        scaling,
-        inertia,
-        measurement,
-    )
-    for e in effects_of(module)
+    [
+        *cse1.EFFECTS,
+        all_thrusters.lag,
+        all_thrusters.delay,
+        *[
+            e
+            for module in (environment, force, linear_map, scaling, inertia, measurement)
+            for e in effects_of(module)
+        ],
+    ]
 )

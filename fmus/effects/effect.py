@@ -36,19 +36,24 @@ Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
 Device = Literal["vsp", "bow", "each vsp"]
 # Of an effect on one of the two propellers: these have commands of their own.
 EACH_VSP: Device = "each vsp"
-# Pictures that show an effect: its force over speed or command, drawn by the report.
-Picture = Literal[
-    "hull surge force over surge speed",
-    "VSP surge force over command",
-    "VSP sway force over command",
-    "surge force of VSP 1 over its command",
-    "sway force of VSP 1 over its command",
-    "surge force of VSP 2 over its command",
-    "sway force of VSP 2 over its command",
-    "bow effectiveness over surge speed",
-    "VSP force given over commanded",
-    "bow force given over commanded",
-]
+
+
+class Picture(NamedTuple):
+    """A curve that shows an effect.
+
+    Attributes:
+        what: the curve.
+        whose: title of the actuators.
+        members: their numbers; the force of the first is shown.
+        command: number of the command.
+        axis: of the force, X or Y.
+    """
+
+    what: Literal["damping over speed", "force over command", "force given", "effectiveness over speed"]
+    whose: str = ""
+    members: tuple[int, ...] = ()
+    command: int = 0
+    axis: str = "X"
 
 
 class Motion(NamedTuple):
@@ -83,37 +88,33 @@ class Loaded(NamedTuple):
 
 
 class Running(NamedTuple):
-    """What a thruster's force may depend on: time [s], velocity, commands -1...1, place, power.
+    """What the force of a ship's actuators may depend on: time [s], velocity, commands that arrive.
 
-    ``aside`` [m] is how far to starboard the propellers sit: 0 where one set stands for both; ``l_vsp``
-    [m] how far forward; ``power_*`` are the settings by which the thrust is scaled.
+    ``given`` has the commands, ``part`` each as a share of its largest one; ``power`` is for each
+    actuator the setting by which its force is scaled.
     """
 
     t: Any = 0.0
     u: Any = 0.0
     v: Any = 0.0
     r: Any = 0.0
-    u_vsp_x: Any = 0.0
-    u_vsp_y: Any = 0.0
-    u_bow: Any = 0.0
-    aside: Any = 0.0
-    l_vsp: Any = 0.0
-    power_vsp: Any = 1.0
-    power_bow: Any = 1.0
+    given: tuple[Any, ...] = ()
+    part: tuple[Any, ...] = ()
+    power: tuple[Any, ...] = ()
 
 
 class Thrust(NamedTuple):
-    """Forces of the thrusters [N], and what turns their sum into tau.
+    """Forces X and Y [N] of each actuator, where they act (x, y) [m], and what their sum loses.
 
-    ``turn`` [N m] is the moment of propellers that push each to one side of the middle; ``loss_*`` is
-    the part of tau that is lost on each axis; ``dx`` and ``dy`` [m] is how far from the assumed point
-    the force acts.
+    ``gain`` is by which each counts in the sum; ``loss_*`` is the part of tau that is lost on each axis;
+    ``dx`` and ``dy`` [m] is how far from the assumed point all of it acts.
     """
 
-    vsp_x: Any = 0.0
-    vsp_y: Any = 0.0
-    bow: Any = 0.0
-    turn: Any = 0.0
+    X: tuple[Any, ...] = ()
+    Y: tuple[Any, ...] = ()
+    x: tuple[Any, ...] = ()
+    y: tuple[Any, ...] = ()
+    gain: tuple[Any, ...] = ()
     loss_X: Any = 0.0
     loss_Y: Any = 0.0
     loss_N: Any = 0.0

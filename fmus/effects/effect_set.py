@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ..declare import DeclarationError, nearest
+from ..declare import DeclarationError, flatten, nearest
 from ..scale import Scale
 from .effect import Effect, Kind, Loaded, Running, Thrust
 
@@ -136,17 +136,22 @@ def _imported(name: str, path: Path) -> ModuleType:
     return module
 
 
-# Motion and thrust at which effects are compared, so large that squares and products all count.
-_AT = (
-    (
-        Loaded(1.0, 2.0, 0.5, 0.3, -0.2, 0.1, 7.0, 0.4, 0.6, -0.3),
-        Running(7.0, 0.3, -0.2, 0.1, 0.6, -0.4, 0.5),
-    ),
-    (
-        Loaded(1.0, 2.0, 0.5, -0.3, 0.2, -0.1, 7.0, -0.4, -0.6, 0.3),
-        Running(7.0, -0.3, 0.2, -0.1, -0.6, 0.4, -0.5),
-    ),
-)
+# Motion and thrust at which effects are compared, so large that squares and products all count; of more
+# actuators than ships have.
+_SIGNS = (1.0, -1.0)
+_SIZES = tuple([0.7 - 0.05 * k if k % 2 else 0.05 * k - 0.6 for k in range(12)])
+
+
+def _motion(sign: float) -> Loaded:
+    moving = (0.3, -0.2, 0.1, 7.0 * sign, 0.4, 0.6, -0.3)
+    return Loaded(1.0, 2.0, 0.5, *[sign * x for x in moving])
+
+
+def _running(sign: float) -> tuple[Thrust, Running]:
+    X = tuple([sign * x for x in _SIZES])
+    sizes = len(_SIZES) * (1.0,)
+    thrust = Thrust(X, X[::-1], _SIZES, _SIZES[::-1], sizes)
+    return thrust, Running(7.0, 0.3 * sign, -0.2 * sign, 0.1 * sign, X, X, sizes)
 
 
 def _check_force(e: Effect) -> None:
@@ -158,9 +163,9 @@ def _check_force(e: Effect) -> None:
     values = {name: _unit(e, name) for name in e.coefficients}
     gets = ", ".join(f"ship.{name}" for name in Loaded._fields)
     form = f"a force gets {gets} and gives three numbers, X, Y and N"
-    for motion, _ in _AT:
+    for sign in _SIGNS:
         try:
-            found = _flat(e, (motion,), values)
+            found = _flat(e, (_motion(sign),), values)
         except (AttributeError, TypeError) as error:
             raise DeclarationError(f"'{e.id}': {error}; {form}") from None
         except (ValueError, ArithmeticError):  # it has no value there
@@ -179,9 +184,8 @@ def is_linear(e: Effect) -> bool:
     """
     if e.memory is not None or e.kind not in ("force", "environment", "actuator"):
         return True
-    for motion, running in _AT:
-        thrust = Thrust(0.7, -0.5, 1.3) if running.u_vsp_x > 0.0 else Thrust(-0.7, 0.5, -1.3)
-        at = (thrust, running) if e.kind == "actuator" else (motion,)
+    for sign in _SIGNS:
+        at = _running(sign) if e.kind == "actuator" else (_motion(sign),)
         for name in e.coefficients:
             none, once, twice = (_flat(e, at, {name: k * _unit(e, name)}) for k in (0.0, 0.5, 1.0))
             size = max(abs(b - a) for a, b in zip(none, twice, strict=True))
@@ -205,7 +209,7 @@ def _unit(e: Effect, name: str) -> float:
 
 def _flat(e: Effect, at: tuple[Any, ...], values: Mapping[str, float]) -> list[float]:
     """What an effect gives with some values of its parameters, as floats."""
-    return [float(x) for x in e(*at, *[values.get(p.name, p.start) for p in e.parameters])]
+    return flatten(e(*at, *[values.get(p.name, p.start) for p in e.parameters]))
 
 
 def effects_of(module: ModuleType) -> list[Effect]:

@@ -7,7 +7,7 @@ from ..declare import Range, Variable, packer, variables, width
 from ..hull import Damping, Triple, damping_force, product, term_force
 from ..ops import Number
 from .curve import interpolate, node_parameters
-from .effect import Effect, Motion, Search, Wording, effect
+from .effect import Effect, Motion, Picture, Search, Wording, effect
 from .families import (
     SURGE_BY_TURNING,
     SURGE_DRAG,
@@ -143,7 +143,7 @@ def surge_curve_sentence(f: Found) -> str:
     settings=("curve_X_u_range",),
     parameters=node_parameters("curve_X_u", "N", "surge force", "surge speed, both ways", "m/s", 0.6),
     search=Search(smooth=True),
-    wording=Wording(surge_curve_sentence, SURGE_DRAG, pictures=("hull surge force over surge speed",)),
+    wording=Wording(surge_curve_sentence, SURGE_DRAG, pictures=(Picture("damping over speed"),)),
 )
 def surge_force_curve(ship: Motion, *values: Number) -> Triple:
     """free surge force over the surge speed"""

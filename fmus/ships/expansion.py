@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from ..actuators.actuation import actuators, command_names
+from ..actuators.actuation import actuators
 from ..actuators.failings import failings
 from ..declare import variables
 from ..effects import STANDARD, EffectSet
@@ -24,10 +24,9 @@ def effects_of_ship(ship: Description, effects: EffectSet = STANDARD) -> EffectS
         DeclarationError: an actuator's effect has the id or a parameter of another one.
     """
     own = {v.name for v in variables(Damping)}
-    width = len(command_names(ship))
     return EffectSet(
         [
-            *[e for a in actuators(ship) for e in failings(a, width)],
+            *[e for a in actuators(ship) for e in failings(a)],
             *[e for e in effects.at(ship.scale).values() if not e.needs],
             *[further_change(term_variable(t.name)) for t in ship.terms if t.name not in own],
         ],

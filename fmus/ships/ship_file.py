@@ -22,7 +22,7 @@ from pydantic import (
 from ..actuators import laws as laws  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
-from ..effects.thruster_dynamics import LONGEST
+from ..effects.all_thrusters import LONGEST
 from ..hull import Inertia, mass_matrix
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale

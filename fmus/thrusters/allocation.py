@@ -33,13 +33,7 @@ def thrust(s_x: Number, s_y: Number, s_bow: Number, p: Any) -> Triple:
     The thrusters p are an Allocation, or a tuple in the same order.
     """
     F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p
-    return moments(F_vsp * s_x, F_vsp * s_y, F_bow * s_bow, l_vsp, l_bow, p_x, p_y)
-
-
-def moments(
-    f_x: Number, f_y: Number, f_bow: Number, l_vsp: Number, l_bow: Number, p_x: Number, p_y: Number
-) -> Triple:
-    """Force and moment [N, N, N m] of the thrusters' forces [N] at their places [m]: H(p_o) T f."""
+    f_x, f_y, f_bow = F_vsp * s_x, F_vsp * s_y, F_bow * s_bow
     return f_x, f_y + f_bow, (l_vsp + p_x) * f_y + (l_bow + p_x) * f_bow - p_y * f_x
 
 

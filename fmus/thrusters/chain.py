@@ -24,10 +24,11 @@ from ..actuators.response import (
 )
 from ..declare import POSITIVE, Component, Known, bundle
 from ..effects import STANDARD, EffectSet, Running, Thrust
+from ..effects.cse1 import ASIDE, PORT, STARBOARD
 from ..hull import Triple
-from ..ops import Number, clip, finite, when
+from ..ops import Number, clip, finite, sign, when
 from ..signals import Force, Velocity
-from .allocation import Allocation, allocate, moments, thrust
+from .allocation import Allocation, allocate, thrust
 
 # Thrust goes with the square of a propeller's speed, which is not recorded: a third less speed is half
 # the thrust.
@@ -80,26 +81,32 @@ class Outputs(NamedTuple):
 def running(t: Number, u: Number, v: Number, r: Number, commands: Triple, b: Prepared) -> Running:
     """What the force of this ship's thrusters may depend on."""
     vsp, bow = b.params.power
-    return Running(t, u, v, r, *commands, b.aside, b.params.plant.plant_l_vsp, vsp, bow)
+    return Running(t, u, v, r, commands, commands, (vsp, vsp, bow))
 
 
-def act(shares: Triple, now: Running, b: Prepared) -> Triple:
-    """tau [N, N, N m] of thrusters that give these shares of their full force, effects included.
+def acting(shares: Triple, now: Running, b: Prepared) -> Thrust:
+    """The forces of thrusters that give these shares of their full force, effects included.
 
     Args:
         shares: of the VSP's surge and sway force and of the bow thruster's.
         now: of :func:`running`.
-        b: the thrusters.
+        b: the thrusters; one of two sets, or one that stands for both.
     """
     p = b.params
     F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
     vsp, bow = p.power
-    f = Thrust(F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2])
+    ahead, aside, across = F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2]
+    starboard = 0.5 + 0.5 * sign(b.aside)
+    f = Thrust(
+        (ahead, ahead, 0.0),
+        (aside, aside, across),
+        (l_vsp + p_x, l_vsp + p_x, l_bow + p_x),
+        (ASIDE[PORT] + p_y, ASIDE[STARBOARD] + p_y, p_y),
+        ((1.0 - starboard) * vsp, starboard * vsp, bow),
+    )
     for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
         f = member.apply(acts, p.wrong, f, f, now)
-    X, Y, N = moments(vsp * f.vsp_x, vsp * f.vsp_y, bow * f.bow, l_vsp, l_bow, p_x + f.dx, p_y + f.dy)
-    N = N + vsp * f.turn
-    return X * (1.0 - f.loss_X), Y * (1.0 - f.loss_Y), N * (1.0 - f.loss_N)
+    return f
 
 
 def believed(commands: Triple, p: Any) -> Triple:
@@ -116,20 +123,21 @@ def full(p: Any) -> Triple:
 def placed(b: Prepared, aside: Any, power: Any) -> Prepared:
     """Thrusters that sit ``aside`` [m] to starboard, at settings of the power (VSP, bow) or None."""
     p = b.params
-    plant = p.plant._replace(plant_p_y=p.plant.plant_p_y + aside)
     scaled = p.power if power is None else Power(p.power[0] * power[0], p.power[1] * power[1])
-    return b._replace(params=p._replace(plant=plant, power=scaled), aside=aside)
+    return b._replace(params=p._replace(power=scaled), aside=aside)
 
 
 THREE = Layout(
     ("u_vsp_x", "u_vsp_y", "u_bow"),
     running,
-    act,
+    acting,
     believed,
     lambda tau, p: allocate(tau[0], tau[1], tau[2], p.allocation),
     full,
+    lambda p: ((-1.0, 1.0),) * 3,
     placed,
 )
+act = THREE.act
 
 
 def thrusters(

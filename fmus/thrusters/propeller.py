@@ -15,7 +15,7 @@ from .thrusters import Line
 
 def squared(now: Running, p: Any) -> Triple:
     """Shares of full force: the commands squared, with their sign, (2.11)."""
-    x, y, bow = now.u_vsp_x, now.u_vsp_y, now.u_bow
+    x, y, bow = now.given
     return abs(x) * x, abs(y) * y, abs(bow) * bow
 
 

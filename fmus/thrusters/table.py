@@ -61,10 +61,11 @@ def looked_up(command: Number, speed: Number, table: Any, most: Number) -> Any:
 
 def tabulated(now: Running, p: Table) -> Triple:
     """Shares of full force from the tables, (2.12)."""
+    x, y, bow = now.given
     return (
-        looked_up(now.u_vsp_x, abs(now.u), p.surge, p.table_speed),
-        looked_up(now.u_vsp_y, abs(now.v), p.sway, p.table_speed),
-        looked_up(now.u_bow, abs(now.u), p.bow, p.table_speed),
+        looked_up(x, abs(now.u), p.surge, p.table_speed),
+        looked_up(y, abs(now.v), p.sway, p.table_speed),
+        looked_up(bow, abs(now.u), p.bow, p.table_speed),
     )
 
 

@@ -17,7 +17,8 @@ class Line(NamedTuple):
 
 def linear(now: Running, p: Any) -> Triple:
     """Shares of full force: the commands themselves, (2.10)."""
-    return now.u_vsp_x, now.u_vsp_y, now.u_bow
+    x, y, bow = now.given
+    return x, y, bow
 
 
 def same(share: Number) -> Number:

@@ -1,0 +1,231 @@
+"""Effects on all thrusters of any ship together: losses by axis, point of attack, lag and delay."""
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import Range
+from ..ops import Number, exp, floor, fmax, pick, when, where, wrap
+from ..scale import CSE1
+from .devices import SHARE, Devices, declared, parameter
+from .effect import Effect, Memory, Running, Search, Thrust, Wording, effect
+from .families import PROPELLERS, SIDE_THRUST, SYNC_PULSE, TIMING
+from .misplaced import place_parameters
+from .text import Found, lost, number, offset
+
+SLOTS = 64  # commands that a delay keeps; a longer one is remembered in coarser steps
+FORGOTTEN = 12.0  # time constants after which e^-12 = 6e-6 of an earlier command is left
+LONGEST = Range(0.0, 60.0)  # s
+# s: from a sample or two to the longest that a ship of this size could be steered with.
+TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5)
+
+
+def share_reached(h: Number, lag: Number) -> Number:
+    """Share of its way that a first-order lag [s] has gone after h [s], for an input that is held."""
+    return 1.0 - exp(-h / fmax(lag, 1e-9))
+
+
+def way(before: Number, wanted: Number, angle: bool) -> Number:
+    """From a command to another one; of an angle that goes round the shorter way [rad]."""
+    return wrap(wanted - before) if angle else wanted - before
+
+
+def slow(
+    d: Devices,
+    name: str,
+    sentence: Callable[[Found], str],
+    own: slice,
+    turns: Sequence[bool] = (),
+    **more: Any,
+) -> Effect:
+    """A first-order lag of some of the commands, exact at the step's end for an input that is held.
+
+    Args:
+        d: the actuators.
+        name: of the effect and its parameter.
+        sentence: its finding.
+        own: places of the commands among those of the ship.
+        turns: for each of these whether it is an angle that goes round; empty: none is.
+        more: further arguments of :func:`declared`.
+    """
+
+    @declared(
+        d,
+        name,
+        (parameter(name, "s", f"first-order lag of {d.label}", d.scale.limits("s", LONGEST)),),
+        sentence,
+        formula="T df/dt = f_cmd - f",
+        symbol="T",
+        sign="0: none",
+        source="6.4.5",
+        linear=False,
+        memory=Memory(
+            lambda width: (0.0,) * width,
+            "force",
+            lambda lag: FORGOTTEN * lag,
+            idle=lambda before, wanted: wanted,
+        ),
+        search=Search(tries=[{name: d.scale.time * T} for T in (*TIMES, 2.0)]),
+        description=f"first-order lag of {d.label}",
+        **more,
+    )
+    def function(
+        before: tuple[Any, ...], wanted: tuple[Any, ...], h: Number, lag: Number
+    ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        share = share_reached(h, lag)
+        angles = turns or (False,) * len(before[own])
+        moved = [
+            x + share * way(x, w, angle)
+            for x, w, angle in zip(before[own], wanted[own], angles, strict=True)
+        ]
+        after = (*wanted[: own.start or 0], *moved, *wanted[own.stop or len(wanted) :])
+        return after, after
+
+    return function
+
+
+def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
+    """A share of tau that is lost on one axis."""
+    name, field = f"loss_{way}", f"loss_{axis}"
+
+    @effect(
+        name,
+        "actuator",
+        axis,
+        formula=f"{axis}_act = (1 - δ) {axis}_cmd",
+        symbol="δ",
+        sign=f"positive: {what} is lost",
+        source="(2.39), (7.3)-(7.6)",
+        parameters=(parameter(name, "1", f"share of {way} {what} lost", SHARE),),
+        description=f"{what} lost in {way}",
+        wording=wording,
+    )
+    def function(f: Thrust, now: Running, share: float) -> Thrust:
+        return f._replace(**{field: getattr(f, field) + share})
+
+    return function
+
+
+loss_surge = _axis_loss(
+    "X",
+    "surge",
+    "force",
+    Wording(
+        lost(
+            "loss_surge",
+            "Of the commanded surge force {} do not arrive.",
+            "The surge force is {} larger than commanded.",
+        ),
+        PROPELLERS,
+        {"X_u": "pulse the speed instead of keeping it", "mass": "run steady and accelerating legs"},
+    ),
+)
+loss_sway = _axis_loss(
+    "Y",
+    "sway",
+    "force",
+    Wording(
+        lost(
+            "loss_sway",
+            "Of the commanded sway force {} do not arrive.",
+            "The sway force is {} larger than commanded.",
+        ),
+        SIDE_THRUST,
+        {"Y_r": "crab to both sides with no turn"},
+    ),
+)
+loss_yaw = _axis_loss(
+    "N",
+    "yaw",
+    "moment",
+    Wording(
+        lost(
+            "loss_yaw",
+            "Of the commanded yaw moment {} do not arrive.",
+            "The yaw moment is {} larger than commanded.",
+        ),
+        SIDE_THRUST,
+        {"N_r": "turn on the spot, with starts and stops of the turn"},
+    ),
+)
+
+
+@effect(
+    "attack_point",
+    "actuator",
+    "N",
+    formula="N + dx · Y - dy · X",
+    symbol="dx, dy",
+    sign="positive: ahead and to starboard of where it is assumed",
+    source="(2.17)-(2.19)",
+    parameters=place_parameters("attack_point", "point of attack", CSE1),
+    description="the force acts elsewhere than assumed",
+    wording=Wording(
+        lambda f: f"The thrust acts {offset(f, 'attack_point')} of where the model believes.",
+        SIDE_THRUST,
+    ),
+)
+def attack_point(f: Thrust, now: Running, dx: float, dy: float) -> Thrust:
+    return f._replace(dx=f.dx + dx, dy=f.dy + dy)
+
+
+lag = slow(
+    Devices("", "thrusters", "all thrusters", (), (0, 0), "XYN", TIMING, plural=True),
+    "lag",
+    lambda f: (
+        f"The thrusters follow their commands slowly, with a time constant of {number(f['lag'])} s."
+    ),
+    slice(None),
+    apart={
+        "delay": "give steps in the commands, and measure faster",
+        "clock_offset": "give steps in the commands; " + SYNC_PULSE,
+    },
+)
+
+
+class Kept(NamedTuple):
+    """Commands that a delay remembers, the latest first, and the time since the latest [s]."""
+
+    since: Any
+    commands: tuple[tuple[Any, ...], ...]
+
+
+@effect(
+    "delay",
+    "actuator",
+    "XYN",
+    formula="f(t) = f_cmd(t - T)",
+    symbol="T",
+    sign="0: none",
+    source="6.4.5",
+    linear=False,
+    description="pure delay of all thrusters",
+    memory=Memory(
+        lambda width: Kept(0.0, ((0.0,) * width,) * SLOTS), "command", lambda delay: delay, keeps=SLOTS
+    ),
+    search=Search(tries=[{"delay": T} for T in TIMES]),
+    wording=Wording(
+        lambda f: f"The thrusters act {number(f['delay'])} s after they are commanded.",
+        TIMING,
+        {"clock_offset": SYNC_PULSE},
+    ),
+)
+def delay(
+    kept: Kept,
+    command: tuple[Any, ...],
+    h: Number,
+    delay: Annotated[float, "s", "pure delay of all thrusters", LONGEST] = 0.0,
+) -> tuple[Kept, tuple[Any, ...]]:
+    """Pure delay: the mean over the step of held commands of some time ago."""
+    since = kept.since + h
+    # Time between two remembered commands: a step, or more where the delay is long.
+    tick = fmax(fmax(h, delay / (SLOTS - 1.0)), 1e-9)
+    due = (h > 0.0) & (since >= tick - 1e-9)
+    commands = when(due, lambda: (command, *kept.commands[:-1]), lambda: kept.commands)
+    place = delay / tick
+    ago = floor(place + 1e-6)
+    part = fmax(0.0, place - ago)
+    arriving = tuple(
+        (1.0 - part) * a + part * b
+        for a, b in zip(pick(commands, ago), pick(commands, ago + 1.0), strict=True)
+    )
+    return Kept(where(due, since - tick, since), commands), arriving

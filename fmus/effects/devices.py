@@ -1,0 +1,114 @@
+"""Actuators that an effect concerns, and what their effects are made with.
+
+What may go wrong with actuators is declared once, for :class:`Devices`, and made for those of each ship:
+:mod:`.lost_force`, :mod:`.own_curves`, :mod:`.misplaced`, :mod:`.all_thrusters`. The effects act on
+:class:`~fmus.effects.effect.Thrust`, the forces of all actuators, one after the other. CyberShip
+Enterprise 1 has those of :mod:`.cse1`, any other ship those of :mod:`fmus.actuators.failings`.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..declare import Range, Variable
+from ..scale import CSE1, Scale
+from .effect import Effect, Picture, Thrust, Wording, effect
+from .families import Family
+from .text import Found, capital
+
+ANY = Range()
+SHARE = Range(-1.0, 1.0)
+
+
+class Devices(NamedTuple):
+    """Actuators that an effect concerns.
+
+    Attributes:
+        name: in ids and parameters.
+        title: in sentences.
+        label: in descriptions of parameters.
+        members: numbers of the actuators.
+        commands: number of the command that makes the force on each axis, X and Y.
+        axis: axes on which their force may act.
+        family: the manoeuvre that brings out what is wrong with them.
+        full: the largest force of one of them at rest [N].
+        plural: whether the title is of several.
+        needs: thrusters that a ship must have.
+        scale: of the ship.
+    """
+
+    name: str
+    title: str
+    label: str
+    members: tuple[int, ...]
+    commands: tuple[int, int]
+    axis: str
+    family: Family
+    full: float = 0.0
+    plural: bool = False
+    needs: frozenset[str] = frozenset()
+    scale: Scale = CSE1
+
+    def does(self, verb: str, article: str = "The") -> str:
+        """Subject and verb of a sentence, such as ``The propellers give``."""
+        one = {"are": "is", "push": "pushes"}.get(verb, f"{verb}s")
+        return f"{article} {self.title} {verb if self.plural else one}"
+
+    def picture(self, what: Any, axis: str = "") -> Picture:
+        """A picture of the force along an axis, by default the first that it acts on."""
+        axis = axis or self.axis[0]
+        command = self.commands["XY".index(axis)]
+        return Picture(what, capital(self.title), self.members, command, axis)
+
+
+def with_one(values: tuple[Any, ...], k: int, value: Any) -> tuple[Any, ...]:
+    """The values with another one at place k."""
+    return (*values[:k], value, *values[k + 1 :])
+
+
+def pushed(f: Thrust, k: int, X: Any, Y: Any) -> Thrust:
+    """The forces with others of actuator k."""
+    return f._replace(X=with_one(f.X, k, X), Y=with_one(f.Y, k, Y))
+
+
+def changed(f: Thrust, members: Sequence[int], change: Callable[[Any], Any]) -> Thrust:
+    """The forces with both components of some actuators changed."""
+    for k in members:
+        f = pushed(f, k, change(f.X[k]), change(f.Y[k]))
+    return f
+
+
+def added(f: Thrust, members: Sequence[int], axis: str, extra: Any) -> Thrust:
+    """The forces with more of some actuators [N], each along an axis."""
+    for k in members:
+        f = pushed(f, k, f.X[k] + extra, f.Y[k]) if axis == "X" else pushed(f, k, f.X[k], f.Y[k] + extra)
+    return f
+
+
+def parameter(name: str, unit: str, text: str, limits: Range = ANY) -> Variable:
+    """A parameter that is zero where there is no effect."""
+    return Variable(name, unit, text, 0.0, limits, False)
+
+
+def declared(
+    d: Devices,
+    id: str,  # noqa: A002
+    parameters: tuple[Variable, ...],
+    sentence: Callable[[Found], str],
+    *,
+    axis: str = "",
+    apart: dict[str, str] | None = None,
+    pictures: tuple[Picture, ...] = (),
+    **more: Any,
+) -> Callable[[Callable[..., Any]], Effect]:
+    """The decorator that makes an effect of actuators.
+
+    Args:
+        d: the actuators.
+        id, axis, parameters: of the effect; by default it acts on the axes of the actuators.
+        sentence, apart, pictures: see :class:`~fmus.effects.effect.Wording`.
+        more: further arguments of :func:`~fmus.effects.effect.effect`.
+    """
+    wording = Wording(sentence, d.family, apart or {}, pictures)
+    return effect(
+        id, "actuator", axis or d.axis, parameters=parameters, wording=wording, needs=d.needs, **more
+    )

@@ -1,0 +1,165 @@
+"""Forces of actuators that follow curves of their own, over the command or the ship's speed."""
+
+from ..declare import Range
+from ..ops import Number, fmax, where
+from .curve import NODES, interpolate, node_parameters
+from .devices import SHARE, Devices, added, changed, declared, parameter, pushed
+from .effect import Effect, Running, Search, Thrust
+from .text import Found, peak, percent, reach, towards
+
+# Shares of the full command: closer where a small one matters.
+COMMAND_DEADBANDS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4)
+ALONG = {"X": "surge", "Y": "sway"}
+
+
+def speed_curve(d: Devices) -> Effect:
+    """The force changes freely with the ship's speed."""
+    stem = f"curve_{d.name}_u"
+
+    @declared(
+        d,
+        f"curve_{d.name}(|u|)",
+        node_parameters(
+            stem,
+            "1",
+            f"change of {d.label} effectiveness",
+            "surge speed",
+            "m/s",
+            0.6 * d.scale.factor("m/s"),
+        ),
+        lambda f: (
+            f"The {d.title}'s force changes with the speed: "
+            f"{percent(peak(f)[1])} {'less' if peak(f)[1] < 0.0 else 'more'} than the model believes "
+            f"at {peak(f)[0] * reach(f):.2g} m/s."
+        ),
+        pictures=(d.picture("effectiveness over speed"),),
+        formula=f"f (1 + Σ c_k · hat_k(|u|)), {NODES} nodes over [0, range]",
+        symbol=f"c_1 … c_{NODES}",
+        sign="positive: more force than assumed",
+        source="6.4.4; 3.2.3, on a triangle basis",
+        settings=(f"{stem}_range",),
+        search=Search(smooth=True),
+        description=f"free change of the {d.title}'s effectiveness over the surge speed",
+    )
+    def function(f: Thrust, now: Running, *values: Number) -> Thrust:
+        *nodes, span = values
+        gain = 1.0 + interpolate(abs(now.u), 0.0, span, nodes)
+        return changed(f, d.members, lambda x: x * gain)
+
+    return function
+
+
+def command_curve(d: Devices, command: str) -> Effect:
+    """The force changes freely over the command, as a share of it."""
+    stem, place = f"curve_{d.name}", d.commands[0]
+
+    def sentence(f: Found) -> str:
+        at, value = peak(f)
+        return (
+            f"The {d.title}'s force follows another curve over its command than the model's: "
+            f"{percent(value)} {'less' if value < 0.0 else 'more'} at {percent(2.0 * at - 1.0)} of "
+            f"full {'ahead' if at >= 0.5 else 'astern'}."
+        )
+
+    @declared(
+        d,
+        f"{stem}({command})",
+        node_parameters(stem, "1", f"change of {d.label} force", "command", "1", 1.0),
+        sentence,
+        formula=f"f (1 + Σ c_k · hat_k(c)), {NODES} nodes over the command's range",
+        symbol=f"c_1 … c_{NODES}",
+        sign="positive: more force than assumed",
+        settings=(f"{stem}_range",),
+        search=Search(smooth=True),
+        description=f"free change of the {d.title}'s force over the command",
+    )
+    def function(f: Thrust, now: Running, *values: Number) -> Thrust:
+        *heights, span = values
+        gain = 1.0 + interpolate(now.part[place], -span, span, heights)
+        return changed(f, d.members, lambda x: x * gain)
+
+    return function
+
+
+def force_curve(d: Devices, axis: str) -> Effect:
+    """A free force along an axis over the command on that axis."""
+    way, on = ALONG[axis], axis.lower()
+    stem, place = f"curve_{d.name}_{on}_c", d.commands["XY".index(axis)]
+    push = {"X": "", "Y": " aside"}[axis]
+    verb, whose = ("push", "their") if d.plural else ("pushes", "its")
+
+    def sentence(f: Found) -> str:
+        at, value = peak(f)
+        return (
+            f"The {d.title} {verb}{push} by another curve over {whose} command than the model's: "
+            f"{towards(value, 'N', axis)} is missing at command {(2.0 * at - 1.0) * reach(f):.2g}."
+        )
+
+    @declared(
+        d,
+        f"curve_{d.name}_{on}(c)",
+        node_parameters(stem, "N", f"{d.label} {way} force", "command, both ways", "1", 1.0),
+        sentence,
+        axis=axis + "N" * (axis == "Y" or not d.plural),
+        pictures=(d.picture("force over command", axis),),
+        formula=f"f_{on} + Σ c_k · hat_k(c_{on}), {NODES} nodes over [-range, range]",
+        symbol=f"c_1 … c_{NODES}",
+        sign=f"positive pushes {'ahead' if axis == 'X' else 'to starboard'}",
+        source="(2.12); 3.2.3, on a triangle basis",
+        settings=(f"{stem}_range",),
+        search=Search(smooth=True),
+        description=f"free addition to the {way} force of the {d.title} over the command",
+    )
+    def function(f: Thrust, now: Running, *values: Number) -> Thrust:
+        *nodes, span = values
+        return added(f, d.members, axis, interpolate(now.part[place], -span, span, nodes))
+
+    return function
+
+
+def thrust_curve(d: Devices) -> Effect:
+    """The surge force is another ahead than astern, and has a dead band over the command."""
+    name, (place, _) = "thrust_curve", d.commands
+    ways = (f"{name}_ahead", f"{name}_astern")
+    band = f"{name}_deadband"
+
+    def sentence(f: Found) -> str:
+        change = {way: f[f"{name}_{way}"] for way in ("ahead", "astern")}
+        parts = [f"{percent(x)} {'more' if x > 0.0 else 'less'} {way}" for way, x in change.items() if x]
+        push = f"push {' and '.join(parts)} than the model believes" if parts else ""
+        still = f"do nothing at commands below {percent(f[band])}" if f[band] else ""
+        return f"The {d.title} {' and '.join(filter(None, (push, still)))}."
+
+    @declared(
+        d,
+        name,
+        (
+            *[
+                parameter(
+                    way, "1", f"relative change of the {d.label} force {way.split('_')[-1]}", SHARE
+                )
+                for way in ways
+            ],
+            parameter(band, "1", f"{d.label} surge command without effect", Range(0.0, 0.9)),
+        ),
+        sentence,
+        axis="X",
+        pictures=(d.picture("force over command", "X"),),
+        formula="f = f_nominal(c') · (1 + ahead or astern), c' = c less its dead band",
+        symbol="ahead, astern, dead band",
+        sign="positive: more force than assumed",
+        source="(2.10)-(2.12)",
+        linear=False,
+        search=Search(tries=[{}, *[{band: x} for x in COMMAND_DEADBANDS]], fitted=ways),
+        description=f"surge force of the {d.title} asymmetric and with a dead band over the command",
+    )
+    def function(f: Thrust, now: Running, ahead: Number, astern: Number, least: Number) -> Thrust:
+        c = now.part[place]
+        size = abs(c)
+        left = fmax(0.0, size - least) / fmax(size, 1e-9)
+        gain = 1.0 + where(c > 0.0, ahead, astern)
+        for k in d.members:
+            f = pushed(f, k, f.X[k] * left * gain, f.Y[k])
+        return f
+
+    return function
