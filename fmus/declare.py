@@ -307,6 +307,7 @@ class Component:
         starts: start values of parameters and inputs that are not those of the declaration.
         any_ship: whether it serves every ship; False where it names the parts of one.
         outline: of the ship that it is the hull of.
+        trial: the manoeuvring trial that it conducts by its output ``order``; empty: none.
     """
 
     name: str
@@ -326,6 +327,7 @@ class Component:
     starts: Mapping[str, float] = field(default_factory=dict)
     any_ship: bool = True
     outline: Outline | None = None
+    trial: str = ""
 
     def starting(self, starts: Mapping[str, float]) -> "Component":
         """The same component with other start values of some parameters or inputs."""

@@ -8,9 +8,10 @@ import pytest
 from support.project import COMPONENTS
 
 from fmus.declare import flatten, packer, variables
+from fmus.signals import Target
 
-# Those that follow nothing but time.
-GUIDANCE = [n for n, c in COMPONENTS.items() if n.startswith("guidance_") and not variables(c.inputs)]
+# Paths that follow nothing but time.
+GUIDANCE = [n for n, c in COMPONENTS.items() if c.outputs is Target and not variables(c.inputs)]
 
 
 def follow(name, seconds, h=0.01, **parameters):
@@ -34,13 +35,13 @@ LIVELY = {
     "guidance_setpoint": {"psi_s": 2.5},
     "guidance_ellipse": {"a_x": 1.5, "a_y": 0.6, "pulse": 1.0},
     "guidance_eight": {"a_x": 1.5, "a_y": 0.6, "pulse": 0.7, "pulse_rise": 100.0},
-    "guidance_zigzag": {"length": 1.0, "psi_c": 2.0, "pulse": 0.5},
+    "guidance_zigzag_path": {"length": 1.0, "psi_c": 2.0, "pulse": 0.5},
     "guidance_waypoints": {
         "x_2": 6.0, "loop": 0.0, "psi_given": 1.0, "psi_2": 1.0, "psi_3": 3.0, "psi_4": -3.0,
         "u_given": 1.0, "u_1": 0.08, "u_2": 0.05, "u_3": 0.07, "pulse": 0.3,
     },
 }  # fmt: skip
-PACED = ["guidance_ellipse", "guidance_eight", "guidance_zigzag", "guidance_waypoints"]
+PACED = ["guidance_ellipse", "guidance_eight", "guidance_zigzag_path", "guidance_waypoints"]
 
 
 @pytest.mark.parametrize("seconds", [6.0, pytest.param(60.0, marks=pytest.mark.slow)])
@@ -119,7 +120,7 @@ def test_mean_speed_of_pulses_is_exact_whatever_the_step(pulse, width, h):
 
 
 def test_zigzag_goes_along_its_course_and_returns_astern():
-    rows = follow("guidance_zigzag", 137.5)
+    rows = follow("guidance_zigzag_path", 137.5)
     x, y, psi = rows[:, :3].T
     assert rows[0, :6] == pytest.approx([3.0, 0.5, 0.35, 0.0, 0.0, 0.0])
     assert (x.min(), x.max()) == pytest.approx((3.0, 7.0), abs=1e-6)
@@ -138,8 +139,8 @@ def test_zigzag_goes_along_its_course_and_returns_astern():
 
 def test_zigzag_lies_where_it_is_wanted():
     """Another course turns the path about its start."""
-    north = follow("guidance_zigzag", 50.0, x_0=0.0, y_0=0.0)
-    turned = follow("guidance_zigzag", 50.0, x_0=2.0, y_0=-1.0, psi_c=1.1)
+    north = follow("guidance_zigzag_path", 50.0, x_0=0.0, y_0=0.0)
+    turned = follow("guidance_zigzag_path", 50.0, x_0=2.0, y_0=-1.0, psi_c=1.1)
     c, s = math.cos(1.1), math.sin(1.1)
     for k in (0, 3, 6):
         offset = ([2.0, -1.0], [0.0, 0.0], [0.0, 0.0])[k // 3]

@@ -13,7 +13,7 @@ from cosim import InputError
 from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
 from .text_layout import text_layout
 
-SI = ("s", "m", "rad", "N", "N.m", "1")  # need not be said
+SI = ("s", "m", "rad", "N", "N.m", "1", "m/s", "rad/s", "m/s2")  # need not be said
 SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 
@@ -56,6 +56,7 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
         unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
         flip = column.flip != (sign < 0.0)
         other = {"name": name or column.name, "unit": unit, "factor": column.factor, "flip": flip}
+        other["noise"] = column.noise
         other["offset"] = sign * column.offset
         if unit is None:
             other |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}

@@ -18,7 +18,6 @@ Columns that it does not name keep their names and SI units.
 
 import codecs
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -31,6 +30,9 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 
+from .channels import BESIDE, outputs
+from .unit_factors import UNITS
+
 MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
@@ -42,16 +44,6 @@ POWER = ("power_vsp", "power_bow")  # may be beside the five
 SHOWN = 40  # characters of a name that a message shows; a broken file may have thousands (chosen)
 ALL = (*TAU, *THREE, *FIVE, *POWER)
 
-# Factor to SI of every unit that a quantity may be in.
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254},
-    "angle": {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
-    "command": {"1": 1.0, "%": 1e-2},
-    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
-}
 # Quantity of a described ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
 QUANTITY = {
@@ -63,6 +55,7 @@ QUANTITY = {
     "tau_Y": "force",
     "tau_N": "moment",
 } | dict.fromkeys((*THREE, *FIVE, *POWER), "command")
+QUANTITY |= BESIDE
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
@@ -72,6 +65,16 @@ CALLED: dict[str, tuple[str, ...]] = {
     "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
     "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
     "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
+    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
+    "v": ("swayspeed", "swayvelocity", "velocitysway"),
+    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
+    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
+    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
+    "speed": ("sog", "speedoverground"),
+    "course": ("cog", "courseoverground"),
+    "u_water": ("stw", "speedthroughwater"),
+    "wind_speed": ("truewindspeed", "tws"),
+    "wind_direction": ("truewinddirection", "twd"),
 }
 OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
@@ -91,6 +94,9 @@ class Column(BaseModel):
     flip: bool = Field(default=False, description="whether its axis points the other way")
     offset: float = Field(
         default=0.0, allow_inf_nan=False, description="what is added, in its unit, after the flip"
+    )
+    noise: float | None = Field(
+        default=None, gt=0.0, allow_inf_nan=False, description="standard deviation, in its unit"
     )
 
 
@@ -133,7 +139,8 @@ class Layout(BaseModel):
                 raise ValueError(f"'{key[:SHOWN]}' is not a signal of a run{nearest(key, QUANTITY)}")
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is not zero")
-            every = [UNITS[q] for q in OF_UNIT.values()] if of_ship else [UNITS[QUANTITY[key]]]
+            own = QUANTITY | outputs([key])
+            every = [UNITS[own[key]]] if key in own else [UNITS[q] for q in OF_UNIT.values()]
             units = [unit for table in every for unit in table]
             if column.unit is not None and column.unit not in units:
                 raise ValueError(
@@ -200,7 +207,7 @@ def layout_of(
     Raises:
         InputError: no unit of that signal.
     """
-    known = {*QUANTITY, *commands}
+    known = {*QUANTITY, *commands, *outputs(commands)}
     told = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
     told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
@@ -253,7 +260,7 @@ def read_layout(path: Path) -> Layout | None:
 def signals(
     layout: Layout, names: Sequence[str], where: str, commands: Mapping[str, str] | None = None
 ) -> list[str]:
-    """The signals of a run that a file has: time, pose, and one form of the commands or more.
+    """The signals of a run that a file has: time, pose, commands in one form or more, and others.
 
     A force on an axis that is never commanded needs no column, unless one has nearly its name.
 
@@ -270,7 +277,7 @@ def signals(
     every = COMMANDS if commands is None else (tuple(commands), TAU)
     groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
     if commands is not None:
-        known = {*QUANTITY, *commands}
+        known = {*QUANTITY, *commands, *outputs(commands)}
         for signal in layout.columns:
             if signal not in known:
                 raise InputError(f"{where}: '{signal[:SHOWN]}' is no signal{nearest(signal, known)}")
@@ -285,7 +292,10 @@ def signals(
         groups.append(POWER)
     ours = layout is LOG or (commands is not None and layout == log_of(commands))
     named = [signal for signal in layout.columns if not ours]
-    wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named])
+    beside = [
+        s for s in (*BESIDE, *outputs(commands or ())) if layout.column(s).name in names and not ours
+    ]
+    wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named, *beside])
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):
         name = layout.column(signal).name

@@ -12,6 +12,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.ship import Ship, ship
 
+from .channels import outputs
 from .cleaning import in_order, lost, repeated
 from .columns import (
     CALLED,
@@ -85,7 +86,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     """
     of = of or ship()
     commands = of.commands or {}
-    quantity = QUANTITY | {name: OF_UNIT[unit] for name, unit in commands.items()}
+    quantity = QUANTITY | outputs(commands) | {name: OF_UNIT[unit] for name, unit in commands.items()}
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
         raise InputError(f"'{path}' is no CSV or Parquet file, of which columns can be told")
     text = Layout()

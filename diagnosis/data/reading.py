@@ -6,8 +6,9 @@ files that NTNU publishes of CyberShip Enterprise 1.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,8 @@ from fmus.effects.cse1 import ASIDE
 from fmus.ship import Ship, ship
 from fmus.thrusters.allocation import Allocation, thrust
 
-from .beside import decimal_comma, refuse_preamble, refuse_separator, refuse_units
+from .beside import refuse_preamble, refuse_separator, refuse_units
+from .channels import BESIDE, outputs
 from .columns import (
     ALL,
     FIVE,
@@ -27,7 +29,6 @@ from .columns import (
     POSE,
     POWER,
     QUANTITY,
-    SHOWN,
     TAU,
     THREE,
     Layout,
@@ -40,6 +41,8 @@ from .columns import (
 )
 from .csv_tables import csv_names, csv_table
 from .matlab_files import read_matlab
+from .table_cells import date_stamps, numbers
+from .unit_factors import UNITS
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
@@ -68,6 +71,8 @@ class Run:
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
         signals: names of ``commands``.
+        measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
+        noise: signal -> standard deviation that the file beside tells [SI].
     """
 
     name: str
@@ -83,11 +88,14 @@ class Run:
     file: Path | None = None
     absent: tuple[str, ...] = ()
     signals: tuple[str, ...] = THREE
+    measured: Mapping[str, np.ndarray] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
         columns = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(self, **{n: c[keep] for n, c in columns.items() if isinstance(c, np.ndarray)})
+        kept = {n: c[keep] for n, c in columns.items() if isinstance(c, np.ndarray)}
+        return replace(self, **kept, measured={s: c[keep] for s, c in self.measured.items()})
 
 
 def propellers(five: np.ndarray) -> np.ndarray:
@@ -127,8 +135,24 @@ def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None)
     name = path.absolute().parent.name if path.name in LOGS else path.stem
     of = of or ship()
     is_matlab = path.suffix == ".mat" and of.commands is None
-    columns, called = (read_matlab(path), {}) if is_matlab else _tabular(path, layout, of.commands)
-    return replace(_run(name, columns, f"'{path}'", of), called=called or None, file=path)
+    if is_matlab:
+        return replace(_run(name, read_matlab(path), f"'{path}'", of), file=path)
+    table = _tabular(path, layout, of.commands)
+    return replace(_of_table(name, table, f"'{path}'", of), file=path)
+
+
+class _Table(NamedTuple):
+    """Signals of a table in SI, names of their columns where these are others, and their noise [SI]."""
+
+    columns: dict[str, np.ndarray]
+    called: dict[str, str]
+    noise: dict[str, float]
+
+
+def _of_table(name: str, table: _Table, where: str, of: Ship) -> Run:
+    """A run of a table's signals."""
+    run = _run(name, table.columns, where, of)
+    return replace(run, called=table.called or None, noise=table.noise)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
@@ -175,6 +199,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         held,
         absent=absent,
         signals=own,
+        measured={s: c for s, c in columns.items() if s in {*BESIDE, *outputs(own)}},
     )
 
 
@@ -186,10 +211,8 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
 
 
-def _tabular(
-    path: Path, layout: Layout | None, commands: Mapping[str, str] | None
-) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Signals of a CSV or Parquet file, and the names of their columns where these are others."""
+def _tabular(path: Path, layout: Layout | None, commands: Mapping[str, str] | None) -> _Table:
+    """Signals of a CSV or Parquet file."""
     given = layout or read_layout(path)
     try:
         names = column_names(path, given or Layout())
@@ -228,8 +251,7 @@ def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None)
     log = LOG if of.commands is None else log_of(of.commands)
     layout = log if is_log else layout_of(names, frame.attrs.get("units", {}), where, of.commands or ())
     wanted = signals(layout, names, where, of.commands)
-    columns, called = _signals(frame, layout, wanted, Path(name), of.commands or {})
-    return replace(_run(name, columns, where, of), called=called or None)
+    return _of_table(name, _signals(frame, layout, wanted, Path(name), of.commands or {}), where, of)
 
 
 def _signals(
@@ -238,40 +260,23 @@ def _signals(
     wanted: Sequence[str],
     path: Path,
     commands: Mapping[str, str],
-) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Signals of a table in SI, and the names of their columns where these are others."""
-    columns = {}
+) -> _Table:
+    columns, noise = {}, {}
+    quantities = QUANTITY | outputs(commands) | {s: OF_UNIT[unit] for s, unit in commands.items()}
     for signal in wanted:
         column = layout.column(signal)
         if table.columns.tolist().count(column.name) > 1:
             raise InputError(f"'{path}' has the column '{column.name}' more than once")
         cells = table[column.name]
-        stamps = _seconds(cells, f"'{path}'") if signal == "time" else None
+        stamps = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if stamps is None:
-            quantity = OF_UNIT[commands[signal]] if signal in commands else QUANTITY[signal]
-            columns[signal] = to_si(_numbers(cells, path, layout), signal, column, quantity)
+            columns[signal] = to_si(numbers(cells, path, layout), signal, column, quantities[signal])
         else:
             columns[signal] = stamps
-    return columns, {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
-
-
-def _seconds(cells: pd.Series, where: str) -> np.ndarray | None:
-    """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
-    if not pd.api.types.is_datetime64_any_dtype(cells):
-        try:
-            if not np.isnan(np.asarray(pd.to_numeric(cells, errors="coerce"), float)).all():
-                return None
-        except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
-            return None
-        cells = cells.astype("string").str.replace(",", ".")
-    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
-    wrong = np.flatnonzero(stamps.isna() & cells.notna())
-    if stamps.isna().all():
-        return None
-    if wrong.size:
-        text = str(cells.iloc[wrong[0]])[:SHOWN]
-        raise InputError(f"{where}: {cells.name} = {text!r} is no date stamp of ISO 8601")
-    return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+        if column.noise is not None:
+            noise[signal] = column.noise * UNITS[quantities[signal]].get(column.unit or "", 1.0)
+    called = {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
+    return _Table(columns, called, noise)
 
 
 def column_names(path: Path, layout: Layout) -> list[str]:
@@ -291,17 +296,3 @@ def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
     table = csv_table(path, layout, wanted)
     refuse_units(path, layout, table)
     return table
-
-
-def _numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
-    """A column as floats; empty cells are NaN."""
-    try:
-        numbers = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
-    except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
-        raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
-    wrong = np.flatnonzero(np.isnan(numbers) & np.asarray(cells.notna()))
-    if wrong.size:
-        text = str(cells.iloc[wrong[0]])[:SHOWN]
-        hint = decimal_comma(path, layout, text)
-        raise InputError(f"'{path}': {cells.name} = {text!r} is not a number{hint}")
-    return numbers

@@ -35,10 +35,10 @@ def thinned(track: Track) -> Track:
     valid = track.valid
     of_valid = _by(part, np.where(valid, run.time, np.nan)).mean()
     time = of_valid.fillna(_by(part, run.time).mean()).to_numpy()[:, 0]
-    measured = np.where(valid[:, None], track.pose, np.nan)
-    pose = _by(part, measured).median().to_numpy()
+    seen = np.where(valid[:, None], track.pose, np.nan)
+    pose = _by(part, seen).median().to_numpy()
     moved = np.nan_to_num(np.gradient(pose, time, axis=0))[part] * (run.time - time[part])[:, None]
-    pose = _by(part, measured - moved).median().to_numpy()
+    pose = _by(part, seen - moved).median().to_numpy()
     gone = np.isnan(pose).any(axis=1)
     frozen = gone & _by(part, track.frozen).max().to_numpy()[:, 0]
     dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
@@ -47,13 +47,15 @@ def thinned(track: Track) -> Track:
         for name in ("tau_cmd", "commands", "five", "power")
         if (values := getattr(run, name)) is not None
     }
+    near = np.searchsorted(run.time, time).clip(0, run.time.size - 1)
+    measured = {name: values[near] for name, values in run.measured.items()}
     held = None if run.held is None else _by(part, run.held).mean().to_numpy()[:, 0] > 0.5
     note = (
         f"{run.time.size} rows, {row:.3g} s apart, thinned to {time.size}, {width:.3g} s apart: "
         "medians of the pose, means of the commands"
     )
     return Track(
-        replace(run, time=time, pose=pose, held=held, **commands),
+        replace(run, time=time, pose=pose, held=held, measured=measured, **commands),
         pose,
         frozen,
         dropped,

@@ -9,7 +9,7 @@ import numpy as np
 from cosim import InputError
 from fmus.scale import CSE1, Scale
 
-from .columns import UNITS
+from .unit_factors import UNITS
 
 GO_ON = "--anyway goes on all the same"
 # s between two samples of a measurement, by which a unit of time is guessed (chosen)

@@ -70,18 +70,24 @@ def pushed(f: Thrust, k: int, X: Any, Y: Any) -> Thrust:
     return f._replace(X=with_one(f.X, k, X), Y=with_one(f.Y, k, Y))
 
 
+def replaced(
+    values: tuple[Any, ...], members: Sequence[int], change: Callable[[Any], Any]
+) -> tuple[Any, ...]:
+    """The values with some changed; those that are one object, as of actuators alike, only once."""
+    known = {id(values[k]): values[k] for k in members}
+    after = {key: change(x) for key, x in known.items()}
+    return tuple([after[id(x)] if k in members else x for k, x in enumerate(values)])
+
+
 def changed(f: Thrust, members: Sequence[int], change: Callable[[Any], Any]) -> Thrust:
     """The forces with both components of some actuators changed."""
-    for k in members:
-        f = pushed(f, k, change(f.X[k]), change(f.Y[k]))
-    return f
+    return f._replace(X=replaced(f.X, members, change), Y=replaced(f.Y, members, change))
 
 
 def added(f: Thrust, members: Sequence[int], axis: str, extra: Any) -> Thrust:
     """The forces with more of some actuators [N], each along an axis."""
-    for k in members:
-        f = pushed(f, k, f.X[k] + extra, f.Y[k]) if axis == "X" else pushed(f, k, f.X[k], f.Y[k] + extra)
-    return f
+    more = replaced(getattr(f, axis), members, lambda x: x + extra)
+    return f._replace(X=more) if axis == "X" else f._replace(Y=more)
 
 
 def parameter(name: str, unit: str, text: str, limits: Range = ANY) -> Variable:

@@ -3,7 +3,7 @@
 from ..declare import Range
 from ..ops import Number, fmax, where
 from .curve import NODES, interpolate, node_parameters
-from .devices import SHARE, Devices, added, changed, declared, parameter, pushed
+from .devices import SHARE, Devices, added, changed, declared, parameter, replaced
 from .effect import Effect, Running, Search, Thrust
 from .text import Found, peak, percent, reach, towards
 
@@ -158,8 +158,6 @@ def thrust_curve(d: Devices) -> Effect:
         size = abs(c)
         left = fmax(0.0, size - least) / fmax(size, 1e-9)
         gain = 1.0 + where(c > 0.0, ahead, astern)
-        for k in d.members:
-            f = pushed(f, k, f.X[k] * left * gain, f.Y[k])
-        return f
+        return f._replace(X=replaced(f.X, d.members, lambda x: x * left * gain))
 
     return function

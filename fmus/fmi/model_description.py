@@ -4,7 +4,7 @@ import uuid
 from xml.etree.ElementTree import Element, SubElement
 
 from ..base_units import base_exponents
-from ..declare import Component, Outline, Variable, width
+from ..declare import Component, Variable, width
 from .trace import initial_dependencies, output_dependencies
 
 TOOL = "cybership"  # whose vendor annotations these are
@@ -61,8 +61,7 @@ def model_description(
     for name, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=text)
     SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize="0.01")
-    if component.outline is not None:
-        _annotation(root, component.outline)
+    _annotations(root, component)
     _variables(root, component)
     return root
 
@@ -74,11 +73,17 @@ def _units(root: Element, component: Component) -> None:
         SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", exponents)
 
 
-def _annotation(root: Element, outline: Outline) -> None:
-    """What tools draw of the ship: corners ``forward,starboard`` [m] with blanks between."""
+def _annotations(root: Element, component: Component) -> None:
+    """What tools draw of the ship, corners ``forward,starboard`` [m] with blanks between; the trial."""
+    outline = component.outline
+    if outline is None and not component.trial:
+        return
     tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
-    corners = " ".join(f"{x!r},{y!r}" for x, y in outline.corners)
-    SubElement(tool, "Ship", name=outline.name, length=repr(outline.length), outline=corners)
+    if outline is not None:
+        corners = " ".join(f"{x!r},{y!r}" for x, y in outline.corners)
+        SubElement(tool, "Ship", name=outline.name, length=repr(outline.length), outline=corners)
+    if component.trial:
+        SubElement(tool, "Trial", kind=component.trial)
 
 
 def _variables(root: Element, component: Component) -> None:

@@ -1,89 +1,63 @@
-"""Guidance through a zig-zag manoeuvre, back and forth along a straight course (6.3.5); no inputs.
+"""Guidance of a zig-zag trial: the order is reversed whenever the heading has changed so far.
 
-The path swings to either side of a straight course: its tangent, which the heading follows, alternates
-smoothly between +psi_z and -psi_z. The target runs along the course at the speed u_t (on the path it is
-faster by 1 / cos psi), starting from rest. After ``length`` it stops smoothly and returns on the same
-path astern, with its heading as before, then ahead again and so on: it stays in its strip of the basin
-and visits speeds ahead and astern. A long ``length`` makes it a zig-zag without return.
+After a steady approach the order is put over to one side (first execute); when the heading is
+``psi_check`` off the original one, to the other side (second execute), and so on (IMO, MSC.137(76),
+4.2.4 to 4.2.8; ISO 13643-2:2017). With ``angle`` = ``psi_check`` = 10 degrees it is the 10/10 trial.
 
-With a the way made good along the course, (x, y) = (a, tan(psi_z) J(a)) in the frame of the course,
-where J' is a square wave with smooth changes of sign; all derivatives are exact, and nothing is
-integrated numerically.
+An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, Range
-from ..ops import Number, cos, fmin, sin
-from ..signals import Nothing, Target
-from .pace import Clock, Pace, tick
-from .path import PathPoint, target
-from .ramps import alternation, climb
+from ..declare import Component, Range
+from ..ops import Number, where
+from .trial_order import ANGLE, START, TENTH, Helm, Order, begun, first_side, given
+
+
+class Inputs(NamedTuple):
+    psi_hat: Annotated[float, "rad", "estimated heading, continuous over turns"] = 0.0
 
 
 class Params(NamedTuple):
-    u_t: Annotated[float, "m/s", "speed along the course", Range(-2.0, 2.0)] = 0.06
-    x_0: Annotated[float, "m", "north position at the start", FIXED] = 3.0
-    y_0: Annotated[float, "m", "east position at the start", FIXED] = 0.5
-    psi_c: Annotated[float, "rad", "direction of the course", FIXED] = 0.0
-    psi_z: Annotated[float, "rad", "heading off the course on each leg", Range(-1.2, 1.2), FIXED] = 0.35
-    leg: Annotated[float, "m", "from turn to turn along the course", Range(min=0.01), FIXED] = 1.0
-    turn: Annotated[float, "m", "length of a turn, at most a leg", Range(min=0.01), FIXED] = 0.6
-    length: Annotated[float, "m", "from end to end along the course", Range(min=0.01), FIXED] = 4.0
-    stop: Annotated[
-        float, "m", "run in which the speed is reversed, at most the length", Range(min=0.01), FIXED
-    ] = 0.4
-    pace: Pace = Pace()
+    start: START = 20.0
+    angle: ANGLE = TENTH
+    psi_check: Annotated[float, "rad", "heading off the original one at which it is reversed",
+                         Range(0.01, 1.6)] = TENTH  # fmt: skip
+    helm: Helm = Helm()
 
 
 class State(NamedTuple):
-    run: float = 0.0
-    clock: Clock = Clock()
+    """Time [s], original heading [rad], the order."""
+
+    t: Any = 0.0
+    psi_0: Any = 0.0
+    order: Any = 0.0
 
 
-def path(a: Number, p: Params) -> PathPoint:
-    """The path over the way made good a [m]; the start is in the middle of a leg."""
-    turn = fmin(p.turn, p.leg)
-    swing = alternation(a + 0.5 * p.leg, p.leg, turn)
-    north, east = cos(p.psi_c), sin(p.psi_c)
-    slope = sin(p.psi_z) / cos(p.psi_z)
-    y = slope * (swing.integral - 0.5 * climb(p.leg, turn))
-    y1, y2, y3 = slope * swing.value, slope * swing.rate, slope * swing.curvature
-    return PathPoint(
-        p.x_0 + north * a - east * y,
-        p.y_0 + east * a + north * y,
-        north - east * y1,
-        east + north * y1,
-        -east * y2,
-        north * y2,
-        -east * y3,
-        north * y3,
-    )
+def init(i: Inputs, p: Params) -> State:
+    return State(psi_0=i.psi_hat)
 
 
-def init(i: Nothing, p: Params) -> State:
-    return State()
-
-
-def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
-    clock, beat = tick(s.clock, p.pace, h)
-    run = s.run + beat.passed * p.u_t
-    stop = fmin(p.stop, p.length)
-    # Half a period of the way back and forth: what a reversal costs of the run comes on top.
-    way = alternation(run, p.length + (p.length - climb(p.length, stop)), stop)
-    rate, acceleration = beat.rates(p.u_t, 0.0)
-    return State(run, clock), target(
-        path(way.integral, p), way.value * rate, way.rate * rate * rate + way.value * acceleration
-    )
+def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Order]:
+    t = s.t + h
+    first = (s.order == 0.0) & (h > 0.0) & begun(t, p.start, h)
+    psi_0 = where(first, i.psi_hat, s.psi_0)
+    order = where(first, first_side(p.helm), s.order)
+    # How far the ship has gone to the side of its order.
+    off = order * (i.psi_hat - psi_0)
+    reversed_ = (h > 0.0) & (off >= p.psi_check) & (order * order > 0.0)
+    order = where(reversed_, -order, order)
+    return State(t, psi_0, order), given(order, p)
 
 
 COMPONENT = Component(
     name="guidance_zigzag",
-    description="Guidance through a zig-zag manoeuvre, back and forth",
+    description="Zig-zag trial: an order that is reversed by the heading",
     params=Params,
     state=State,
-    inputs=Nothing,
-    outputs=Target,
+    inputs=Inputs,
+    outputs=Order,
     init=init,
     step=step,
+    trial="zigzag",
 )

@@ -1,0 +1,50 @@
+"""Guidance of a turning circle: after a steady approach the order is put over and held; no inputs.
+
+35 degrees of rudder, or all that is permitted, to either side (IMO, MSC.137(76), 4.2.1; ISO
+13643-2:2017). With ``release`` it ends as a pull-out: that long after the first execute the order is
+taken back, and the rate that remains tells whether the ship is stable (ISO 13643-3:2017).
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import POSITIVE, Component
+from ..ops import Number, where
+from ..signals import Nothing
+from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, begun, first_side, given
+
+
+class Params(NamedTuple):
+    start: START = 20.0
+    angle: ANGLE = HARD_OVER
+    release: Annotated[float, "s", "time from execute to pull-out; 0: none", POSITIVE] = 0.0
+    helm: Helm = Helm()
+
+
+class State(NamedTuple):
+    """Time [s]."""
+
+    t: Any = 0.0
+
+
+def init(i: Nothing, p: Params) -> State:
+    return State()
+
+
+def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Order]:
+    t = s.t + h
+    out = (p.release > 0.0) & begun(t, p.start + p.release, h)
+    order = where(begun(t, p.start, h), where(out, 0.0, first_side(p.helm)), 0.0)
+    return State(t), given(order, p)
+
+
+COMPONENT = Component(
+    name="guidance_circle",
+    description="Turning circle: an order that is held, with or without a pull-out",
+    params=Params,
+    state=State,
+    inputs=Nothing,
+    outputs=Order,
+    init=init,
+    step=step,
+    trial="circle",
+)
