@@ -13,8 +13,6 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, complain, folder_name, program
 from cosim.interrupts import Held
-from cosim.results import read_options
-from fmus.ships.naming import DEFAULT
 
 from .identification import Prior
 from .progress import Advance, progress
@@ -178,22 +176,18 @@ def command_of(name: str) -> str:
 
 
 def _ship_of(options: argparse.Namespace) -> str | None:
-    """The ship that the logs among the runs are of, and say so; None: the usual one, or no log tells.
+    """The ship that the logs among the runs are of, told; None: the usual one, or no log tells.
 
     Raises:
         InputError: they are of several ships.
     """
-    paths = [path for name in RUNS for path in getattr(options, name, None) or ()]
-    logs = {path: read_options(path if path.is_dir() else path.parent) for path in paths}
-    told = {path: log.ship or log.outline.name for path, log in logs.items() if log.outline}
-    ships = dict.fromkeys(told.values())
-    if len(ships) > 1:
-        each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
-        raise InputError(f"the runs are of several ships: {each}")
-    ship = next(iter(ships), DEFAULT)
-    if ship == DEFAULT:
+    from .data import ship_of_logs  # only now: it takes a second to import
+
+    told = ship_of_logs(path for name in RUNS for path in getattr(options, name, None) or ())
+    if told is None:
         return None
-    complain(f"the ship is {ship}, as '{next(iter(told))}' says; --ship means another one", "note: ")
+    ship, path = told
+    complain(f"the ship is {ship}, as '{path}' says; --ship means another one", "note: ")
     return ship
 
 

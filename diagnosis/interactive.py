@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
-from .data import Run, read_frame
+from .data import Run, read_frame, ship_of_logs
 from .gathering import gather
 from .identification import DEFAULT, Method, Prior, shares
 from .model import Integrals, Model, ship_with, write_model
@@ -50,7 +50,8 @@ def load(
         advance: receives the name of each step when it begins.
         model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
             default.
-        ship: whose nominal model that is: the name of a shipped ship, or the path of a description.
+        ship: whose nominal model that is: the name of a shipped ship, or the path of a description; by
+            default the one that logs among the sources are of.
         horizon: length of the windows in which models predict the runs [s]; by default that of the ship.
 
     Returns:
@@ -61,8 +62,12 @@ def load(
     """
     import pandas
 
-    model = _model_of(model, ship)
     every = sources if isinstance(sources, (list, tuple)) else [sources]
+    if model is None and ship is None:
+        files = [s.folder if isinstance(s, Result) else s for s in every]
+        told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
+        ship = told[0] if told else None
+    model = _model_of(model, ship)
     found: list[str | Path | Run] = []
     for k, source in enumerate(every, 1):
         if isinstance(source, pandas.DataFrame):

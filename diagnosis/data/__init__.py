@@ -5,6 +5,7 @@ from .cleaning import Counts, Track, clean, in_order, lost, repeated
 from .other_columns import other_columns
 from .proposal import propose
 from .reading import Run, read, read_frame
+from .ship_of_logs import ship_of_logs
 from .thinning import thinned
 
 __all__ = [
@@ -20,5 +21,6 @@ __all__ = [
     "read",
     "read_frame",
     "repeated",
+    "ship_of_logs",
     "thinned",
 ]

@@ -6,6 +6,7 @@ operations of :mod:`fmus.ops`, so that it runs on floats, arrays and symbols.
 
 from typing import Any, ClassVar, NamedTuple
 
+from ..declare import DeclarationError
 from ..ops import Number
 
 Span = tuple[Any, Any]
@@ -49,6 +50,9 @@ class Law:
     known: ClassVar[dict[str, type["Law"]]] = {}
 
     def __init_subclass__(cls) -> None:
+        taken = Law.known.get(cls.name)
+        if taken is not None and taken.__module__.startswith(__package__):
+            raise DeclarationError(f"there is a law '{cls.name}' already")
         Law.known[cls.name] = cls
 
     @staticmethod

@@ -87,10 +87,11 @@ class EffectSet(Mapping[str, Effect]):
         """The set with the effects of a user's file.
 
         Args:
-            path: a Python file with functions decorated by :func:`fmus.effects.effect`.
+            path: a Python file with functions decorated by :func:`fmus.effects.effect`, or with laws of
+                actuators (:class:`fmus.actuators.law.Law`), which register themselves.
 
         Raises:
-            DeclarationError: the file cannot be read, fails, or has no effect, or one that is taken.
+            DeclarationError: the file cannot be read, fails, or declares nothing, or what is taken.
         """
         taken = {found.stem for found in (*ROOM.iterdir(), *self.files)}
         if not path.stem.isidentifier() or path.stem in taken:
@@ -102,7 +103,9 @@ class EffectSet(Mapping[str, Effect]):
         name = f"{__package__}.{path.stem}_{digest}"
         module = sys.modules.get(name) or _imported(name, path)
         found = effects_of(module)
-        if not found:
+        if not found and not any(
+            isinstance(x, type) and x.__module__ == name for x in vars(module).values()
+        ):
             raise DeclarationError(
                 f"'{path}' registers no effect; decorate a function with @effect(...)"
             )
