@@ -12,9 +12,9 @@ runs a scenario; from Python::
 
 The packages below, each using only those before it: ``compiled`` (C for the step loop and the log),
 ``fmu`` (one FMU), ``formats`` (files of the SSP and OSP standards), ``scenario`` (the user's input),
-``system`` (a scenario checked against its FMUs), ``results`` (log, metrics, pictures), ``master`` (the
-run), ``dispatch`` (runs in many processes), ``campaign`` (many runs and their table), ``export``
-(systems for other tools).
+``system`` (a scenario checked against its FMUs), ``results`` (log, metrics, pictures), ``trials``
+(manoeuvring trials and their measures), ``master`` (the run), ``dispatch`` (runs in many processes),
+``campaign`` (many runs and their table), ``export`` (systems for other tools).
 """
 
 from .lazy import lazy_names

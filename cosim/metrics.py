@@ -17,8 +17,8 @@ from .errors import InputError
 from .files import atomic_write
 from .results.log import CSV, Log, read_log
 from .results.performance import MetricsError, compute, over_time, table
-from .results.run_options import read_options
-from .scenario.roles import Roles
+from .results.run_options import RunOptions, read_options
+from .trials.trial_outcome import outcome_of_log, sheet
 
 
 def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
@@ -58,9 +58,10 @@ examples:
     return parser
 
 
-def _read(folder: Path, roles: Roles) -> Log:
+def _read(folder: Path, run: RunOptions) -> Log:
+    trial = [] if run.trial is None else [*run.roles.pose, run.trial.order]
     try:
-        return read_log(folder, roles.of("pose", "velocity", "target", "force"))
+        return read_log(folder, trial or run.roles.of("pose", "velocity", "target", "force"))
     except InputError:
         # A column or the log is missing: reading everything finds out which.
         return read_log(folder)
@@ -71,10 +72,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         run = read_options(options.folder)
-        log = _read(options.folder, run.roles)
+        log = _read(options.folder, run)
         start = run.start if options.start is None else options.start
         stop = run.stop if options.stop is None else options.stop
-        metrics = compute(log, start, stop, run.roles)
+        trial = None
+        if run.trial is None:
+            metrics = compute(log, start, stop, run.roles)
+        else:
+            length = 0.0 if run.outline is None else run.outline.length
+            trial = outcome_of_log(log, run.trial, run.roles, length, start, stop)
+            metrics = dict(trial.measures)
         if options.out is not None:
             if options.out.resolve().parent == options.folder.resolve() and options.out.name == CSV:
                 raise InputError(f"'{options.out}' is the log itself")
@@ -88,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json:
         print(json.dumps(metrics, indent=2))
     else:
-        Output().print(table(metrics))
+        Output().print(table(metrics) if trial is None else sheet(trial))
     return 0
 
 

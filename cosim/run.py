@@ -30,10 +30,11 @@ from .master.ending import Result
 from .master.simulation import simulate
 from .process.run_state import STATE
 from .process.spawned import mute_started_processes
-from .results.performance import table
+from .results.performance import METRICS, table
 from .scenario.load import cut_short, load_scenario, with_settings
 from .scenario.schema import Scenario
 from .scenario.setting import parse_assignment
+from .trials.trial_outcome import sheet
 
 EXIT_CODES = {"done": 0, "failed": FAILED, "interrupted": INTERRUPTED}
 
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             def measured(metrics: dict[str, float]) -> None:
                 shown.close()  # the metrics do not wait for the pictures
-                if not options.quiet:
+                if not options.quiet and METRICS[0].name in metrics:
                     with suppress(BrokenPipeError):
                         Output(highlight=False).print(table(metrics))
 
@@ -179,6 +180,8 @@ def _report(result: Result, quiet: bool) -> None:
     if quiet:
         return
     output = Output(highlight=False)
+    if result.trial is not None:
+        output.print(sheet(result.trial))
     if result.pace:
         output.print(
             f"real time x {result.pace['factor']:g}: {result.pace['deadline_misses']} missed deadlines, "

@@ -27,6 +27,7 @@ COSIM_LAYERS = (
     ("scenario",),
     ("system",),
     ("results",),
+    ("trials",),
     ("master", "watch"),
     ("dispatch",),
     ("export", "campaign"),
@@ -96,6 +97,7 @@ PUBLIC_TO_DIAGNOSIS = (
     "cosim.lazy",
     "cosim.process",
     "cosim.results",
+    "cosim.trials",
     "cosim.watch",
 )
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of

@@ -23,7 +23,7 @@ from ..errors import InputError, SimulationError
 from ..files import atomic_write
 from ..process.run_state import STATE
 from ..process.spawned import mute_started_processes
-from ..results.performance import METRICS
+from ..trials.measures import EVERY
 from .conduct import demand_packages, result_folder, run_campaign
 from .shown_progress import shown_progress
 
@@ -112,7 +112,7 @@ def _evaluate(options: argparse.Namespace, made: pandas.DataFrame, out: Path) ->
         _print(f"not beaten in both {' and '.join(options.pareto)}", [*found.columns], rows)
     if options.compare:
         found = differences(made, axes, options.compare, metrics)
-        units = {metric.name: metric.unit for metric in METRICS}
+        units = {metric.name: metric.unit for metric in EVERY}
         _write(found, out / "differences.csv")
         rows = [
             [

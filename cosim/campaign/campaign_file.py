@@ -7,16 +7,16 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PositiveInt, ValidationError, field_validator, model_validator
 
 from ..errors import InputError, nearest
-from ..results.performance import METRICS
 from ..scenario.load import load_scenario, telling_error
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
 from ..scenario.shipped import find_scenario
 from ..scenario.strict import Strict
+from ..trials.measures import EVERY
 
 # Columns of the table that are no axes.
 OUTCOME = ("status", "message", "wall_s", "hash")
-TAKEN = (*(metric.name for metric in METRICS), *OUTCOME)
+TAKEN = (*(metric.name for metric in EVERY), *OUTCOME)
 DISTRIBUTIONS = ("uniform", "normal", "log_uniform")
 # Runs of a campaign; chosen: a grid with a slip in it is larger, and would fill the memory first.
 MOST_RUNS = 1_000_000

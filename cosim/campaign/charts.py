@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..files import atomic_write
-from ..results.performance import METRICS
+from ..trials.measures import EVERY
 from .comparison import differences
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 NO_UNITS: Mapping[str, str] = {}
 TIMES = ("step", "stop")  # of a scenario [s]
-UNITS = {metric.name: metric.unit for metric in METRICS}
+UNITS = {metric.name: metric.unit for metric in EVERY}
 # Pairs of axes of which heat maps are drawn; chosen: three axes give three.
 MOST_MAPS = 3
 # Resolution [dots per inch] and size of one panel [inch]; taste.

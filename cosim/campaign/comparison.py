@@ -11,7 +11,7 @@ import numpy as np
 
 from ..dispatch.job import Row
 from ..errors import InputError, nearest
-from ..results.performance import METRICS
+from ..trials.measures import EVERY
 from .design import Case
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def _demand_axis(axis: str, axes: Sequence[str]) -> None:
 
 
 def _demand_metrics(metrics: Iterable[str]) -> None:
-    names = [metric.name for metric in METRICS]
+    names = [metric.name for metric in EVERY]
     for metric in metrics:
         if metric not in names:
             raise InputError(f"no metric '{metric}'{nearest(metric, names)}")
@@ -117,7 +117,7 @@ class StopRule:
         axes = list(cases[0].shown)
         if self.axis not in axes:
             raise InputError(f"'{text}': no axis '{self.axis}'{nearest(self.axis, axes)}")
-        names = [metric.name for metric in METRICS]
+        names = [metric.name for metric in EVERY]
         if self.metric not in names:
             raise InputError(f"'{text}': no metric '{self.metric}'{nearest(self.metric, names)}")
         self.relative = width.endswith("%")

@@ -16,10 +16,10 @@ from rich.table import Table
 from ..errors import InputError, SimulationError, nearest
 from ..files import atomic_write
 from ..results.log import read_log
-from ..results.performance import METRICS
 from ..scenario.schema import LogOptions, Scenario
 from ..scenario.shipped import find_parameters
 from ..system.preparation import prepare
+from ..trials.measures import EVERY
 from .conduct import Progress, demand_packages, run_campaign
 from .posterior import Posterior, read_posterior
 from .run_table import DIGITS, LOGS
@@ -189,8 +189,8 @@ def spread(made: pandas.DataFrame) -> Table:
     shown = Table(title="Performance of the members", title_justify="left", box=None, pad_edge=False)
     for name in ("metric", "mean", "5 %", "95 %", "unit", "meaning"):
         shown.add_column(name, justify="right" if name in ("mean", "5 %", "95 %") else "left")
-    for name, unit, meaning in METRICS:
-        if len(values := made[name].dropna()):
+    for name, unit, meaning in EVERY:
+        if name in made and len(values := made[name].dropna()):
             numbers = (values.mean(), values.quantile(0.05), values.quantile(0.95))
             shown.add_row(name, *(f"{x:.4g}" for x in numbers), unit, meaning)
     return shown

@@ -14,6 +14,7 @@ from ..dispatch.job import Row
 from ..errors import InputError
 from ..files import atomic_write, write_all
 from ..results.performance import METRICS
+from ..trials.measures import EVERY
 from .design import Case
 
 if TYPE_CHECKING:
@@ -141,7 +142,8 @@ def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, Row]) -> pandas.
         rows: what is kept of each, by hash.
 
     Returns:
-        Columns: the axes, the metrics (NaN where there are none), status, message, wall_s, hash.
+        Columns: the axes, the metrics (NaN where there are none; the measures of trials where there are
+        some), status, message, wall_s, hash.
     """
     import pandas
 
@@ -149,7 +151,9 @@ def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, Row]) -> pandas.
     columns: dict[str, list[Any]] = {}
     for name in ended[0][0].shown if ended else ():
         columns[name] = _plain([case.shown[name] for case, _ in ended])
-    for metric in METRICS:
+    for metric in EVERY:
+        if metric not in METRICS and not any(metric.name in rows[h].metrics for _, h in ended):
+            continue  # of trials, and these are none
         columns[metric.name] = [rows[h].metrics.get(metric.name, math.nan) for _, h in ended]
     columns["status"] = ["done" if rows[h].status == "done" else "failed" for _, h in ended]
     columns["message"] = [rows[h].message for _, h in ended]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..compiled.library import prepare_library
 from ..errors import SimulationError
 from ..master.algorithm import Master
+from ..master.ending import metrics_of, trial_of
 from ..master.loop_surroundings import interruptible, paused_collector
 from ..master.loops.chosen_loop import choose_loop
 from ..master.recorder import Recorder, demand_memory
@@ -81,8 +82,8 @@ def run_in_memory(
             master.close()
             if keep is not None and log is not None:
                 keep(log)
-    window = scenario.metrics
-    return performance.compute(recorder.kept(), window.start, window.stop, scenario.roles)
+    columns = recorder.kept()
+    return metrics_of(system, columns, trial_of(system, columns))
 
 
 def _step(master: Master, recorder: Recorder, interrupted: Callable[[], bool]) -> None:

@@ -1,4 +1,4 @@
-"""The ship that an FMU is the hull of: an annotation in its model description says how to draw it."""
+"""What annotations in model descriptions tell: the ship that an FMU is the hull of, and a trial."""
 
 import math
 from collections.abc import Mapping
@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 SHIP = "Tool[@name='cybership']/Ship"  # among the vendor annotations
+TRIAL = "Tool[@name='cybership']/Trial"
 MOST_CORNERS = 1000
 
 
@@ -42,3 +43,21 @@ def read_outline(annotations: Element | None) -> Outline | None:
         return None
     corners = [corner.split(",") for corner in ship.get("outline", "").split()]
     return Outline.read({**ship.attrib, "corners": corners})
+
+
+class Trial(NamedTuple):
+    """A manoeuvring trial.
+
+    Attributes:
+        kind: such as ``zigzag``.
+        order: the signal of the order under trial, ``instance.variable``.
+    """
+
+    kind: str
+    order: str
+
+
+def read_trial(annotations: Element | None, instance: str) -> Trial | None:
+    """The trial that an FMU conducts, by its output ``order``; None: it conducts none."""
+    trial = None if annotations is None else annotations.find(TRIAL)
+    return None if trial is None else Trial(trial.get("kind", ""), f"{instance}.order")

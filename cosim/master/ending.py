@@ -18,6 +18,7 @@ from ..results.log_frame import log_frame
 from ..results.picture_files import Drawn
 from ..results.run_options import RunOptions, read_options
 from ..system.system import System
+from ..trials.trial_outcome import Outcome, outcome_of_log
 from .loop_surroundings import paused_collector
 from .recorder import Recorder
 
@@ -40,6 +41,7 @@ class Result:
         loop: which step loop ran, ``compiled`` or ``plain``; empty if none did.
         loop_reason: why it was the plain one.
         native: whether the project's own FMUs were compiled; None where there are none.
+        trial: measures and limits where it is a manoeuvring trial; None: it is none.
     """
 
     status: str
@@ -52,6 +54,7 @@ class Result:
     loop: str = ""
     loop_reason: str = ""
     native: bool | None = None
+    trial: Outcome | None = None
 
     def __repr__(self) -> str:
         told = [f"{self.status}: {self.rows} rows in '{self.folder}'", self.message]
@@ -110,6 +113,31 @@ def interrupted_late(result: Result) -> None:
             update_json(path, json.loads(path.read_text("utf-8")), {"status": result.status})
 
 
+def trial_of(system: System, columns: logs.Log) -> Outcome | None:
+    """The manoeuvring trial that a run is, measured; None: it is none.
+
+    Raises:
+        MetricsError: the order under trial never changes, or a column is missing.
+    """
+    if system.trial is None:
+        return None
+    window, roles = system.scenario.metrics, system.scenario.roles
+    length = 0.0 if system.outline is None else system.outline.length
+    return outcome_of_log(columns, system.trial, roles, length, window.start, window.stop)
+
+
+def metrics_of(system: System, columns: logs.Log, trial: Outcome | None) -> dict[str, float]:
+    """What metrics.json holds: the measures of a trial, or the performance.
+
+    Raises:
+        MetricsError: it cannot be computed.
+    """
+    if trial is not None:
+        return dict(trial.measures)
+    window = system.scenario.metrics
+    return performance.compute(columns, window.start, window.stop, system.scenario.roles)
+
+
 def finish(
     system: System,
     result: Result,
@@ -122,9 +150,12 @@ def finish(
     window, roles = system.scenario.metrics, system.scenario.roles
     columns = recorder.kept()
     try:
-        result.metrics = performance.compute(columns, window.start, window.stop, roles)
+        result.trial = trial_of(system, columns)
+        result.metrics = metrics_of(system, columns, result.trial)
         with writing(result):
             write_json(result.folder / logs.METRICS, result.metrics)
+            if result.trial is not None:
+                result.trial.write(result.folder)
     except performance.MetricsError as error:
         show(f"note: no metrics: {error}")
     else:
@@ -137,7 +168,11 @@ def finish(
             told = RunOptions(window.start, window.stop, roles, system.outline)
             drawn = drawing.draw(runs, result.folder, {system.scenario.name: told})
             missing = drawing.PICTURES.keys() - {path.stem for path in drawn}
-            if missing:
+            if result.trial is not None:
+                from ..trials.trial_picture import write_picture
+
+                write_picture(result.trial, result.folder)
+            elif missing:
                 show(f"note: the log lacks columns to draw {', '.join(sorted(missing))}")
     if system.scenario.log.format == "parquet" and result.status == "done":
         with writing(result):

@@ -22,13 +22,20 @@ def demand_memory(system: System, pictures: bool) -> None:
     Raises:
         InputError: this computer has less memory.
     """
-    names = (needed if pictures else read)(list(system.signals), system.scenario.roles)
+    names = _kept_names(system, list(system.signals), pictures)
     octets = 8 * (1 + len(names)) * (1 + system.steps)
     if hasattr(os, "sysconf") and octets > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
         raise InputError(
             f"{system.steps} steps are too many: metrics and pictures would need "
             f"{octets / 2**30:.3g} GiB of memory; a longer step or an earlier stop needs less"
         )
+
+
+def _kept_names(system: System, names: Sequence[str], pictures: bool) -> list[str]:
+    """Those of some columns that are kept until the end."""
+    known = {*(needed if pictures else read)(names, system.scenario.roles)}
+    known |= set() if system.trial is None else {system.trial.order}
+    return [name for name in names if name in known]
 
 
 class Recorder:
@@ -59,7 +66,7 @@ class Recorder:
         self._writer = memory if folder is None else self._log_writer(folder / CSV, system)
         self._names = [s.name for s in table.signals]
         self._outputs = self._slots(table, master.outputs)
-        self._kept_names = (needed if pictures else read)(self._names, system.scenario.roles)
+        self._kept_names = _kept_names(system, self._names, pictures)
         self._kept_slots = self._slots(table, self._kept_names)
         self._kept = np.empty((1 + len(self._kept_names), 1 + system.steps))
         self._count = 0  # rows in it

@@ -7,7 +7,7 @@ from ..system.system import System
 
 
 def describe(system: System) -> dict[str, Any]:
-    """Columns, FMUs, the ship to draw, the scenario as it was understood, versions."""
+    """Columns, FMUs, the ship to draw, the trial, the scenario as it was understood, versions."""
     columns: dict[str, dict[str, str]] = {"time": {"unit": "s", "description": "simulated time"}}
     for name in system.logged:
         variable = system.signals[name].variable
@@ -36,6 +36,7 @@ def describe(system: System) -> dict[str, Any]:
             for name, model in system.models.items()
         },
         "ship": None if system.outline is None else system.outline._asdict(),
+        "trial": None if system.trial is None else system.trial._asdict(),
         "order": system.order,
         "scenario": resolved,
         "seed": system.scenario.seed,

@@ -19,6 +19,8 @@ CSV = "log.csv"
 PARQUET = "log.parquet"
 SIDECAR = "log.json"
 METRICS = "metrics.json"
+TRIAL = "trial.json"
+TRIAL_PICTURE = "trial.png"
 CHUNK = 2**20  # bytes read at once; chosen
 
 # Column name, as in the header of ``log.csv``, -> values, shape (rows,).

@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from .drawing import PICTURES
-from .log import CSV, METRICS, PARQUET, SIDECAR
+from .log import CSV, METRICS, PARQUET, SIDECAR, TRIAL, TRIAL_PICTURE
 
 RESULTS = Path("results")
 
 
 # All that a run writes; what tells that it was a run comes last.
-FILES = (CSV, PARQUET, METRICS, *(f"{picture}.png" for picture in PICTURES), SIDECAR)
+FILES = (
+    CSV, PARQUET, METRICS, TRIAL, TRIAL_PICTURE, *(f"{picture}.png" for picture in PICTURES), SIDECAR,
+)  # fmt: skip
 
 
 def others_file(folder: Path) -> Path | None:

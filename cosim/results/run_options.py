@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from ..formats.outline import Outline
+from ..formats.outline import Outline, Trial
 from ..scenario.roles import DEFAULT_ROLES, Roles
 from .log import SIDECAR
 
@@ -17,6 +17,7 @@ class RunOptions(NamedTuple):
         roles: columns that metrics and pictures read.
         outline: of the ship; None where its FMUs do not say.
         ship: whose FMUs the project's were: a name, or the path of a description; None: the usual ship.
+        trial: the manoeuvring trial that it is; None: it is none.
     """
 
     start: float | None = None
@@ -24,6 +25,7 @@ class RunOptions(NamedTuple):
     roles: Roles = DEFAULT_ROLES
     outline: Outline | None = None
     ship: str | None = None
+    trial: Trial | None = None
 
 
 def read_options(folder: Path) -> RunOptions:
@@ -33,6 +35,9 @@ def read_options(folder: Path) -> RunOptions:
         scenario, window = told["scenario"], told["scenario"]["metrics"]
         roles = Roles.model_validate(scenario.get("roles", {}))
         outline = Outline.read(told.get("ship") or {})
-        return RunOptions(window["from"], window["to"], roles, outline, scenario.get("ship"))
+        trial = told.get("trial") and Trial(str(told["trial"]["kind"]), str(told["trial"]["order"]))
+        return RunOptions(
+            window["from"], window["to"], roles, outline, scenario.get("ship"), trial or None
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return RunOptions()

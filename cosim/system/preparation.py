@@ -124,6 +124,7 @@ def _choose_signals(system: System, unlogged: Collection[str]) -> None:
     system.logged = [name for name in system.logged if name.partition(".")[0] not in unlogged]
     needed = {*system.logged}
     needed |= set(system.scenario.roles.metric_inputs).intersection(available)
+    needed |= set() if system.trial is None else {system.trial.order}
     for c in system.connections:
         needed |= {c.source.name, c.target.name}
     needed |= system.fed
@@ -141,6 +142,7 @@ def _compact(system: System, available: Mapping[str, Variable]) -> list[str]:
     measured = [c.target.name for c in system.connections if c.source.name in sources]
     poses = [f"{name}.{axis}_m" for name in system.models for axis in ("x", "y", "psi")]
     wanted = {*system.scenario.roles.columns, *measured, *poses}
+    wanted |= set() if system.trial is None else {system.trial.order}
     return [name for name in available if name in wanted]
 
 

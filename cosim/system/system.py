@@ -7,7 +7,7 @@ from pathlib import PurePath
 from ..conversion import Conversion
 from ..errors import InputError, nearest
 from ..fmu.fmu_model import Model, Value, Variable
-from ..formats.outline import Outline, read_outline
+from ..formats.outline import Outline, Trial, read_outline, read_trial
 from ..scenario.schema import Scenario
 from .recordings import Recorded
 
@@ -90,6 +90,12 @@ class System:
         """The ship to draw: that of the first FMU which says so."""
         outlines = (read_outline(model.annotations) for model in self.models.values())
         return next((outline for outline in outlines if outline is not None), None)
+
+    @property
+    def trial(self) -> Trial | None:
+        """The manoeuvring trial that the first FMU which says so conducts."""
+        trials = (read_trial(m.annotations, n) for n, m in self.models.items() if "order" in m.variables)
+        return next((trial for trial in trials if trial is not None), None)
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""

@@ -1,0 +1,118 @@
+"""What a manoeuvring trial came to: its measures, and what the resolution allows of them."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.table import Table
+
+from ..errors import InputError
+from ..files import write_json
+from ..formats.outline import Trial
+from ..results.log import TRIAL, Log
+from ..results.performance import MetricsError
+from ..scenario.roles import Roles
+from .measures import MEASURES, limits, measure
+from .ship_passage import Passage, executes, passage
+
+DEGREES = {"rad": "°", "rad/s": "°/s"}  # how angles are shown
+
+
+class Outcome(NamedTuple):
+    """A trial, measured.
+
+    Attributes:
+        kind: of the trial, such as ``zigzag``.
+        passage: of the ship.
+        length: of the ship [m]; 0: not known.
+        measures: by name, in SI; see :data:`~cosim.trials.measures.MEASURES`.
+        limits: of some of them, by name; see :func:`~cosim.trials.measures.limits`.
+    """
+
+    kind: str
+    passage: Passage
+    length: float
+    measures: Mapping[str, float]
+    limits: Mapping[str, float]
+
+    def content(self) -> dict[str, Any]:
+        """What ``trial.json`` holds."""
+        return {
+            "trial": self.kind,
+            "length": self.length or None,
+            "executes": executes(self.passage),
+            "measures": dict(self.measures),
+            "limits": dict(self.limits),
+            "units": {m.name: m.unit for m in MEASURES if m.name in self.measures},
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write ``trial.json``."""
+        write_json(folder / TRIAL, self.content())
+
+
+def outcome(kind: str, p: Passage, length: float) -> Outcome:
+    """Measure a trial.
+
+    Args:
+        kind: of the trial.
+        p: the ship under trial.
+        length: of the ship [m]; 0: not known.
+
+    Raises:
+        InputError: no such trial, or no order.
+    """
+    found = measure(kind, p, length)
+    return Outcome(kind, p, length, found, limits(found, length) if length > 0.0 else {})
+
+
+def outcome_of_log(
+    log: Log, trial: Trial, roles: Roles, length: float, start: float | None, stop: float | None
+) -> Outcome:
+    """Measure a trial in a log.
+
+    Args:
+        log: at least time, pose and order.
+        trial: its kind, and the column of its order.
+        roles: columns of the pose.
+        length: of the ship [m]; 0: not known.
+        start, stop: first and last time used [s]; None: all.
+
+    Raises:
+        MetricsError: a column is missing, or it is no trial.
+    """
+    missing = [name for name in (*roles.pose, trial.order) if name not in log]
+    if missing:
+        raise MetricsError(f"the log lacks {', '.join(missing)}")
+    low, high = (-math.inf if start is None else start), (math.inf if stop is None else stop)
+    chosen = (log["time"] >= low) & (log["time"] <= high)
+    try:
+        columns = [log[name][chosen] for name in ("time", *roles.pose, trial.order)]
+        return outcome(trial.kind, passage(*columns), length)
+    except InputError as error:
+        raise MetricsError(str(error)) from None
+
+
+def sheet(found: Outcome, title: str = "") -> Table:
+    """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
+    shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
+    shown.add_column("measure", style="bold", no_wrap=True)
+    for name in ("value", "unit", "in L", "limit"):
+        shown.add_column(name, justify="left" if name == "unit" else "right", no_wrap=True)
+    shown.add_column("meaning")
+    for name, unit, meaning in MEASURES:
+        if name not in found.measures:
+            continue
+        value, limit = found.measures[name], found.limits.get(name)
+        in_lengths = f"{value / found.length:.2f}" if unit == "m" and found.length > 0.0 else ""
+        factor = math.degrees(1.0) if unit in DEGREES else 1.0
+        shown.add_row(
+            name,
+            f"{factor * value:.4g}",
+            DEGREES.get(unit, unit),
+            in_lengths,
+            "" if limit is None else f"{factor * limit:.4g}",
+            meaning,
+        )
+    return shown

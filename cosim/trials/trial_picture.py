@@ -1,0 +1,101 @@
+"""The picture of a manoeuvring trial, as trial reports have it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..results.canvas import DPI, WIDTH, arrange, blank, grid, save, thin
+from ..results.log import TRIAL_PICTURE
+from ..results.picture_files import Drawn
+from .ship_passage import executes
+from .trial_outcome import Outcome
+from .yaw_stability import plateaus
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HEIGHT = 4.2  # in
+SHIP, MARK = "blue", "0.4"  # colours of the ship's line, and of what is measured
+
+
+def draw_trial(found: Outcome) -> Drawn:
+    """The picture of a trial: its track, and heading and order, or rate over order."""
+    return Drawn(_figure(found))
+
+
+def write_picture(found: Outcome, folder: Path) -> None:
+    """Write it as ``trial.png``."""
+    save(_figure(found), folder / TRIAL_PICTURE, DPI)
+
+
+def _figure(found: Outcome) -> Figure:
+    figure = blank(WIDTH, HEIGHT)
+    left, right = figure.subplots(1, 2)
+    for panel in (left, right):
+        grid(panel)
+    _track(left, found)
+    PANELS[found.kind](right, found)
+    return arrange(figure)
+
+
+def _track(panel: Axes, found: Outcome) -> None:
+    """Track along and across the heading at the first execute, in metres or ship's lengths."""
+    p = found.passage
+    x_0, y_0, psi_0 = p.at(executes(p)[0])
+    size, unit = (found.length, "L") if found.length > 0.0 else (1.0, "m")
+    north, east = (p.x - x_0) / size, (p.y - y_0) / size
+    ahead = np.cos(psi_0) * north + np.sin(psi_0) * east
+    aside = np.cos(psi_0) * east - np.sin(psi_0) * north
+    panel.plot(aside, ahead, color=SHIP, linewidth=1.4)
+    panel.plot(0.0, 0.0, "o", markerfacecolor="white", markeredgecolor="black")
+    panel.set(xlabel=f"to starboard [{unit}]", ylabel=f"ahead [{unit}]", aspect="equal")
+    panel.set_adjustable("datalim")
+    m = found.measures
+    if "advance" in m:
+        panel.axhline(m["advance"] / size, color=MARK, linewidth=0.8, dashes=(5, 4))
+    if "tactical_diameter" in m:
+        side = np.sign(aside[np.argmax(np.abs(aside))])
+        panel.axvline(side * m["tactical_diameter"] / size, color=MARK, linewidth=0.8, dashes=(5, 4))
+
+
+def _heading(panel: Axes, found: Outcome) -> None:
+    """Heading off the first one, and the order as a share of its largest, over time."""
+    p = found.passage
+    times = executes(p)
+    time = p.time - times[0]
+    panel.plot(*thin(time, np.degrees(p.psi - p.at(times[0])[2])), color=SHIP, linewidth=1.4)
+    for instant in times:
+        panel.axvline(instant - times[0], color=MARK, linewidth=0.6)
+    share = panel.twinx()
+    share.plot(*thin(time, p.order / np.abs(p.order).max()), color="red", linewidth=0.9)
+    share.set(ylim=(-3.0, 3.0), yticks=[])
+    share.spines[:].set_visible(False)
+    panel.set(xlabel="time [s]", ylabel="heading [°]; order (red)")
+
+
+def _speed(panel: Axes, found: Outcome) -> None:
+    """Speed over ground over time."""
+    p = found.passage
+    speed = np.hypot(np.gradient(p.x, p.time), np.gradient(p.y, p.time))
+    panel.plot(*thin(p.time - executes(p)[0], speed), color=SHIP, linewidth=1.4)
+    panel.set(xlabel="time [s]", ylabel="speed [m/s]")
+
+
+def _rates(panel: Axes, found: Outcome) -> None:
+    """Steady rate over order, in the order of the plateaus."""
+    held = plateaus(found.passage)[1:]
+    panel.plot([h.order for h in held], [np.degrees(h.rate) for h in held], "o-", color=SHIP)
+    panel.set(xlabel="order", ylabel="rate of turn [°/s]")
+
+
+PANELS: Mapping[str, Callable[[Axes, Outcome], None]] = {
+    "circle": _heading,
+    "zigzag": _heading,
+    "stop": _speed,
+    "spiral": _rates,
+}
