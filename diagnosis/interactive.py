@@ -185,7 +185,7 @@ def diagnose(
         held_out: runs to test on only; likewise.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one by default.
+        model: the initial one; the nominal one of the runs' ship by default.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -194,8 +194,9 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    model = _model_of(model, ship)
-    shares(model.ship, prior)  # before any work
+    if model is not None or ship is not None:
+        model = _model_of(model, ship)
+        shares(model.ship, prior)  # before any work
     none = isinstance(held_out, (list, tuple)) and not held_out
     train, test = _loaded(runs, model), () if none else _loaded(held_out, model)
     found = session.diagnose(train, test, prior, model, advance, seed, by)

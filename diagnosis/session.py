@@ -9,6 +9,8 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from cosim import InputError
+from fmus.ship import ship
+from fmus.ships.naming import DEFAULT as USUAL
 
 from .assessment.bands import Bands
 from .assessment.evaluation import Evaluation, evaluate_run
@@ -126,6 +128,19 @@ def well_posed() -> Iterator[None]:
         raise InputError(f"these runs do not determine what is asked of them: {error}") from None
 
 
+def nominal(runs: Sequence[Integrals]) -> Model:
+    """The nominal model of the ship that runs are of.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    ships = dict.fromkeys(w.run.ship for w in runs)
+    if len(ships) > 1:
+        names = (USUAL if one is None else one.name for one in ships)
+        raise InputError(f"the runs are of several ships: {', '.join(names)}")
+    return Model(ship=ship(description=next(iter(ships), None)))
+
+
 @well_posed()
 def evaluate(
     runs: Sequence[Integrals],
@@ -138,7 +153,7 @@ def evaluate(
 
     Args:
         runs: see :func:`diagnosis.gather`.
-        model: the nominal one by default.
+        model: the nominal one of the runs' ship by default.
         after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
         advance: receives the name of each step when it begins.
@@ -146,7 +161,8 @@ def evaluate(
     Raises:
         InputError: the runs are so ill-conditioned that nothing can be computed of them.
     """
-    every, before = [*runs, *held_out], model or Model()
+    every = [*runs, *held_out]
+    before = model or nominal(every)
     advance(f"predicting {', '.join(w.run.name for w in every)}")
     known = [before, after, *every, *(w.smoothed for w in every)]
 
@@ -174,7 +190,7 @@ def diagnose(
         held_out: runs to test on only.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one by default.
+        model: the initial one; the nominal one of the runs' ship by default.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -182,7 +198,7 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    start = model or Model()
+    start = model or nominal([*train, *held_out])
     prior_shares(start.ship, prior)  # before any work
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import cosim
 import diagnosis
 from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
@@ -103,3 +104,16 @@ def test_a_weak_port_propeller_is_named(ship):
     assert "port propeller" in found.sentence
     low, high = effect.coefficients["loss_port"].ci95
     assert low < 0.15 < high
+
+
+def test_python_takes_the_ship_from_the_log(tmp_path):
+    """Without a word about it, and refuses runs of several ships."""
+    otter = cosim.simulate("otter_waypoints", tmp_path / "otter", stop=40.0, pictures=False)
+    runs = diagnosis.load(otter)
+    assert runs[0].run.ship == ship_with((), "otter").description
+    assert diagnosis.evaluate(runs).evaluations[0].model.ship.scale == ship_with((), "otter").scale
+    other = cosim.simulate("ellipse", tmp_path / "ellipse", stop=30.0, pictures=False)
+    with pytest.raises(InputError, match="of several ships"):
+        diagnosis.load([otter, other])
+    with pytest.raises(InputError, match="of several ships: otter, cse1"):
+        diagnosis.evaluate([*runs, *diagnosis.load(other)])

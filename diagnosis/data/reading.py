@@ -17,6 +17,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from fmus.effects.cse1 import ASIDE
 from fmus.ship import Ship, ship
+from fmus.ship_description import Description
 from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import refuse_preamble, refuse_separator, refuse_units
@@ -73,6 +74,7 @@ class Run:
         signals: names of ``commands``.
         measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
         noise: signal -> standard deviation that the file beside tells [SI].
+        ship: that was measured; None: CyberShip Enterprise 1.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Run:
     signals: tuple[str, ...] = THREE
     measured: Mapping[str, np.ndarray] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
+    ship: Description | None = None
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
@@ -199,6 +202,7 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         held,
         absent=absent,
         signals=own,
+        ship=of.description,
         measured={s: c for s, c in columns.items() if s in {*BESIDE, *outputs(own)}},
     )
 

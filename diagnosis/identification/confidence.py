@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from ..model.uncertainty import NOISE_TOLERANCE
 
@@ -44,7 +45,7 @@ class Evidence(NamedTuple):
 
 def confidence(e: Evidence) -> float:
     """Probability that the id is a true cause."""
-    a_candidate_is_right = 1.0 / (1.0 + np.exp(PER_LEFT * e.left + PER_VARIATION * e.varies - SURE))
+    a_candidate_is_right = expit(SURE - PER_LEFT * e.left - PER_VARIATION * e.varies)
     return float(e.bagged * a_candidate_is_right)
 
 

@@ -51,7 +51,7 @@ class Law:
 
     def __init_subclass__(cls) -> None:
         taken = Law.known.get(cls.name)
-        if taken is not None and taken.__module__.startswith(__package__):
+        if taken is not None and taken.__module__.startswith(f"{__package__}."):
             raise DeclarationError(f"there is a law '{cls.name}' already")
         Law.known[cls.name] = cls
 
