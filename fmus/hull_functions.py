@@ -6,23 +6,50 @@ A function gets u, v and r through the water [m/s, m/s, rad/s] and then its para
 """
 
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from .declare import POSITIVE
-from .ops import Number
+from .ops import Number, atan2, fmax, sqrt, where
 
-FUNCTIONS: dict[str, Callable[..., tuple[Any, Any, Any]]] = {}
+Function = Callable[..., tuple[Any, Any, Any]]
+
+
+class Change(NamedTuple):
+    """Parameters that a ship may have otherwise than described: an effect of its own.
+
+    Attributes:
+        stem: the effect's id; of an actuator its name follows.
+        parameters: that are added to.
+        text: what they are.
+    """
+
+    stem: str
+    parameters: tuple[str, ...]
+    text: str
+
+
+FUNCTIONS: dict[str, Function] = {}
+CHANGES: dict[str, tuple[Change, ...]] = {}  # of each function
 
 STRIPS = 10  # of a hull's length; the moment of a turn on the spot is within 2 % of the integral
+POINTS = 15  # along a hull, its ends included, as the published model of R/V Gunnerus has them
+SMALL = 1e-9  # m/s, in place of zero, by which nothing can be divided
+# L r / U of the polynomial, at the most: captive tests and turning circles reach about 1; chosen.
+SHARPEST = 2.0
 
 
-def hull_function(function: Callable[..., tuple[Any, Any, Any]]) -> Callable[..., tuple[Any, Any, Any]]:
-    """Decorator that registers a function of the hull's damping."""
-    FUNCTIONS[function.__name__] = function
-    return function
+def hull_function(*changes: Change) -> Callable[[Function], Function]:
+    """Decorator that registers a function of the hull's damping, and what may be otherwise."""
+
+    def register(function: Function) -> Function:
+        FUNCTIONS[function.__name__] = function
+        CHANGES[function.__name__] = changes
+        return function
+
+    return register
 
 
-@hull_function
+@hull_function()
 def cross_flow(
     u: Number,
     v: Number,
@@ -44,3 +71,112 @@ def cross_flow(
         force = scale * abs(speed) * speed
         Y, N = Y + force, N + x * force
     return 0.0 * v, Y, N
+
+
+@hull_function(
+    Change("cross_flow_drag", ("section_drag",), "drag of the cross-flow"),
+    Change("cross_flow_distribution", ("section_tilt", "section_ends"), "cross-flow along the hull"),
+)
+def cross_flow_along(
+    u: Number,
+    v: Number,
+    r: Number,
+    section_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0,
+    section_length: Annotated[float, "m", "length of the hull, about the origin", POSITIVE] = 1.0,
+    section_draft: Annotated[float, "m", "draft of the hull", POSITIVE] = 0.1,
+    section_drag: Annotated[float, "1", "drag coefficient of a section"] = 1.0,
+    section_tilt: Annotated[float, "1", "share by which it is more at the bow, less at the stern"] = 0.0,
+    section_ends: Annotated[float, "1", "share by which it is more at both ends, less amidships"] = 0.0,
+) -> tuple[Any, Any, Any]:
+    """Drag of the cross-flow at points from end to end, unevenly spread along the hull.
+
+    The coefficient at xi = 2 x / L is C (1 + tilt xi + ends (xi^2 - 1/3)).
+    """
+    dx = section_length / (POINTS - 1)
+    scale = -0.5 * section_density * section_draft * dx
+    Y, N = 0.0 * v, 0.0 * v
+    for k in range(POINTS):
+        xi = 2.0 * k / (POINTS - 1) - 1.0
+        x = 0.5 * section_length * xi
+        speed = v + x * r
+        drag = section_drag * (1.0 + section_tilt * xi + section_ends * (xi * xi - 1.0 / 3.0))
+        force = scale * drag * abs(speed) * speed
+        Y, N = Y + force, N + x * force
+    return 0.0 * v, Y, N
+
+
+@hull_function(
+    Change("resistance", ("drag_ahead",), "resistance ahead"),
+    Change("resistance_in_drift", ("drag_in_drift",), "resistance added by drift"),
+)
+def resistance(
+    u: Number,
+    v: Number,
+    r: Number,
+    drag_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1025.0,
+    drag_area: Annotated[float, "m2", "draft times beam", POSITIVE] = 1.0,
+    drag_ahead: Annotated[float, "1", "coefficient of the resistance"] = 0.1,
+    drag_in_drift: Annotated[float, "1/rad", "its growth with the angle of drift"] = 0.0,
+) -> tuple[Any, Any, Any]:
+    """Resistance that grows with the angle of drift, 1/2 rho (C + C_b |atan2(v, u)|) A |u| u."""
+    coefficient = drag_ahead + drag_in_drift * abs(atan2(v, u))
+    return -0.5 * drag_density * drag_area * coefficient * abs(u) * u, 0.0 * v, 0.0 * v
+
+
+@hull_function(
+    Change("resistance", ("R_0_prime",), "resistance ahead"),
+    Change("resistance_in_drift", ("X_vv_prime", "X_vr_prime"), "surge force by drift"),
+    Change("asymmetry", ("Y_0_prime", "N_0_prime"), "difference of port and starboard"),
+    Change("sway_by_drift", ("Y_v_prime", "Y_vvv_prime"), "sway force by drift"),
+    Change("yaw_by_drift", ("N_v_prime", "N_vvv_prime"), "yaw moment by drift"),
+    Change("sway_by_yaw", ("Y_r_prime", "Y_rrr_prime"), "sway force by the yaw rate"),
+    Change("yaw_by_yaw", ("N_r_prime", "N_rrr_prime"), "yaw moment by the yaw rate"),
+)
+def drift_polynomial(
+    u: Number,
+    v: Number,
+    r: Number,
+    polynomial_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1000.0,
+    polynomial_length: Annotated[float, "m", "length L between perpendiculars", POSITIVE] = 1.0,
+    polynomial_draft: Annotated[float, "m", "draft d", POSITIVE] = 0.1,
+    R_0_prime: Annotated[float, "1", "resistance ahead"] = 0.0,
+    X_vv_prime: Annotated[float, "1", "surge force, v'^2"] = 0.0,
+    X_vr_prime: Annotated[float, "1", "surge force, v' r'"] = 0.0,
+    X_rr_prime: Annotated[float, "1", "surge force, r'^2"] = 0.0,
+    X_vvvv_prime: Annotated[float, "1", "surge force, v'^4"] = 0.0,
+    Y_0_prime: Annotated[float, "1", "sway force ahead, of a hull that is not symmetric"] = 0.0,
+    Y_v_prime: Annotated[float, "1", "sway force, v'"] = 0.0,
+    Y_r_prime: Annotated[float, "1", "sway force, r'"] = 0.0,
+    Y_vvv_prime: Annotated[float, "1", "sway force, v'^3"] = 0.0,
+    Y_vvr_prime: Annotated[float, "1", "sway force, v'^2 r'"] = 0.0,
+    Y_vrr_prime: Annotated[float, "1", "sway force, v' r'^2"] = 0.0,
+    Y_rrr_prime: Annotated[float, "1", "sway force, r'^3"] = 0.0,
+    N_0_prime: Annotated[float, "1", "yaw moment ahead, of a hull that is not symmetric"] = 0.0,
+    N_v_prime: Annotated[float, "1", "yaw moment, v'"] = 0.0,
+    N_r_prime: Annotated[float, "1", "yaw moment, r'"] = 0.0,
+    N_vvv_prime: Annotated[float, "1", "yaw moment, v'^3"] = 0.0,
+    N_vvr_prime: Annotated[float, "1", "yaw moment, v'^2 r'"] = 0.0,
+    N_vrr_prime: Annotated[float, "1", "yaw moment, v' r'^2"] = 0.0,
+    N_rrr_prime: Annotated[float, "1", "yaw moment, r'^3"] = 0.0,
+) -> tuple[Any, Any, Any]:
+    """Hull of the MMG standard method (Yasukawa and Yoshimura 2015), in prime units.
+
+    Forces over 1/2 rho L d U^2, the moment over 1/2 rho L^2 d U^2, v' = v / U, r' = r L / U. The powers
+    above the second are those of v' and r' within what was measured: U in them is at least L |r| / 2.
+    """
+    turn = polynomial_length * r
+    speed = sqrt(u * u + v * v)
+    over = fmax(fmax(speed, abs(turn) / SHARPEST), SMALL)
+    vv, vr, rr = v * v, v * turn, turn * turn
+    X = where(u < 0.0, R_0_prime, -R_0_prime) * speed * speed
+    X = X + X_vv_prime * vv + X_vr_prime * vr + X_rr_prime * rr + X_vvvv_prime * vv * vv / (over * over)
+
+    def across(c_0: Any, c_v: Any, c_r: Any, vvv: Any, vvr: Any, vrr: Any, rrr: Any) -> Any:
+        linear = (c_v * v + c_r * turn) * speed
+        cubic = ((vvv * v + vvr * turn) * vv + (vrr * v + rrr * turn) * rr) / over
+        return c_0 * u * abs(u) + linear + cubic
+
+    Y = across(Y_0_prime, Y_v_prime, Y_r_prime, Y_vvv_prime, Y_vvr_prime, Y_vrr_prime, Y_rrr_prime)
+    N = across(N_0_prime, N_v_prime, N_r_prime, N_vvv_prime, N_vvr_prime, N_vrr_prime, N_rrr_prime)
+    force = 0.5 * polynomial_density * polynomial_length * polynomial_draft
+    return force * X, force * Y, force * polynomial_length * N

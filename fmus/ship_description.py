@@ -41,12 +41,16 @@ class Part(NamedTuple):
         law: see :mod:`fmus.actuators.laws` and :mod:`fmus.hull_functions`.
         title: what people call it.
         values: of its parameters; what is not named is as the law declares it.
+        order: name of the commands that it shares with others; empty: they have its own name.
+        behind: actuator in whose race it works; empty: in none.
     """
 
     name: str
     law: str
     title: str
     values: tuple[Value, ...]
+    order: str = ""
+    behind: str = ""
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
         """A number of the part, by its name."""
@@ -68,6 +72,7 @@ class Description(NamedTuple):
         functions: damping that is no product of speeds.
         actuators: what drives it, in the order of its commands.
         allocates: whether its thrusters get a force to give; else commands of each actuator.
+        wind: areas above the water, parameters of :mod:`fmus.effects.wind`; empty: not known.
     """
 
     name: str
@@ -81,6 +86,7 @@ class Description(NamedTuple):
     functions: tuple[Part, ...] = ()
     actuators: tuple[Part, ...] = ()
     allocates: bool = True
+    wind: tuple[Value, ...] = ()
 
     @property
     def scale(self) -> Scale:

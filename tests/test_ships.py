@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from support.ships import (
     AZIMUTH,
+    COMMANDED,
     EVERY_LAW,
+    LEG,
     OPEN_WATER,
     PROPELLER,
+    RACE_RUDDER,
     SHIPS,
     believed,
     described,
@@ -21,9 +24,9 @@ from support.ships import (
 )
 
 from fmus import hull_functions
-from fmus.actuators.actuation import actuators, allocate, axes, forces
+from fmus.actuators.actuation import actuators, allocate, axes, command_names, forces, ordered
 from fmus.actuators.failings import failings
-from fmus.actuators.law import Flow, Law
+from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total
 from fmus.declare import group_of, variables
 from fmus.effects import Running
@@ -160,13 +163,18 @@ LAWS = {
     "azimuth": AZIMUTH,
     "rudder": {"area": 0.02, "hull_force": 0.2, "wake": 0.1, "steering_deduction": 0.3},
     "given_force": {"F_X": 3.0, "F_Y": 2.0},
+    "propeller_behind_hull": {**OPEN_WATER, "C_2_plus": 1.6, "C_2_minus": 1.1},
+    "rudder_in_race": RACE_RUDDER,
+    "azimuth_with_leg": LEG,
 }
-FLOWS = [Flow(), Flow(1.0, 0.0), Flow(-0.6, 0.0)]
+RACE = Race(0.3, 1.2, 0.2)
+FLOWS = [Flow(race=RACE), Flow(1.0, 0.0, 1.0, race=RACE), Flow(-0.6, 0.0, -0.6, race=RACE)]
 every_law = pytest.mark.parametrize("name", LAWS)
 
 
 def test_every_law_is_tested():
-    assert set(LAWS) == set(Law.known) == {a.law for a in EVERY_LAW.actuators}
+    sailed = {a.law for a in (*EVERY_LAW.actuators, *COMMANDED.actuators)}
+    assert set(LAWS) == set(Law.known) == sailed
 
 
 @every_law
@@ -179,6 +187,8 @@ def test_commands_give_the_force_that_is_asked_for_within_reach(name, flow, a, b
     asked = [low + s * (high - low) for s, (low, high) in zip((a, b), reach, strict=False)]
     if name == "azimuth":  # the corners of its reach are beyond a circle
         asked = [x / 1.5 for x in asked]
+    if not law.components:
+        return
     commands = law.commanded(tuple(asked), flow, p)
     for c, (low, high) in zip(commands, law.limits(p), strict=True):
         assert low - 1e-9 <= c <= high + 1e-9
@@ -196,7 +206,7 @@ def test_reach_is_what_commands_within_their_limits_give(name, a, b):
         commands = [low + s * (high - low) for s, (low, high) in zip((a, b), spans, strict=False)]
         given = dict(zip("XY", law.force(tuple(commands), flow, p), strict=True))
         for axis, (low, high) in zip(law.components, law.reach(flow, p), strict=True):
-            if name == "open_water_propeller" and flow.u > 0.0 and commands[0] > 0.0:
+            if "diameter" in LAWS[name] and flow.u > 0.0 and commands[0] > 0.0:
                 assert given[axis] <= high + 1e-9  # a slow propeller that the ship drags along
             else:
                 assert low - 1e-9 <= given[axis] <= high + 1e-9
@@ -208,9 +218,10 @@ def test_one_source_serves_floats_and_arrays(name, a, b):
     law = Law.known[name]
     p = law.Parameters(**LAWS[name])
     commands = [low + s * (high - low) for s, (low, high) in zip((a, b), law.limits(p), strict=False)]
-    alone = law.force(tuple(commands), Flow(0.3, 0.1), p)
+    alone = law.force(tuple(commands), Flow(0.3, 0.1, 0.3, 0.2, 0.1, RACE), p)
     arrays = tuple(np.array([c, c]) for c in commands)
-    together = law.force(arrays, Flow(np.array([0.3, 0.3]), np.array([0.1, 0.1])), p)
+    series = [np.array([x, x]) for x in (0.3, 0.1, 0.3, 0.2, 0.1)]
+    together = law.force(arrays, Flow(*series, RACE), p)
     assert [x[1] for x in together] == pytest.approx(alone, rel=1e-12, abs=1e-15)
 
 
@@ -258,9 +269,7 @@ def test_commands_beyond_their_limits_count_as_the_limits(name, data):
     d = SHIPS[name]
     values = believed(d)
     limits = [
-        span
-        for a, own in zip(actuators(d), values, strict=True)
-        for span in a.law.limits(a.law.Parameters._make(own[:-2]))
+        span for a in ordered(d) for span in a.law.limits(a.law.Parameters._make(values[a.k][:-2]))
     ]
     goes_round = ship(description=d).layout.round
     given = [data.draw(st.floats(-3.0, 3.0) if angle else st.floats(-1e3, 1e3)) for angle in goes_round]
@@ -381,7 +390,7 @@ def pushing(d, commands, nu=(0.4, 0.1, -0.2)):
 
 def width_of(d):
     """How many commands a ship has."""
-    return sum(len(a.law.commands) for a in actuators(d))
+    return len(command_names(d))
 
 
 def without_memory(d):

@@ -9,7 +9,9 @@ from ..effects import Running, Thrust
 from ..hull import Triple
 from ..ops import Number, clip, fmax, where, wrap
 from ..ship_description import Description
-from . import laws as laws  # registers the laws
+from . import azimuth_leg as azimuth_leg  # registers laws, as the next two do
+from . import laws as laws
+from . import standard_method as standard_method
 from .failings import Actuator, goes_round
 from .law import Flow, Law
 from .response import Layout, Prepared, total
@@ -23,18 +25,31 @@ NOTHING = 1e-30  # N2, in place of zero where no actuator can push
 def actuators(ship: Description) -> tuple[Actuator, ...]:
     """The actuators of a ship, each with its law and the place of its commands."""
     found: list[Actuator] = []
+    places: dict[str, int] = {}
     first = 0
+    names = [part.name for part in ship.actuators]
     for k, part in enumerate(ship.actuators):
         law = Law.known[part.law]
-        found.append(Actuator(k, first, part, law, ship.scale, goes_round(part, law)))
-        first += len(law.commands)
+        order = part.order or part.name
+        leads = order not in places
+        own = places.setdefault(order, first)
+        behind = names.index(part.behind) if part.behind else None
+        round_ = goes_round(part, law)
+        found.append(Actuator(k, own, part, law, ship.scale, round_, leads, behind))
+        first += len(law.commands) if leads else 0
     return tuple(found)
+
+
+@cache
+def ordered(ship: Description) -> tuple[Actuator, ...]:
+    """The actuators of a ship with commands of their own, or the first with those that others share."""
+    return tuple(a for a in actuators(ship) if a.leads)
 
 
 @cache
 def command_units(ship: Description) -> dict[str, str]:
     """``ACTUATOR.COMMAND`` of every command of a ship, and its unit."""
-    return {f"{a.part.name}.{c.name}": c.unit for a in actuators(ship) for c in a.law.commands}
+    return {f"{a.order}.{c.name}": c.unit for a in ordered(ship) for c in a.law.commands}
 
 
 def command_names(ship: Description) -> tuple[str, ...]:
@@ -89,7 +104,29 @@ def within(a: Actuator, commands: Sequence[Any], p: Any) -> tuple[Any, ...]:
 
 def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
     """Velocity of a place on the ship."""
-    return Flow(u - y * r, v + x * r)
+    return Flow(u - y * r, v + x * r, u, v, r)
+
+
+def water_at(
+    ship: Description, a: Actuator, every: Sequence[Any], commands: Sequence[Any], nu: Triple
+) -> Flow:
+    """What an actuator meets: the velocity of its place, and the race that it works in.
+
+    Args:
+        ship: whose actuator it is.
+        a: the actuator.
+        every: of each actuator of the ship, what :func:`law_of` gives.
+        commands: of all of them.
+        nu: u, v, r [m/s, m/s, rad/s].
+    """
+    _, x, y = every[a.k]
+    flow = flow_at(*nu, x, y)
+    if a.behind is None:
+        return flow
+    b = actuators(ship)[a.behind]
+    p, x, y = every[b.k]
+    given = within(b, commands[b.commands], p)
+    return flow._replace(race=b.law.race(given, flow_at(*nu, x, y), p))
 
 
 def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) -> Thrust:
@@ -102,14 +139,41 @@ def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) 
         values: parameters of each actuator.
     """
     X, Y, xs, ys = [], [], [], []
-    for a, own in zip(actuators(ship), values, strict=True):
-        p, x, y = law_of(a, own)
-        f_x, f_y = a.law.force(within(a, commands[a.commands], p), flow_at(*nu, x, y), p)
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    for a, (p, x, y) in zip(actuators(ship), every, strict=True):
+        flow = water_at(ship, a, every, commands, nu)
+        f_x, f_y = a.law.force(within(a, commands[a.commands], p), flow, p)
         X.append(f_x)
         Y.append(f_y)
-        xs.append(x)
+        xs.append(a.law.acts_at(x, p))
         ys.append(y)
     return Thrust(tuple(X), tuple(Y), tuple(xs), tuple(ys), (1.0,) * len(X))
+
+
+@cache
+def measurable(ship: Description) -> dict[str, str]:
+    """``ACTUATOR.OUTPUT`` of all that can be measured of a ship's actuators, and its unit."""
+    return {
+        f"{a.part.name}.{name}": unit for a in actuators(ship) for name, unit in a.law.measurable.items()
+    }
+
+
+def output(ship: Description, name: str, commands: Sequence[Any], nu: Triple, values: Any) -> Number:
+    """What is measured of an actuator beside its commands.
+
+    Args:
+        ship: its actuators.
+        name: ``ACTUATOR.OUTPUT``, such as ``propeller.thrust``.
+        commands: of all of them.
+        nu: u, v, r [m/s, m/s, rad/s].
+        values: parameters of each actuator.
+    """
+    of, what = name.split(".")
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    a = next(a for a in actuators(ship) if a.part.name == of)
+    p, _, _ = every[a.k]
+    flow = water_at(ship, a, every, commands, nu)
+    return a.law.output(what, within(a, commands[a.commands], p), flow, p)
 
 
 class Component(NamedTuple):
@@ -195,7 +259,7 @@ def allocate(ship: Description, tau: Triple, nu: Triple, values: Any) -> tuple[A
             for w, f, weight in zip(wanted, found, weights, strict=True)
         ]
     commands: list[Any] = []
-    for a in actuators(ship):
+    for a in ordered(ship):
         p, x, y = every[a.k]
         own = tuple([f for f, c in zip(found, parts, strict=True) if c.actuator is a])
         if own:
@@ -252,8 +316,8 @@ def working(
 ) -> Running:
     """What the force of a ship's actuators may depend on."""
     part: list[Any] = []
-    for a, own in zip(actuators(ship), values, strict=True):
-        p, _, _ = law_of(a, own)
+    for a in ordered(ship):
+        p, _, _ = law_of(a, values[a.k])
         for c, (low, high) in zip(commands[a.commands], a.law.limits(p), strict=True):
             part.append(clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0))
     return Running(t, u, v, r, tuple(commands), tuple(part), (1.0,) * len(ship.actuators))
@@ -278,12 +342,8 @@ def layout(ship: Description) -> Layout:
         allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
         full=lambda p: largest(ship, p.allocation),
         limits=lambda p: tuple(
-            [
-                span
-                for a, own in zip(actuators(ship), p.plant, strict=True)
-                for span in a.law.limits(law_of(a, own)[0])
-            ]
+            [span for a in ordered(ship) for span in a.law.limits(law_of(a, p.plant[a.k])[0])]
         ),
         curved=True,
-        round=tuple([angle for a in actuators(ship) for angle in a.round]),
+        round=tuple([angle for a in ordered(ship) for angle in a.round]),
     )

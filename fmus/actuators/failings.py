@@ -27,6 +27,8 @@ class Actuator(NamedTuple):
         law: that it follows.
         scale: of its ship.
         round: for each of its commands whether it is an angle that goes round.
+        leads: whether it is the first with its commands, which others may share.
+        behind: number of the actuator in whose race it works; None: in none.
     """
 
     k: int
@@ -35,6 +37,13 @@ class Actuator(NamedTuple):
     law: type[Law]
     scale: Scale
     round: tuple[bool, ...]
+    leads: bool = True
+    behind: int | None = None
+
+    @property
+    def order(self) -> str:
+        """The name that its commands have."""
+        return self.part.order or self.part.name
 
     @property
     def commands(self) -> slice:
@@ -44,8 +53,8 @@ class Actuator(NamedTuple):
     @property
     def axis(self) -> str:
         """Axes on which its force may act."""
-        ahead = self.law.components != "Y" or self.law.name == "rudder"
-        aside = "Y" in self.law.components
+        pushes = self.law.pushes or self.law.components
+        ahead, aside = "X" in pushes, "Y" in pushes
         turns = aside or self.part.number("y") != 0.0
         return "X" * ahead + "Y" * aside + "N" * turns
 
@@ -90,9 +99,16 @@ def full_force(a: Actuator) -> float:
 def failings(a: Actuator) -> list[Effect]:
     """All that may go wrong with an actuator."""
     d = a.devices
-    lag = f"lag_{d.name}"
+    lag = f"lag_{a.order}"
     lost = parameter(
         f"inflow_{d.name}", "N.s/m", f"force of the {d.title} lost with the water's speed at its place"
+    )
+    lagging = slow(
+        d._replace(label=f"the {d.title}"),
+        lag,
+        lambda f: f"{d.does('follow')} its command with a time constant {number(f[lag])} s longer.",
+        a.commands,
+        a.round,
     )
     return [
         command_curve(d, a.law.commands[-1].name),
@@ -104,11 +120,5 @@ def failings(a: Actuator) -> list[Effect]:
         turned(d),
         elsewhere(d),
         outage(d, f"{d.name}_failure"),
-        slow(
-            d._replace(label=f"the {d.title}"),
-            lag,
-            lambda f: f"{d.does('follow')} its command with a time constant {number(f[lag])} s longer.",
-            a.commands,
-            a.round,
-        ),
+        *([lagging] if a.leads else []),
     ]

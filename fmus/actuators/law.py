@@ -4,9 +4,11 @@ A law is one subclass of :class:`Law`, which registers itself by its name. It is
 operations of :mod:`fmus.ops`, so that it runs on floats, arrays and symbols.
 """
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ..declare import DeclarationError
+from ..hull_functions import Change
 from ..ops import Number
 
 Span = tuple[Any, Any]
@@ -24,11 +26,33 @@ class Command(NamedTuple):
     angle_limit: str = ""
 
 
+class Race(NamedTuple):
+    """What a propeller makes of the water behind it.
+
+    Attributes:
+        inflow: speed of the water that it meets [m/s].
+        jet: speed of its race far behind it [m/s], by momentum theory.
+        diameter: of the propeller [m].
+    """
+
+    inflow: Any
+    jet: Any
+    diameter: Any
+
+
 class Flow(NamedTuple):
-    """Velocity [m/s, m/s] of the actuator's place through the water, along the ship's axes."""
+    """Velocity [m/s, m/s] of the actuator's place through the water, along the ship's axes.
+
+    ``hull_u`` and ``hull_v`` are those of the ship's origin, to which publications refer angles of
+    drift, ``r`` [rad/s] is the yaw rate; ``race`` is that of the propeller in front, where there is one.
+    """
 
     u: Any = 0.0
     v: Any = 0.0
+    hull_u: Any = 0.0
+    hull_v: Any = 0.0
+    r: Any = 0.0
+    race: Race | None = None
 
 
 class Law:
@@ -38,14 +62,23 @@ class Law:
         name: by which descriptions call it.
         commands: that it gets.
         components: axes X and Y of the force that it can be asked for; empty: it is not asked.
+        pushes: axes X and Y of the force that it has; empty: those of ``components``.
         limiting: parameters that are limits of commands, which are not fitted.
+        changes: what a ship may have otherwise than described.
+        in_race: whether it works in the race of a propeller; has_race: whether it has one itself.
+        measurable: what can be measured of it beside its commands -> unit.
         Parameters: NamedTuple class of its parameters, of which the place has its own.
     """
 
     name: ClassVar[str]
     commands: ClassVar[tuple[Command, ...]]
     components: ClassVar[str] = ""
+    pushes: ClassVar[str] = ""
     limiting: ClassVar[tuple[str, ...]] = ("n_max", "n_min")
+    changes: ClassVar[tuple[Change, ...]] = ()
+    in_race: ClassVar[bool] = False
+    has_race: ClassVar[bool] = False
+    measurable: ClassVar[Mapping[str, str]] = {}
     Parameters: ClassVar[type[Any]]
     known: ClassVar[dict[str, type["Law"]]] = {}
 
@@ -55,22 +88,37 @@ class Law:
             raise DeclarationError(f"there is a law '{cls.name}' already")
         Law.known[cls.name] = cls
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         """For each command the lowest and the highest value."""
         raise NotImplementedError
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         """Force on the hull (X, Y) [N, N], for commands within their limits."""
         raise NotImplementedError
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
-        """For each of ``components`` the lowest and the highest force [N]."""
+    @classmethod
+    def acts_at(cls, x: Number, p: Any) -> Number:
+        """Where along the ship [m] the force of an actuator at x [m] acts."""
+        return x
+
+    @classmethod
+    def race(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> Race | None:
+        """Its race; None: it has none that others could work in."""
+        return None
+
+    @classmethod
+    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+        """One of ``measurable``, in its unit."""
         raise NotImplementedError
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+        """For each of ``components`` the lowest and the highest force [N]."""
+        return ()
+
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         """The commands that give a force on each of ``components`` [N], within their reach."""
         raise NotImplementedError

@@ -1,10 +1,12 @@
 """The laws of actuators that descriptions may name."""
 
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping
+from math import pi
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..declare import POSITIVE, Range
 from ..ops import Number, atan2, clip, cos, fmax, fmin, power, signed_root, sin, sqrt, where
-from .law import Command, Flow, Law, Span
+from .law import Command, Flow, Law, Race, Span
 
 DIVISOR = Range(min=1e-6)
 ASTERN = Range(max=0.0)
@@ -40,21 +42,21 @@ class FixedPropeller(Law):
     components = "X"
     Parameters = Bollard
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((p.n_min, p.n_max),)
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (n,) = commands
         return bollard_thrust(n, p), 0.0 * n
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         return ((bollard_thrust(p.n_min, p), bollard_thrust(p.n_max, p)),)
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         return (bollard_speed(forces[0], p),)
 
 
@@ -73,34 +75,66 @@ class OpenWater(NamedTuple):
     n_min: Annotated[float, "1/s", "lowest shaft speed, negative where it turns astern", ASTERN] = -1.0
 
 
+def square_by_coefficient(n: Number, advance: Number, p: Any) -> Number:
+    """n |n| K_T(J) [1/s2], multiplied out, so that a propeller at rest needs no J.
+
+    Args:
+        n: shaft speed [1/s].
+        advance: speed of the water that meets the propeller [m/s].
+        p: an :class:`OpenWater`.
+    """
+    square = p.K_T0 * n * abs(n)
+    slope = p.K_T1 * advance * abs(n) / p.diameter
+    rest = p.K_T2 * advance * advance / (p.diameter * p.diameter)
+    found = where(n < 0.0, p.astern * (square + slope), square + slope + rest)
+    return where(n == 0.0, 0.0 * n, found)
+
+
 class OpenWaterPropeller(FixedPropeller):
     """Propeller with an open-water curve, wake and thrust deduction (Yasukawa and Yoshimura 2015)."""
 
     name = "open_water_propeller"
+    has_race = True
+    measurable: ClassVar[Mapping[str, str]] = {"thrust": "N"}
     Parameters = OpenWater
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def advance(cls, flow: Flow, p: Any) -> Number:
+        """Speed of the water [m/s] that meets the propeller."""
+        return (1.0 - p.wake) * flow.u
+
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (n,) = commands
-        advance = (1.0 - p.wake) * flow.u
-        # n |n| K_T(J), multiplied out, so that a propeller at rest needs no J.
-        square = p.K_T0 * n * abs(n)
-        slope = p.K_T1 * advance * abs(n) / p.diameter
-        rest = p.K_T2 * advance * advance / (p.diameter * p.diameter)
-        thrust = where(n < 0.0, p.astern * (square + slope), square + slope + rest)
-        thrust = where(n == 0.0, 0.0 * n, thrust)
+        thrust = square_by_coefficient(n, cls.advance(flow, p), p)
         return (1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0) * thrust, 0.0 * n
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
-        low, _ = OpenWaterPropeller.force((p.n_min,), flow, p)
-        high, _ = OpenWaterPropeller.force((p.n_max,), flow, p)
+    @classmethod
+    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+        (n,) = commands
+        coefficient = square_by_coefficient(n, cls.advance(flow, p), p)
+        return p.water_density * power(p.diameter, 4.0) * coefficient
+
+    @classmethod
+    def race(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> Race:
+        """By momentum theory, V sqrt(1 + 8 K_T / (pi J^2)), multiplied out."""
+        (n,) = commands
+        inflow = cls.advance(flow, p)
+        coefficient = square_by_coefficient(n, inflow, p)
+        added = 8.0 / pi * p.diameter * p.diameter * coefficient
+        jet = signed_root(inflow * abs(inflow) + added)
+        return Race(inflow, jet, p.diameter)
+
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
+        low, _ = cls.force((p.n_min,), flow, p)
+        high, _ = cls.force((p.n_max,), flow, p)
         return ((fmin(0.0, low), fmax(0.0, high)),)
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         wanted = forces[0] / ((1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0))
-        advance = (1.0 - p.wake) * flow.u
+        advance = cls.advance(flow, p)
         slope = p.K_T1 * advance / p.diameter
         rest = p.K_T2 * advance * advance / (p.diameter * p.diameter) - wanted
         ahead = (-slope + sqrt(fmax(0.0, slope * slope - 4.0 * p.K_T0 * rest))) / (2.0 * p.K_T0)
@@ -121,21 +155,21 @@ class TunnelThruster(Law):
     components = "Y"
     Parameters = Tunnel
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((-1.0, 1.0),)
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (u,) = commands
         return 0.0 * u, p.F * u
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         return ((-p.F, p.F),)
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         return (forces[0] / p.F,)
 
 
@@ -150,21 +184,21 @@ class VoithSchneider(Law):
     components = "XY"
     Parameters = Tunnel
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((-1.0, 1.0), (-1.0, 1.0))
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         surge, sway = commands
         return p.F * surge, p.F * sway
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         return ((-p.F, p.F), (-p.F, p.F))
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         return forces[0] / p.F, forces[1] / p.F
 
 
@@ -188,24 +222,24 @@ class AzimuthThruster(Law):
     limiting = ("n_max", "n_min", "alpha_max")
     Parameters = Azimuth
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((-p.alpha_max, p.alpha_max), (p.n_min, p.n_max))
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         alpha, n = commands
         thrust = bollard_thrust(n, p)
         return thrust * cos(alpha), thrust * sin(alpha)
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         most, least = bollard_thrust(p.n_max, p), bollard_thrust(p.n_min, p)
         aside = most * sin(fmin(p.alpha_max, QUARTER))
         return ((where(p.alpha_max > QUARTER, -most, least), most), (-aside, aside))
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         # One that cannot turn round runs backwards; beyond its angles it gives what it can of the force.
         X, Y = forces
         way = where((p.alpha_max <= QUARTER) & (X < 0.0), -1.0, 1.0)
@@ -235,15 +269,16 @@ class Rudder(Law):
     name = "rudder"
     commands = (Command("delta", "rad", "rudder angle"),)
     components = "Y"
+    pushes = "XY"
     limiting = ("delta_max",)
     Parameters = Foil
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((-p.delta_max, p.delta_max),)
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (delta,) = commands
         u = (1.0 - p.wake) * flow.u
         # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
@@ -258,13 +293,13 @@ class Rudder(Law):
         """Sway force [N] at an angle of 45 degrees, without drift."""
         return Rudder.force((0.5 * QUARTER,), Flow(flow.u, 0.0), p)[1]
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         most = abs(Rudder._full(flow, p)) * sin(2.0 * fmin(p.delta_max, 0.5 * QUARTER))
         return ((-most, most),)
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         # The force goes with sin(2 delta).
         full = Rudder._full(flow, p)
         sine = clip(forces[0] / where(abs(full) > SMALL, full, SMALL), -1.0, 1.0)
@@ -284,18 +319,18 @@ class GivenForce(Law):
     components = "XY"
     Parameters = Given
 
-    @staticmethod
-    def limits(p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
         return ((-p.F_X, p.F_X), (-p.F_Y, p.F_Y))
 
-    @staticmethod
-    def force(commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         return commands[0], commands[1]
 
-    @staticmethod
-    def reach(flow: Flow, p: Any) -> tuple[Span, ...]:
+    @classmethod
+    def reach(cls, flow: Flow, p: Any) -> tuple[Span, ...]:
         return GivenForce.limits(p)
 
-    @staticmethod
-    def commanded(forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    @classmethod
+    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         return forces

@@ -67,6 +67,7 @@ class ThrusterEffects(NamedTuple):
         layout: of the thrusters.
         dynamics: those with a memory.
         forces: those without.
+        changes: those that change parameters of the thrusters.
         remembering: of dynamics, those with a memory of commands and those with one of forces, each with
             its place among the memories.
     """
@@ -75,6 +76,7 @@ class ThrusterEffects(NamedTuple):
     dynamics: Group
     forces: Group
     remembering: Mapping[str, Sequence[tuple[int, Member, Memory]]]
+    changes: Group
 
 
 @cache
@@ -88,8 +90,10 @@ def thruster_effects(effects: EffectSet, layout: Layout) -> ThrusterEffects:
         memory = member.effect.memory
         assert memory is not None
         remembering[memory.of].append((k, member, memory))
-    forces = group("ThrusterEffects", [e for e in actuator if e.memory is None])
-    return ThrusterEffects(layout, dynamics, forces, remembering)
+    now = [e for e in actuator if e.memory is None]
+    forces = group("ThrusterEffects", [e for e in now if e.gives == "force"])
+    changes = group("Changes", [e for e in now if e.gives == "parameters"])
+    return ThrusterEffects(layout, dynamics, forces, remembering, changes)
 
 
 class Past(NamedTuple):

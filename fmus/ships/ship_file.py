@@ -2,10 +2,10 @@
 
 import keyword
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import (
     BaseModel,
@@ -19,14 +19,16 @@ from pydantic import (
     model_validator,
 )
 
-from ..actuators import laws as laws  # registers the laws
+from ..actuators import actuation as actuation  # registers the laws
 from ..actuators.law import Law
+from ..base_units import base_exponents
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
 from ..effects.all_thrusters import LONGEST
-from ..hull import Inertia, mass_matrix
+from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
+from .hull_errors import WIND_SETTINGS
 
 FOLDERS = (Path(__file__).parents[2] / "ships", Path(__file__).parents[1] / "shipped")
 MOST_BYTES = 1_000_000  # of a file; a ship has some hundred numbers
@@ -46,7 +48,8 @@ class Strict(BaseModel):
 class Number(Strict):
     """A number, where it comes from, and its standard deviation."""
 
-    value: Finite = Field(description="in SI units")
+    value: Finite | None = Field(None, description="in SI units")
+    prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
     origin: str = Field("guessed", description="weighed, tank test, borrowed, guessed, or a publication")
     std: PositiveFloat | None = Field(
         None, description="standard deviation in the number's unit", allow_inf_nan=False
@@ -57,18 +60,47 @@ class Number(Strict):
 
     @model_validator(mode="after")
     def _one(self) -> "Number":
+        if (self.value is None) == (self.prime is None):
+            raise ValueError("a number has value or prime")
         if self.std is not None and self.share is not None:
             raise ValueError("a number has std or share, not both")
-        if self.std is not None and self.value == 0.0:
+        if self.std is not None and 0.0 in (self.value, self.prime):
             raise ValueError("a number that is 0 has no std: it stays as it is")
         return self
 
-    def named(self, name: str) -> Value:
-        """The number as components read it."""
+    def named(self, name: str, unit: str, of: "Prime | None") -> Value:
+        """The number as components read it.
+
+        Args:
+            name: of the parameter.
+            unit: of the parameter.
+            of: what a number in prime units is over.
+
+        Raises:
+            DeclarationError: it is in prime units, of a unit that has none or on a ship that has none.
+        """
+        size = 1.0 if self.prime is None else _size(name, unit, of)
+        value = size * (self.prime or self.value or 0.0)
         share = 0.5 if self.share is None else self.share
         if self.std is not None:
-            share = self.std / abs(self.value)
-        return Value(name, self.value, self.origin, share)
+            share = size * self.std / abs(value)
+        return Value(name, value, self.origin, share)
+
+
+class Prime(NamedTuple):
+    """What numbers in prime units are over: length L [m], and mass rho L^2 d / 2 [kg]."""
+
+    length: float
+    mass: float
+
+
+def _size(name: str, unit: str, of: Prime | None) -> float:
+    if of is None:
+        raise DeclarationError(f"{name}: a number in prime units needs the table 'prime'")
+    powers = base_exponents(unit)
+    if powers.get("s"):
+        raise DeclarationError(f"{name}: a number in {unit} has no prime unit without a speed")
+    return of.mass ** powers.get("kg", 0) * of.length ** powers.get("m", 0)
 
 
 def _form(given: Any) -> str:
@@ -80,8 +112,9 @@ Given = Annotated[
 ]
 
 
-def _value(name: str, given: "float | Number") -> Value:
-    return (given if isinstance(given, Number) else Number.model_validate({"value": given})).named(name)
+def _value(name: str, given: "float | Number", unit: str, of: Prime | None) -> Value:
+    number = given if isinstance(given, Number) else Number.model_validate({"value": given})
+    return number.named(name, unit, of)
 
 
 def _speed(factor: str) -> int:
@@ -127,6 +160,15 @@ class ActuatorTable(BaseModel):
     name: Annotated[str, Field(pattern=NAME, max_length=30)]
     law: str
     title: Annotated[str, Field(max_length=60)] = ""
+    order: Annotated[str, Field(pattern=NAME, max_length=30)] | None = None
+    behind: str = ""
+
+
+class PrimeTable(Strict):
+    """What numbers in prime units are over."""
+
+    water_density: Annotated[Finite, Field(gt=0.0, description="rho [kg/m3]")]
+    draft: Annotated[Finite, Field(gt=0.0, description="d [m]; a mass is over rho L^2 d / 2")]
 
 
 class ShipTable(Strict):
@@ -142,6 +184,8 @@ class ShipTable(Strict):
     )
     allocates: bool = Field(True, description="false: the thrusters get commands instead of a force")
     inertia: dict[str, Given] = Field(json_schema_extra={"required": list(REQUIRED)})
+    prime: PrimeTable | None = None
+    wind: dict[str, Given] = {}
     hull: HullTable = HullTable()
     actuators: list[ActuatorTable] = []
 
@@ -234,9 +278,13 @@ def _told(error: ValidationError) -> str:
 
 
 def _description(table: ShipTable) -> Description:
-    actuators = tuple(_actuator(a, Scale(table.length / REFERENCE_LENGTH)) for a in table.actuators)
+    prime, L = None, table.length
+    if table.prime is not None:
+        prime = Prime(L, 0.5 * table.prime.water_density * L * L * table.prime.draft)
+    actuators = tuple(_actuator(a, Scale(L / REFERENCE_LENGTH), prime) for a in table.actuators)
     _once([a.name for a in actuators], "actuators")
-    terms = tuple(t.named(t.name) for t in table.hull.terms)
+    _belong_together(actuators, table.allocates)
+    terms = tuple(t.named(t.name, term_variable(t.name).unit, prime) for t in table.hull.terms)
     _once([t.name for t in terms], "hull.terms")
     return Description(
         table.name,
@@ -245,21 +293,43 @@ def _description(table: ShipTable) -> Description:
         table.length,
         table.beam,
         tuple(table.outline) or _box(table.length, table.beam),
-        _inertia(table.inertia),
+        _inertia(table.inertia, prime),
         terms,
-        tuple(_function(name, given) for name, given in table.hull.functions.items()),
+        tuple(_function(name, given, prime) for name, given in table.hull.functions.items()),
         actuators,
         table.allocates,
+        _values("wind", table.wind, WIND_SETTINGS, prime),
     )
 
 
-def _inertia(given: Mapping[str, Any]) -> tuple[Value, ...]:
+def _belong_together(actuators: Sequence[Part], allocates: bool) -> None:
+    """Refuse races of no propeller, and commands shared by those whose laws have others.
+
+    Raises:
+        DeclarationError: see above.
+    """
+    named = {a.name: a for a in actuators}
+    for a in actuators:
+        where, law = f"actuator '{a.name}'", Law.known[a.law]
+        if law.in_race != bool(a.behind):
+            told = "needs 'behind', the propeller in whose race it works" if law.in_race else ""
+            raise DeclarationError(f"{where}: {told or f'{a.law} works in no race'}")
+        if a.behind and (a.behind not in named or not Law.known[named[a.behind].law].has_race):
+            raise DeclarationError(f"{where}: '{a.behind}' is no propeller with a race")
+        alike = [b for b in actuators if (b.order or b.name) == (a.order or a.name)]
+        if any(Law.known[b.law].commands != law.commands for b in alike):
+            raise DeclarationError(f"{where}: others at its order have other commands")
+        if len(alike) > 1 and allocates:
+            raise DeclarationError(f"{where}: a ship of shared orders has 'allocates = false'")
+
+
+def _inertia(given: Mapping[str, Any], prime: Prime | None) -> tuple[Value, ...]:
     """Numbers of a ship's inertia.
 
     Raises:
         DeclarationError: one is missing, or the ship would gain energy by speeding up.
     """
-    found = _values("inertia", given, variables(Inertia))
+    found = _values("inertia", given, variables(Inertia), prime)
     missing = [name for name in REQUIRED if name not in given]
     if missing:
         raise DeclarationError(f"inertia: {missing[0]} is missing")
@@ -282,7 +352,9 @@ def _box(length: float, beam: float) -> tuple[tuple[float, float], ...]:
     return ((half, 0.0), (0.6 * half, side), (-half, side), (-half, -side), (0.6 * half, -side))
 
 
-def _values(where: str, given: Mapping[str, Any], declared: tuple[Variable, ...]) -> tuple[Value, ...]:
+def _values(
+    where: str, given: Mapping[str, Any], declared: tuple[Variable, ...], prime: Prime | None
+) -> tuple[Value, ...]:
     """Numbers by the names of parameters, each within its range.
 
     Raises:
@@ -293,7 +365,7 @@ def _values(where: str, given: Mapping[str, Any], declared: tuple[Variable, ...]
     for name, value in given.items():
         if name not in known:
             raise DeclarationError(f"{where}: unknown key '{name}'{nearest(name, known)}")
-        found.append(_value(name, value))
+        found.append(_value(name, value, known[name].unit, prime))
         limits: Range = known[name].range
         x = found[-1].value
         if (limits.min is not None and x < limits.min) or (limits.max is not None and x > limits.max):
@@ -301,18 +373,18 @@ def _values(where: str, given: Mapping[str, Any], declared: tuple[Variable, ...]
     return tuple(found)
 
 
-def _function(name: str, given: Mapping[str, Given]) -> Part:
+def _function(name: str, given: Mapping[str, Given], prime: Prime | None) -> Part:
     if name not in FUNCTIONS:
         raise DeclarationError(f"hull.functions: there is no '{name}'{_among(name, FUNCTIONS)}")
     declared = parameters_of(name, 3, FUNCTIONS[name])
-    return Part(name, name, name, _values(f"hull.functions.{name}", given, declared))
+    return Part(name, name, name, _values(f"hull.functions.{name}", given, declared, prime))
 
 
 def _among(name: str, known: Mapping[str, Any]) -> str:
     return nearest(name, known) or f"; there are {', '.join(known)}"
 
 
-def _actuator(a: ActuatorTable, scale: Scale) -> Part:
+def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
     where = f"actuator '{a.name}'"
     if a.law not in Law.known:
         raise DeclarationError(f"{where}: there is no law '{a.law}'{_among(a.law, Law.known)}")
@@ -331,7 +403,8 @@ def _actuator(a: ActuatorTable, scale: Scale) -> Part:
     if keyword.iskeyword(a.name):
         raise DeclarationError(f"{where}: a word of Python's own is no name")
     numbers = {name: _checked(where, name, given) for name, given in (a.model_extra or {}).items()}
-    return Part(a.name, a.law, a.title or a.name.replace("_", " "), _values(where, numbers, declared))
+    title, values = a.title or a.name.replace("_", " "), _values(where, numbers, declared, prime)
+    return Part(a.name, a.law, title, values, a.order or "", a.behind)
 
 
 def _checked(where: str, name: str, given: Any) -> "float | Number":

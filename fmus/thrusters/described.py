@@ -3,7 +3,16 @@
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
-from ..actuators.actuation import actuators, allocate, forces, layout, parameters, total, variable
+from ..actuators.actuation import (
+    actuators,
+    allocate,
+    forces,
+    layout,
+    ordered,
+    parameters,
+    total,
+    variable,
+)
 from ..actuators.response import (
     Past,
     Prepared,
@@ -37,10 +46,8 @@ def commands_of(ship: Description) -> type[Any]:
     return group_of(
         "Commands",
         [
-            Variable(
-                variable(f"{a.part.name}.{c.name}"), c.unit, f"{a.part.title}: {c.description}", 0.0
-            )
-            for a in actuators(ship)
+            Variable(variable(f"{a.order}.{c.name}"), c.unit, f"{a.part.title}: {c.description}", 0.0)
+            for a in ordered(ship)
             for c in a.law.commands
         ],
     )
@@ -52,13 +59,13 @@ def rates_of(ship: Description) -> type[Any]:
         "Rate",
         [
             Variable(
-                f"plant_{a.part.name}_{c.name}_rate",
+                f"plant_{a.order}_{c.name}_rate",
                 "1/s" if c.unit == "1" else f"{c.unit}2" if c.unit == "1/s" else f"{c.unit}/s",
                 f"{a.part.title}: limit of the rate of {c.name}; 0: none",
                 a.part.number(f"{c.name}_rate"),
                 POSITIVE,
             )
-            for a in actuators(ship)
+            for a in ordered(ship)
             for c in a.law.commands
         ],
     )
@@ -68,7 +75,7 @@ def described(effects: EffectSet, ship: Description) -> Component:
     """The FMU of a described ship's thrusters, with the effects that it may have."""
     shape = layout(ship)
     groups = thruster_effects(effects, shape)
-    lags = {f"lag_{part.name}": part.number("lag") for part in ship.actuators}
+    lags = {f"lag_{a.order}": a.part.number("lag") for a in ordered(ship)}
     slow = redeclared(groups.dynamics.params, lambda v: replace(v, start=lags.get(v.name, v.start)))
     parts = actuators(ship)
     params = bundle(
@@ -78,6 +85,7 @@ def described(effects: EffectSet, ship: Description) -> Component:
         rate=rates_of(ship)(),
         dynamics=slow(),
         wrong=groups.forces.params(),
+        changed=groups.changes.params(),
     )
     commands: Any = commands_of(ship)
     if ship.allocates:
@@ -88,7 +96,10 @@ def described(effects: EffectSet, ship: Description) -> Component:
         outputs = Applied
 
     def prepare(p: Any) -> Prepared:
-        return prepared(p, groups)
+        plant = p.plant
+        for member in groups.changes.members:
+            plant = member.apply(member.acting(p.changed), p.changed, plant, plant)
+        return prepared(p._replace(plant=plant), groups)
 
     def init(i: Any, p: Any) -> Past:
         return at_rest(groups)

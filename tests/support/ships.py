@@ -64,7 +64,9 @@ OPEN_WATER = {
     "astern": 0.7, "n_max": 12.0, "n_min": -8.0,
 }  # fmt: skip
 AZIMUTH = {"k_ahead": 0.5, "k_astern": 0.3, "n_max": 10.0}
-# Every law, in one ship.
+LEG = {**AZIMUTH, "area": 0.02, "drag": 0.3, "drag_slope": 0.3, "lift": 0.5}
+RACE_RUDDER = {"area": 0.02, "span": 0.25, "hull_force": 0.2, "gamma_minus": 0.6, "inflow_lever": -1.0}
+# Every law that is asked for force, in one ship.
 EVERY_LAW = described(
     part("port", "fixed_propeller", {**PROPELLER, "x": -1.0, "y": -0.4}),
     part("starboard", "open_water_propeller", {**OPEN_WATER, "x": -1.0, "y": 0.4, "n_rate": 5.0}),
@@ -76,7 +78,18 @@ EVERY_LAW = described(
     terms={"X_absu_u": -20.0, "Y_absu_v": -80.0, "N_uuv": -3.0, "N_r": -30.0, "Y_vvr": -1.0},
     functions=(part("cross_flow", "cross_flow", {"cross_flow_length": 2.0}),),
 )
-SHIPS = {name: read_ship(find_ship(name)) for name in shipped_ships()} | {"every_law": EVERY_LAW}
+# Laws that get commands: a rudder in a race, and two thrusters with the same commands.
+COMMANDED = described(
+    part("screw", "propeller_behind_hull", {**OPEN_WATER, "x": -1.0, "C_2_plus": 1.6}),
+    part("flap", "rudder_in_race", {**RACE_RUDDER, "x": -1.1})._replace(behind="screw"),
+    part("leg", "azimuth_with_leg", {**LEG, "x": -0.7, "y": 0.3, "lag": 0.5})._replace(order="legs"),
+    part("other_leg", "azimuth_with_leg", {**LEG, "x": -0.7, "y": -0.3})._replace(order="legs"),
+    functions=(part("resistance", "resistance", {"drag_in_drift": 0.2}),),
+)._replace(allocates=False, wind=(Value("lateral_area", 2.0, "guessed", 0.5),))
+SHIPS = {name: read_ship(find_ship(name)) for name in shipped_ships()} | {
+    "every_law": EVERY_LAW,
+    "commanded": COMMANDED,
+}
 PARTS = [f"{name} {part}" for name in SHIPS for part in ("vessel", "thrusters")]
 
 

@@ -1,0 +1,74 @@
+"""What the law of an actuator may have otherwise than described: an effect for each, by its law."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..declare import Range, Variable, variables
+from ..effects.effect import Effect, Search, Wording, effect
+from ..effects.text import Found
+from ..hull_functions import Change
+from ..ops import Number
+from .failings import Actuator
+
+
+def changed(alike: Sequence[Actuator], change: Change) -> Effect:
+    """Parameters of a law that are others than described, of all actuators that share its commands.
+
+    Args:
+        alike: actuators with the same commands and law.
+        change: of that law.
+    """
+    a = alike[0]
+    name, title = f"{change.stem}_{a.order}", " and ".join([b.part.title for b in alike])
+    known = {v.name: v for v in variables(a.law.Parameters)}
+    parameters = tuple(
+        [
+            Variable(
+                f"delta_{a.order}_{p}",
+                known[p].unit,
+                f"addition to {known[p].description}: {title}",
+                0.0,
+                Range(),
+                False,
+            )
+            for p in change.parameters
+        ]
+    )
+
+    def sentence(f: Found) -> str:
+        told = [f"{f[v.name]:+.3g} {v.unit}".removesuffix(" 1") for v in parameters]
+        return f"The {title}: {change.text} is another than the model believes, by {', '.join(told)}."
+
+    @effect(
+        name,
+        "actuator",
+        "XYN",
+        parameters=parameters,
+        wording=Wording(sentence, a.devices.family),
+        gives="parameters",
+        formula=f"{', '.join(change.parameters)} + δ, in the law {a.law.name}",
+        symbol="δ",
+        sign="an addition to the described value",
+        linear=False,
+        search=Search(differentiable=True),
+        description=f"{change.text}: {title}",
+    )
+    def function(plant: Any, *additions: Number) -> Any:
+        for b in alike:
+            own = plant[b.k]
+            names = [f"plant_{b.part.name}_{p}" for p in change.parameters]
+            more = {n: getattr(own, n) + d for n, d in zip(names, additions, strict=True)}
+            plant = plant._replace(**{b.part.name: own._replace(**more)})
+        return plant
+
+    return function
+
+
+def changes(every: Sequence[Actuator]) -> list[Effect]:
+    """What the laws of a ship's actuators may have otherwise than described."""
+    return [
+        changed([b for b in every if (b.order, b.law) == (a.order, a.law)], change)
+        for a in every
+        if a.leads
+        for change in a.law.changes
+    ]

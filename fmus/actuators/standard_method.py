@@ -1,0 +1,124 @@
+"""Propeller and rudder of the MMG standard method.
+
+H. Yasukawa and Y. Yoshimura, J. Mar. Sci. Technol. 20, 2015. The
+propeller is behind the hull, whose wake it leaves as the ship drifts; the rudder is in its race, and the
+hull straightens the flow across the rudder. The angle of drift, beta = atan2(-v, u), is that of the
+ship's origin.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+from ..declare import POSITIVE, Range, group_of, variables
+from ..ops import Number, atan2, cos, exp, fmax, sin, sqrt, where
+from .law import Change, Command, Flow, Law, Span
+from .laws import DIVISOR, SMALL, OpenWater, OpenWaterPropeller
+
+
+class DriftWake(NamedTuple):
+    """How drift takes the wake away."""
+
+    C_1: Annotated[float, "1", "how fast drift at the propeller takes the wake away", POSITIVE] = 2.0
+    C_2_plus: Annotated[float, "1", "1 - w in much drift over that in none, drift to port"] = 1.0
+    C_2_minus: Annotated[float, "1", "1 - w in much drift over that in none, drift to starboard"] = 1.0
+
+
+class PropellerBehindHull(OpenWaterPropeller):
+    """Propeller in a wake that goes as the ship drifts.
+
+    1 - w = (1 - w_P0) (1 + (1 - exp(-C1 |beta_P|)) (C2 - 1)), beta_P = beta - x_P r / U.
+    """
+
+    name = "propeller_behind_hull"
+    changes = (
+        Change("wake", ("wake",), "wake"),
+        Change("thrust_deduction", ("thrust_deduction",), "thrust deduction"),
+        Change("drift_wake", ("C_2_plus", "C_2_minus"), "wake in drift"),
+    )
+    Parameters = group_of("BehindHull", [*variables(OpenWater), *variables(DriftWake)])
+
+    @classmethod
+    def advance(cls, flow: Flow, p: Any) -> Number:
+        speed = sqrt(flow.hull_u * flow.hull_u + flow.hull_v * flow.hull_v)
+        turning = (flow.v - flow.hull_v) / fmax(speed, SMALL)
+        beta = atan2(-flow.hull_v, flow.hull_u) - turning
+        most = where(beta > 0.0, p.C_2_plus, p.C_2_minus)
+        gone = (1.0 - exp(-p.C_1 * abs(beta))) * (most - 1.0)
+        return (1.0 - p.wake) * (1.0 + gone) * flow.u
+
+
+class RaceFoil(NamedTuple):
+    """Parameters of :class:`RudderInRace`."""
+
+    area: Annotated[float, "m2", "area of the rudder", DIVISOR] = 0.01
+    span: Annotated[float, "m", "height of the rudder, H_R", DIVISOR] = 0.1
+    lift: Annotated[float, "1", "slope of the normal force's coefficient, f_alpha", DIVISOR] = 2.5
+    delta_max: Annotated[float, "rad", "largest angle to either side", POSITIVE] = 0.61
+    steering_deduction: Annotated[float, "1", "t_R, share of resistance that is not felt"] = 0.0
+    hull_force: Annotated[float, "1", "a_H, force on the hull by the rudder, as a share"] = 0.0
+    hull_force_place: Annotated[float, "m", "x_H, where the force on the hull acts"] = 0.0
+    inflow: Annotated[float, "1", "epsilon, 1 - w at the rudder over that at the propeller", DIVISOR] = (
+        1.0
+    )
+    race: Annotated[float, "1", "kappa, how far the race has got its speed", Range(-1.0, 2.0)] = 0.5
+    gamma_plus: Annotated[float, "1", "gamma_R, flow straightening, drift at the rudder to port"] = 1.0
+    gamma_minus: Annotated[float, "1", "gamma_R, flow straightening, drift to starboard"] = 1.0
+    inflow_lever: Annotated[float, "m", "l_R, lever of the yaw rate in the flow across the rudder"] = 0.0
+    bias: Annotated[float, "rad", "angle of the rudder at the command 0", Range(-0.5, 0.5)] = 0.0
+    water_density: Annotated[float, "kg/m3", "density of the water", POSITIVE] = 1000.0
+
+
+class RudderInRace(Law):
+    """Rudder in the race of a propeller.
+
+    u_R = epsilon u (1 - w) sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta) with
+    eta = D / H_R, and v_R = U gamma_R (beta - l_R r / U). F_N, X_R, Y_R and N_R follow.
+    A positive angle of a rudder aft turns a ship that goes ahead to starboard. It is not asked for
+    force, which would be that of the propeller's speed at the time.
+    """
+
+    name = "rudder_in_race"
+    commands = (Command("delta", "rad", "rudder angle"),)
+    pushes = "XY"
+    limiting = ("delta_max",)
+    in_race = True
+    changes = (
+        Change("inflow_speed", ("inflow",), "wake at the rudder"),
+        Change("race", ("race",), "speed of the race at the rudder"),
+        Change("straightening", ("gamma_plus", "gamma_minus"), "flow straightening at the rudder"),
+        Change("inflow_lever", ("inflow_lever",), "cross-flow by the yaw rate at the rudder"),
+        Change("bias", ("bias",), "angle at the command 0"),
+        Change("hull_force", ("hull_force",), "force on the hull by the rudder"),
+    )
+    Parameters = RaceFoil
+
+    @classmethod
+    def limits(cls, p: Any) -> tuple[Span, ...]:
+        return ((-p.delta_max, p.delta_max),)
+
+    @classmethod
+    def acts_at(cls, x: Number, p: Any) -> Number:
+        """Where rudder and hull together have their force."""
+        return (x + p.hull_force * p.hull_force_place) / (1.0 + p.hull_force)
+
+    @classmethod
+    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+        (delta,) = commands
+        angle = delta + p.bias
+        u, v = RudderInRace.met(flow, p)
+        normal = 0.5 * p.water_density * p.area * p.lift * sqrt(u * u + v * v)
+        normal = normal * (u * sin(angle) - v * cos(angle))
+        along = (1.0 - p.steering_deduction) * normal * sin(angle)
+        return -along, -(1.0 + p.hull_force) * normal * cos(angle)
+
+    @staticmethod
+    def met(flow: Flow, p: Any) -> tuple[Number, Number]:
+        """u_R along the ship and v_R, positive from port, of the water that meets the rudder [m/s]."""
+        assert flow.race is not None
+        inflow, jet, diameter = flow.race
+        covered = diameter / p.span
+        raced = inflow + p.race * (jet - inflow)
+        speed = sqrt(covered * raced * raced + (1.0 - covered) * inflow * inflow)
+        u = p.inflow * where(raced < 0.0, -speed, speed)
+        moving = sqrt(flow.hull_u * flow.hull_u + flow.hull_v * flow.hull_v)
+        across = moving * atan2(-flow.hull_v, flow.hull_u) - p.inflow_lever * flow.r
+        return u, where(across > 0.0, p.gamma_plus, p.gamma_minus) * across
