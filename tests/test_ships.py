@@ -174,7 +174,8 @@ every_law = pytest.mark.parametrize("name", LAWS)
 
 def test_every_law_is_tested():
     sailed = {a.law for a in (*EVERY_LAW.actuators, *COMMANDED.actuators)}
-    assert set(LAWS) == set(Law.known) == sailed
+    ours = {name for name, law in Law.known.items() if law.__module__.startswith("fmus.actuators.")}
+    assert set(LAWS) == ours == sailed
 
 
 @every_law
