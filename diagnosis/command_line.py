@@ -13,6 +13,7 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, complain, folder_name, program
 from cosim.interrupts import Held
+from fmus.ships.naming import DEFAULT
 
 from .identification import Prior
 from .progress import Advance, progress
@@ -20,7 +21,7 @@ from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
 INPUTS = ("train", "test", "runs", "run", "model", "effects")
-RUNS = ("train", "test", "runs")  # of these, those that are measured runs
+RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
 
 
 def prior(text: str) -> Prior:
@@ -72,12 +73,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         default=[],
         help="a file of model effects of your own; may be repeated",
     )
-    made.add_argument(
-        "--ship",
-        metavar="NAME|FILE.toml",
-        help="the ship that was measured: a shipped one, or a description of your own (as the logs "
-        "of runs say, else cse1)",
-    )
+    ship_option(made)
     made.add_argument(
         "--anyway",
         action="store_true",
@@ -90,6 +86,16 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         help="length of the windows in which models predict the runs (8 s, times the scale of the ship)",
     )
     return made
+
+
+def ship_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--ship``."""
+    made.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="the ship that was measured: a shipped one, or a description of your own (as the logs "
+        "of runs say, else cse1)",
+    )
 
 
 def analysis_parser(
@@ -183,12 +189,31 @@ def _ship_of(options: argparse.Namespace) -> str | None:
     """
     from .data import ship_of_logs  # only now: it takes a second to import
 
-    told = ship_of_logs(path for name in RUNS for path in getattr(options, name, None) or ())
+    told = ship_of_logs(_runs(options))
     if told is None:
         return None
     ship, path = told
     complain(f"the ship is {ship}, as '{path}' says; --ship means another one", "note: ")
     return ship
+
+
+def _refuse_other_ships(options: argparse.Namespace) -> None:
+    """Refuse logs of other ships, for analyses of the thesis' model.
+
+    Raises:
+        InputError: there is one.
+    """
+    from .data import ship_of_logs  # only now: it takes a second to import
+
+    told = ship_of_logs(_runs(options))
+    if told is not None:
+        raise InputError(f"'{told[1]}' is of {told[0]}; this analysis knows {DEFAULT} alone")
+
+
+def _runs(options: argparse.Namespace) -> list[Path]:
+    """The measured runs among the arguments."""
+    given = [getattr(options, name, None) or [] for name in RUNS]
+    return [path for each in given for path in (each if isinstance(each, list) else [each])]
 
 
 def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
@@ -216,7 +241,9 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     with Held() as interrupts:
         interrupts.allow()
         try:
-            if "ship" in vars(options) and options.ship is None:
+            if "ship" not in vars(options):
+                _refuse_other_ships(options)
+            elif options.ship is None:
                 options.ship = _ship_of(options)
             inputs = _place(options)
             with progress(errors) as advance:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from cosim.command import run_command
 
-from .command_line import Done, analysis_parser, run
+from .command_line import Done, analysis_parser, run, ship_option
 from .progress import Advance
 from .result_folder import together
 
@@ -27,9 +27,11 @@ def pca(options: argparse.Namespace, advance: Advance) -> Done:
     from .analysis import gather_samples  # only now: it takes a second to import
     from .analysis.document import write_document, write_json
     from .analysis.outlier_report import analyse, content, document, sentences
+    from .model import ship_with
 
+    of = ship_with((), options.ship)
     with together(options.out, FILES) as new:
-        runs = gather_samples(options.runs, options.estimates, advance)
+        runs = gather_samples(options.runs, options.estimates, advance, of)
         advance("principal components")
         found = analyse(runs, options.components)
         write_json(new / FILES[0], content(found, options.estimates))
@@ -47,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "mdf",
     )
+    ship_option(made)
     made.add_argument(
         "--components",
         type=int,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from cosim.command import run_command
 
-from .command_line import Done, analysis_parser, run
+from .command_line import Done, analysis_parser, run, ship_option
 from .progress import Advance
 from .result_folder import together
 
@@ -34,10 +34,11 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
     from .analysis.partial_least_squares import regressed
     from .analysis.pls_report import content, document, sentences
     from .analysis.samples import joined, without_outliers
-    from .model import write_model
+    from .model import ship_with, write_model
 
+    of = ship_with((), options.ship)
     with together(options.out, FILES) as new:
-        runs = gather_samples(options.runs, options.estimates, advance)
+        runs = gather_samples(options.runs, options.estimates, advance, of)
         samples = joined(runs)
         if not options.keep_outliers:
             advance("outliers")
@@ -52,7 +53,7 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
         written = possible and (options.ssv or stable is not None or thrust_of(found).holds)
         if written:
             c, B = (found.c, found.B) if stable is None else (stable.c, stable.B)
-            write_model(new / MODEL, as_model(c, B, found.columns))
+            write_model(new / MODEL, as_model(c, B, found.columns, of))
         write_json(new / RESULT, content(found, options.estimates, stable))
         advance("report")
         write_document(new / REPORT, document(found, options.estimates, stable))
@@ -76,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         "smoothed",
     )
+    ship_option(made)
     made.add_argument("--recipe", default="PLS3", metavar="NAME", help="how X is made (PLS3)")
     made.add_argument(
         "--keep-outliers", action="store_true", help="do not remove outliers by PCA beforehand (7.3)"

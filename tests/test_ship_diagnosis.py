@@ -1,5 +1,6 @@
 """A described ship through the diagnosis: its commands, its predictions, and what is hidden in its runs."""
 
+import importlib
 import json
 
 import numpy as np
@@ -10,7 +11,7 @@ import diagnosis
 from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
 from cosim import InputError
-from diagnosis import propose_columns
+from diagnosis import analysis, propose_columns
 from diagnosis.data import read, read_frame
 from diagnosis.model import Model, ship_with
 
@@ -117,3 +118,40 @@ def test_python_takes_the_ship_from_the_log(tmp_path):
         diagnosis.load([otter, other])
     with pytest.raises(InputError, match="of several ships: otter, cse1"):
         diagnosis.evaluate([*runs, *diagnosis.load(other)])
+
+
+@pytest.fixture(scope="module")
+def otter_log(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("analysed") / "otter"
+    options = {"vessel.X_u": -60.0}
+    cosim.simulate("otter_waypoints", folder, stop=120.0, pictures=False, set=options)
+    return folder
+
+
+def test_model_error_of_the_analyses_is_that_of_the_ship(otter_log):
+    """Relative to its own nominal model, of which the drag alone is another."""
+    (s,) = analysis.gather_samples([otter_log], "smoothed", of=ship_with((), "otter"))
+    nominal = ship_with((), "otter").parameters["vessel"]["X_u"].start
+    missing = (-60.0 - nominal) * s.nu[:, 0]
+    np.testing.assert_allclose(np.median(s.omega[:, 0] / missing), 1.0, atol=0.1)
+    assert analysis.as_model(np.zeros(3), np.zeros((3, 0)), [], ship_with((), "otter")).vessel == {
+        f"map_{axis}_1": 0.0 for axis in "XYN"
+    }
+
+
+@pytest.mark.parametrize(("name", "more"), [("pca", []), ("pls", ["--recipe", "PLS1"])])
+def test_analyses_without_a_model_of_their_own_take_any_ship(tmp_path, capsys, name, more):
+    cosim.simulate("ellipse_bs", tmp_path / "run", stop=60.0, pictures=False, ship="cybership2")
+    command = importlib.import_module(f"diagnosis.{name}").main
+    assert command([str(tmp_path / "run"), "--out", str(tmp_path / "out"), *more]) == 0
+    assert "the ship is cybership2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "more"), [("sysid", []), ("watch", []), ("replay", ["--controller", "abs"])]
+)
+def test_analyses_of_the_thesis_model_refuse_another_ship(otter_log, tmp_path, capsys, name, more):
+    command = importlib.import_module(f"diagnosis.{name}").main
+    assert command([str(otter_log), "--out", str(tmp_path / "out"), *more]) == 2
+    assert "is of otter; this analysis knows cse1 alone" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

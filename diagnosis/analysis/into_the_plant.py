@@ -13,6 +13,7 @@ import numpy as np
 from fmus.declare import variables
 from fmus.effects.linear_map import REGRESSORS, parameter
 from fmus.hull import RotationalDamping
+from fmus.ship import Ship, ship
 
 from ..model import Model
 from ..report.formatting import number
@@ -88,17 +89,23 @@ def goes_into_the_plant(columns: Sequence[str]) -> bool:
     return all(regressor(c) in REGRESSORS for c in columns)
 
 
-def as_model(c: np.ndarray, B: np.ndarray, columns: Sequence[str]) -> Model:
-    """A ship whose model error, relative to (2.27), is c + B x.
+def as_model(c: np.ndarray, B: np.ndarray, columns: Sequence[str], of: Ship | None = None) -> Model:
+    """A ship whose model error, (7.7), is c + B x.
 
     Args:
         c: (3,) [N, N, N m].
         B: (3, m).
         columns: names of the m columns.
+        of: the ship, by :func:`~diagnosis.analysis.samples.model_error`; None: CyberShip Enterprise 1.
     """
-    values = {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+    of = of or ship()
+    values = (
+        {}
+        if of.description is not None
+        else {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+    )
     for k, axis in enumerate(AXES):
         values[parameter(axis, "1")] = float(c[k])
         for column, x in zip(columns, B[k], strict=True):
             values[parameter(axis, regressor(column))] = float(x)
-    return Model().plus(values)
+    return Model(ship=of).plus(values)

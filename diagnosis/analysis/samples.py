@@ -11,11 +11,15 @@ from cosim import InputError
 from fmus.controller.models import ROTATIONAL
 from fmus.controller.parametrisation import Belief
 from fmus.frames import rotate_to_body
+from fmus.hull import mass_matrix
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs
-from fmus.signals import Measurement
+from fmus.ship import Ship, ship
+from fmus.signals import Force, Measurement
+from fmus.vessel.vessel import State, disturbed
 
 from ..data import Run, Track, clean, read
+from ..model import Model
 from ..progress import Advance, silent
 from ..smoothing import smooth
 from .principal_components import fit_components, outliers
@@ -24,7 +28,8 @@ ESTIMATES = ("smoothed", "mdf")
 NU = ("u", "v", "r")
 TAU = ("tau_X", "tau_Y", "tau_N")
 OMEGA = ("omega_X", "omega_Y", "omega_N")
-# s; until the derivative filter has found the ship: ten times the longer of its time constants (chosen).
+# s, times the scale of the ship; until the derivative filter has found the ship: ten times the longer of
+# its time constants (chosen).
 SETTLED = 5.0
 # Samples below which nothing is analysed; chosen: ten for each of the columns of the largest recipe.
 FEWEST = 300
@@ -40,7 +45,8 @@ class Samples:
         nu: velocity [m/s, m/s, rad/s].
         nu_dot: acceleration [m/s2, m/s2, rad/s2].
         tau: commanded force [N, N, N m], the mean of the steps before and after the sample.
-        omega: model error relative to (2.27), rotational damping included [N, N, N m], (7.7).
+        omega: model error [N, N, N m], (7.7): relative to (2.27), rotational damping included; of a
+            described ship relative to all of its nominal model.
     """
 
     run: np.ndarray
@@ -65,10 +71,22 @@ class Samples:
         return np.hstack([self.nu, self.tau])
 
 
-def model_error(nu: np.ndarray, nu_dot: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """omega = M nu_dot + C(nu) nu + g(nu) - tau (n, 3) [N, N, N m], (7.7), of control model (2.27)."""
-    error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
-    return np.column_stack(np.broadcast_arrays(*error))
+def model_error(
+    nu: np.ndarray, nu_dot: np.ndarray, tau: np.ndarray, of: Ship | None = None
+) -> np.ndarray:
+    """omega = M nu_dot + C(nu) nu + g(nu) - tau (n, 3) [N, N, N m], (7.7).
+
+    Args:
+        nu, nu_dot, tau: (n, 3), velocity, acceleration and force.
+        of: the ship; by default control model (2.27), of a described ship its nominal model.
+    """
+    if of is None or of.description is None:
+        error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
+        return np.column_stack(np.broadcast_arrays(*error))
+    body = Model(ship=of).hull
+    free = disturbed(State(0.0, 0.0, 0.0, *nu.T), Force(*tau.T), body)
+    excess = nu_dot - np.column_stack(np.broadcast_arrays(*free))
+    return excess @ np.array(mass_matrix(body.hull.inertia)).T
 
 
 def joined(parts: Sequence[Samples]) -> Samples:
@@ -96,7 +114,10 @@ def without_outliers(samples: Samples) -> Samples:
 
 
 def gather_samples(
-    paths: Sequence[str | Path], estimates: str = "smoothed", advance: Advance = silent
+    paths: Sequence[str | Path],
+    estimates: str = "smoothed",
+    advance: Advance = silent,
+    of: Ship | None = None,
 ) -> list[Samples]:
     """Read measured runs and estimate velocity and acceleration.
 
@@ -105,6 +126,7 @@ def gather_samples(
         estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out;
             ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
         advance: progress callback.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
 
     Returns:
         The samples of each run.
@@ -113,7 +135,8 @@ def gather_samples(
         InputError: a run cannot be used, is given twice, or has too few samples.
     """
     advance("reading")
-    runs = [read(path) for path in paths]
+    of = of or ship()
+    runs = [read(path, of=of) for path in paths]
     known: dict[bytes, str | Path] = {}
     for run, path in zip(runs, paths, strict=True):
         same = known.setdefault(np.column_stack([run.time, run.pose]).tobytes(), path)
@@ -122,15 +145,15 @@ def gather_samples(
     found = []
     for run in runs:
         advance(f"{estimates} states of {run.name}")
-        track = clean(run)
-        s = _smoothed(track) if estimates == "smoothed" else _filtered(track)
+        track = clean(run, scale=of.scale)
+        s = _smoothed(track, of) if estimates == "smoothed" else _filtered(track, of)
         if s.time.size < FEWEST:
             raise InputError(f"run '{run.name}': {s.time.size} samples are too few, {FEWEST} are needed")
         found.append(s)
     return found
 
 
-def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray) -> Samples:
+def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray, of: Ship) -> Samples:
     """The rows to keep, with their forces."""
     before = np.vstack([run.tau_cmd[:1], run.tau_cmd[:-1]])
     tau = 0.5 * (before + run.tau_cmd)
@@ -138,22 +161,22 @@ def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray) -> 
     good &= np.isfinite(tau).all(axis=1)
     nu, nu_dot, tau = nu[good], nu_dot[good], tau[good]
     names = np.full(nu.shape[0], run.name, dtype=object)
-    return Samples(names, run.time[good], nu, nu_dot, tau, model_error(nu, nu_dot, tau))
+    return Samples(names, run.time[good], nu, nu_dot, tau, model_error(nu, nu_dot, tau, of))
 
 
-def _smoothed(track: Track) -> Samples:
+def _smoothed(track: Track, of: Ship) -> Samples:
     """By the smoother, at all measured samples that are no spikes."""
     s = smooth(track)
     ahead, aside = rotate_to_body(s.eta[:, 2], s.eta_ddot[:, 0], s.eta_ddot[:, 1])
     u, v, r = s.nu.T
     # The body-fixed axes turn at the yaw rate.
     nu_dot = np.column_stack([ahead + r * v, aside - r * u, s.eta_ddot[:, 2]])
-    return _samples(track.run, s.used, s.nu, nu_dot)
+    return _samples(track.run, s.used, s.nu, nu_dot, of)
 
 
-def _filtered(track: Track) -> Samples:
+def _filtered(track: Track, of: Ship) -> Samples:
     """By the modified derivative filter of 4.3.2, sample by sample."""
-    run, observer = track.run, mdf.COMPONENT
+    run, observer = track.run, of.serving(mdf.COMPONENT)
     p: Any = observer.params()
     pose = run.pose.tolist()
     inputs = [Inputs(Measurement(*row)) for row in pose]
@@ -163,5 +186,5 @@ def _filtered(track: Track) -> Samples:
         state, e = observer.step(state, i, p, h)
         rows.append((e.u_hat, e.v_hat, e.r_hat, e.u_dot_hat, e.v_dot_hat, e.r_dot_hat))
     found = np.array(rows)
-    settled = (run.time >= run.time[0] + SETTLED) & ~track.between
-    return _samples(run, settled, found[:, :3], found[:, 3:])
+    settled = (run.time >= run.time[0] + SETTLED * of.scale.time) & ~track.between
+    return _samples(run, settled, found[:, :3], found[:, 3:], of)
