@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-PACKAGES = ("cybership*", "fmus*", "cosim*", "diagnosis*", "studies*")
+PACKAGES = ("cybership*", "fmus*", "fmucheck*", "cosim*", "diagnosis*", "studies*")
 SHIPPED = {
     "cosim.shipped": "scenarios",
     "cosim.shipped.campaigns": "scenarios/campaigns",

@@ -25,7 +25,7 @@ from coverage import CoverageData
 
 LEFT_OUT = (".git", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
 MADE = {"results", "site"}  # folders of the project itself
-OURS = ("fmus", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
+OURS = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
 # Results of this code lie in caches: the test that runs it need not be the one that uses the result.
 CACHED = ("fmus/", "cosim/compiled/")
 EACH = 0.05  # s, pytest's own time for a test

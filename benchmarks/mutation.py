@@ -41,7 +41,7 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("fmus", "cosim", "diagnosis", "studies")
+PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies")
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 # What the tests import that is not ours: taken over by every process that is forked.
 LIBRARIES = (
@@ -54,7 +54,8 @@ USERS = {
     "studies": ("studies", "benchmarks", "cybership"),
     "diagnosis": ("diagnosis", "studies", "benchmarks", "cybership"),
     "cosim": ("cosim", "diagnosis", "studies", "benchmarks", "cybership"),
-    "fmus": ("fmus", "diagnosis", "studies", "benchmarks", "cybership"),
+    "fmucheck": ("fmucheck", "fmus"),
+    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "benchmarks", "cybership"),
 }
 KILLED, SURVIVED, SAME, UNTESTED, GONE = "killed", "survived", "equivalent", "no test", "gone"
 STRICT = r",?\s*strict=\w+,?"

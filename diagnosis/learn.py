@@ -35,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
+    from .assessment.measured_outputs import fitted
     from .gathering import gather
     from .identification import shares
     from .model import Model, read_model, ship_with, write_model
@@ -49,6 +50,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         paths = [*options.train, *options.test]
         runs = gather(paths, advance, options.anyway, model, options.horizon)
         train = len(options.train)
+        model = fitted(runs[:train], model, options.prior, options.fit)
         diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
         refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND
         if not refused:
@@ -109,6 +111,14 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SHARE",
         help="relative standard deviation of every nominal coefficient, or, as in mass=0.01,thrust=0.5, "
         "of groups and single ones; 0: exact (by where each value comes from)",
+    )
+    made.add_argument(
+        "--fit",
+        action="append",
+        metavar="OUTPUT",
+        default=[],
+        help="a measured output of an actuator, as propeller.thrust, to fit that actuator to before "
+        "anything else (default: such a measurement judges, and is not fitted)",
     )
     made.add_argument(
         "--method",

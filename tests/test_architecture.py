@@ -14,7 +14,7 @@ import pytest
 from support.project import ROOT
 
 # Each may import those before it, and nothing else of the project.
-PACKAGES = ("fmus", "cosim", "diagnosis", "cybership", "studies", "benchmarks")
+PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership", "studies", "benchmarks")
 
 # The modules and packages directly in cosim, lowest first; each line may import the lines before it only.
 COSIM_LAYERS = (
@@ -262,7 +262,7 @@ def foreign_uses(package, other, allowed):
                 yield f"{module} uses {name}.{what}"
 
 
-@pytest.mark.parametrize("package", ["cosim", "fmus", "diagnosis"])
+@pytest.mark.parametrize("package", ["cosim", "fmus", "fmucheck", "diagnosis"])
 def test_no_import_circles(package):
     try:
         TopologicalSorter(graph(package)).prepare()
@@ -299,7 +299,15 @@ def test_modules_import_modules_inside_cosim():
 @pytest.mark.parametrize("package", ["fmus", "cosim"])
 def test_packages_below_import_nothing_of_others(package):
     for module, targets in graph(package).items():
-        assert {name.partition(".")[0] for name in targets} <= {package}, module
+        if module != "fmus.check":  # where the command of fmucheck is called
+            assert {name.partition(".")[0] for name in targets} <= {package}, module
+
+
+def test_checks_know_the_build_and_nothing_of_the_ship():
+    """Beside that only what any command shares: they hold anybody's FMUs against the standard."""
+    shared = {"fmus.base_units", "fmus.build", "fmus.declare", "fmus.docstring", "fmus.interruption"}
+    for module, targets in graph("fmucheck").items():
+        assert {name for name in targets if not name.startswith("fmucheck")} <= shared, module
 
 
 @pytest.mark.parametrize(

@@ -15,17 +15,17 @@ from support.command import command
 from support.plain import GAIN
 from support.project import COMPONENTS, ROOT
 
+from fmucheck import source
+from fmucheck.api import Library
+from fmucheck.bench import Bench, near, other
+from fmucheck.checking import main
+from fmucheck.description import Description
+from fmucheck.examine import examine
+from fmucheck.fmu import Fmu
+from fmucheck.registry import RULES, NotApplicableError, in_order
+from fmucheck.report import listing
+from fmucheck.source import BadFileError
 from fmus.build.packing import sources
-from fmus.check import source
-from fmus.check.api import Library
-from fmus.check.bench import Bench, near, other
-from fmus.check.checking import main
-from fmus.check.description import Description
-from fmus.check.examine import examine
-from fmus.check.fmu import Fmu
-from fmus.check.registry import RULES, NotApplicableError, in_order
-from fmus.check.report import listing
-from fmus.check.source import BadFileError
 from fmus.declare import discover
 from fmus.ship import ship
 
@@ -492,7 +492,7 @@ def test_documented_rules_are_the_rules():
 def test_fmus_do_not_carry_the_checker_and_trials_start_light():
     for module, _ in discover():
         assert not [inside for inside in sources(module, None, ship()) if inside.startswith("check")]
-    heavy = "import sys, fmus.check.child, fmus.check.rules; print({'fmpy', 'numpy', 'rich', 'lxml'} & set(sys.modules))"
+    heavy = "import sys, fmucheck.child, fmucheck.rules; print({'fmpy', 'numpy', 'rich', 'lxml'} & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", heavy], capture_output=True, text=True, cwd=ROOT, env=os.environ
     )

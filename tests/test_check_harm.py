@@ -11,9 +11,9 @@ import pytest
 from support import ccode, lag
 from support.project import ROOT
 
-from fmus.check.examine import examine
-from fmus.check.fmu import Fmu
-from fmus.check.registry import RULES
+from fmucheck.examine import examine
+from fmucheck.fmu import Fmu
+from fmucheck.registry import RULES
 
 compiled = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")
 

@@ -17,8 +17,8 @@ from support.project import COMPONENTS, ROOT
 
 from benchmarks.windows_numbers import WINE, deviation, host, inputs, stepped
 from cosim.run import main as run_scenario
+from fmucheck.checking import main as check
 from fmus.build import build, native_targets
-from fmus.check.checking import main as check
 from fmus.declare import flatten, packer
 
 pytestmark = pytest.mark.skipif(ccode.COMPILER is None, reason="no C compiler on this machine")

@@ -171,7 +171,7 @@ def force(model: Model, nu: np.ndarray) -> np.ndarray:
     b = model.hull
 
     def total(u: np.ndarray, v: np.ndarray, r: np.ndarray) -> np.ndarray:
-        at = Loaded(u=u, v=v, r=r)
+        at = Loaded(u=u, v=v, r=r, damping=b.hull.damping)
         result = np.stack(damping_force(u, v, r, b.hull.damping))
         for member, acts in zip(b.effects.outside.members, b.outside, strict=True):
             added = member.apply(acts, b.params.outside, NONE, at)

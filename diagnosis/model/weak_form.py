@@ -246,8 +246,16 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
     model = model.during(w.run.name)
     if nu is None:
         nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
-    between = w.recall("response", Response.key(model), lambda: _between(w, model), MEMORIES)
-    return thrust(w.run, model, between, nu)
+    return thrust(w.run, model, _response(w, model), nu)
+
+
+def arriving(w: Integrals, model: Model) -> np.ndarray:
+    """Commands (sets, k, n) that reach the model's thrusters, mean from each sample to the next."""
+    return _response(w, model)[0]
+
+
+def _response(w: Integrals, model: Model) -> np.ndarray:
+    return w.recall("response", Response.key(model), lambda: _between(w, model), MEMORIES)
 
 
 def commanded_force(w: Integrals, model: Model) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import TypedDict, TypeVar
 from fmus.effects.text import Found
 
 from ..assessment.evaluation import Evaluation
+from ..assessment.measured_outputs import inseparable, named, rms
 from ..identification.findings import Finding
 from ..model.ship_model import of_one_run, parameter_and_run
 from ..prediction_error.unrecorded import Unrecorded
@@ -80,6 +81,7 @@ def diagnosis_content(
             matrix=diagnosis.posterior.correlation.tolist(),
             together=diagnosis.posterior.together,
         ),
+        inseparable=inseparable([e.integrals for e in comparison.evaluations], diagnosis.start),
         suspect_coefficients=suspects,
         coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
@@ -188,6 +190,13 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
         window_position_rmse=result_keys.Change(before=b.position, after=a.position),
         window_heading_rmse=result_keys.Change(before=b.heading, after=a.heading),
         omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
+        measured={
+            name: result_keys.MeasuredError(
+                rms_before=rms(e.integrals, e.model, name),
+                rms_after=rms(e.integrals, e.learned or e.model, name),
+            )
+            for name in named(e.integrals, e.model)
+        },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
     )
 

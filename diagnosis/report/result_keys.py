@@ -73,9 +73,17 @@ class WindowLengths(Part):
     model_error: Number
 
 
+class MeasuredError(Part):
+    """RMS of what is measured of an actuator less what the models say, in SI."""
+
+    rms_before: Number
+    rms_after: Number
+
+
 class RunErrors(Part):
     """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m].
 
+    measured: ``ACTUATOR.OUTPUT`` -> its error, of outputs that are measured and not fitted.
     coverage_90: share of the windows' samples, positions and headings alike, within the 90 % band.
     """
 
@@ -84,6 +92,7 @@ class RunErrors(Part):
     window_position_rmse: Change
     window_heading_rmse: Change
     omega_rms: AxesChange
+    measured: dict[str, MeasuredError] = {}
     coverage_90: Number = None
 
 
@@ -287,6 +296,7 @@ class DiagnosisContent(Part):
     withdrawn: list[WithdrawnResult]
     unrecorded: UnrecordedResult
     correlation: CorrelationResult
+    inseparable: list[str] = []
     suspect_coefficients: list[SuspectResult]
     coefficients: list[CoefficientChange] = []
     ranking: list[RankedResult]

@@ -46,7 +46,8 @@ def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
         ]
         yield from _lines("Suspect coefficients", suspects)
     together = [f"Known only together: {', '.join(group)}." for group in r.correlation.together]
-    yield from _lines("How sure the values are", [r.unrecorded.sentence, *together])
+    sure = [r.unrecorded.sentence, *together, *(f"Warning: {x}" for x in r.inseparable)]
+    yield from _lines("How sure the values are", sure)
     if r.effects or r.possibilities:
         first, *others = r.ranking[:MAX_CANDIDATES]
         behind = [f"{c.id} +{_number(c.behind)} (± {_number(c.behind_std, 2)})" for c in others]
@@ -148,6 +149,12 @@ def _errors(r: ComparisonContent | DiagnosisContent, learned: bool) -> Iterator[
     when = ", before -> after" if learned else ""
     yield from _titled(f"Predictions over {_number(r.windows.prediction)} s miss by{when}", predictions)
     yield from _titled(f"Force that the model lacks{when}", forces)
+    measured = _table("run", "what is measured", "off by [SI]")
+    for e in r.errors:
+        for name, m in e.measured.items():
+            measured.add_row(_run(e.run, e.held_out), name, cell(m.rms_before, m.rms_after))
+    if measured.row_count:
+        yield from _titled(f"Measured outputs of actuators and the model's{when}", measured)
 
 
 def _stability(r: DiagnosisContent) -> Iterator[str]:

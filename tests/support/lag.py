@@ -3,7 +3,7 @@
 import subprocess
 import zipfile
 
-from fmus.check.fmu import platform, suffix
+from fmucheck.fmu import platform, suffix
 from support import ccode
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>

@@ -1,12 +1,13 @@
-"""Start the command: ``python -m fmus.check``."""
+"""Start the command: ``python -m fmus.check``; the checks themselves are the package ``fmucheck``."""
 
 if __name__ == "__main__":
     from fmus.interruption import leave_on_interrupt
 
     leave_on_interrupt()  # before all other imports, which take a while
 
-from ..interruption import run_interruptible
-from .checking import main
+from fmucheck.checking import main
+
+from .interruption import run_interruptible
 
 if __name__ == "__main__":
     run_interruptible(main)

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from .fmu import Fmu
 from .registry import Outcome, Rule
 
-PACKAGES = Path(__file__).parents[2]
+PACKAGES = Path(__file__).parents[1]
 
 
 class StoppedError(Exception):
@@ -60,7 +60,7 @@ def _run(arguments: list[str | Path], desk: Path, timeout: float, stopped: threa
     """Run the child; returns how it ended, nothing if as it should."""
     paths = [str(PACKAGES), os.environ.get("PYTHONPATH", "")]
     process = subprocess.Popen(
-        [sys.executable, "-m", "fmus.check.child", *arguments],
+        [sys.executable, "-m", "fmucheck.child", *arguments],
         cwd=desk,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
         stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""Run one trial on one unpacked FMU: ``python -m fmus.check.child RULE FOLDER LIBRARY REPORT NOTE``.
+"""Run one trial on one unpacked FMU: ``python -m fmucheck.child RULE FOLDER LIBRARY REPORT NOTE``.
 
 Started by ``trial``, in a process of its own, since an FMU may crash, hang, or be good for only one
 instance. What was found goes to the file REPORT, the name of the function under way to the file NOTE.

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..docstring import docstring
+from fmus.docstring import docstring
 
 
 class NotApplicableError(Exception):
@@ -89,10 +89,10 @@ def _register(clause: str, runs: bool) -> Callable[[_Check], _Check]:
 
 
 def rule(clause: str) -> Callable[[_Check], _Check]:
-    """Register a function of an :class:`~fmus.check.fmu.Fmu` that reads the archive."""
+    """Register a function of an :class:`~fmucheck.fmu.Fmu` that reads the archive."""
     return _register(clause, runs=False)
 
 
 def trial(clause: str) -> Callable[[_Check], _Check]:
-    """Register a function of a :class:`~fmus.check.bench.Bench` that runs the FMU."""
+    """Register a function of a :class:`~fmucheck.bench.Bench` that runs the FMU."""
     return _register(clause, runs=True)

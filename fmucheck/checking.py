@@ -11,9 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-from ..build import BuildError, build
-from ..declare import DeclarationError
-from ..interruption import program
+from fmus.build import BuildError, build
+from fmus.declare import DeclarationError
+from fmus.interruption import program
+
 from .examine import examine
 from .fmu import Fmu
 from .registry import RULES, Rule, in_order

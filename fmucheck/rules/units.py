@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from ...base_units import base_exponents
+from fmus.base_units import base_exponents
+
 from ..description import number, whole
 from ..fmu import Fmu
 from ..registry import rule
