@@ -38,6 +38,7 @@ COSIM_LAYERS = (
 DIAGNOSIS_LAYERS = (
     ("parallel", "progress", "result_folder"),
     ("data",),
+    ("sensors",),
     ("smoothing",),
     ("model",),
     ("identification", "assessment"),

@@ -1,0 +1,63 @@
+"""Which rows of a log were measured, where it was filled between slower telegrams by straight lines.
+
+A row between two telegrams lies on the line through its neighbours to rounding, as noise never does;
+where a telegram arrived the lines meet, mostly between two rows.
+"""
+
+import numpy as np
+
+# A row is on a line to rounding, which must be less than this share of how far the others are off: with
+# normal noise in two channels one row in two thousand is on a line by chance then. Chosen.
+ON_LINE = 0.03
+FUZZ = 1e-9  # relative, of numbers that were not rounded
+FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
+LONGEST = 8  # rows in a line that is no ship's steady motion without noise (chosen)
+
+
+def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """(n,): rows that a straight line between two measurements has filled; none in most logs.
+
+    Of the two rows about a telegram the one nearer to it stays.
+
+    Args:
+        time: (n,) [s], in order.
+        position: (n, 2) [m], finite.
+    """
+    none = np.zeros(time.size, bool)
+    if time.size < 2 * LONGEST:
+        return none
+    share = (np.diff(time)[:-1] / (time[2:] - time[:-2]))[:, None]
+    off = np.abs(position[1:-1] - position[:-2] - share * (position[2:] - position[:-2])).max(axis=1)
+    rounding = max(_rounding(channel) for channel in position.T)
+    on = none.copy()
+    on[1:-1] = off <= rounding
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], on, [0]]).astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    if (
+        rounding > ON_LINE * np.quantile(off, 0.9)
+        or on.mean() < FEWEST
+        or np.mean(lengths > LONGEST) > 0.1
+    ):
+        return none
+    first = np.flatnonzero(~on & np.concatenate([[True], on[:-1]]))  # of each block of rows on no line
+    rows = np.flatnonzero(~on)
+    place = rows - first[np.searchsorted(first, rows, side="right") - 1]
+    pair = rows[:-1][(place[:-1] % 2 == 0) & (place[1:] == place[:-1] + 1)]
+    pair = pair[(pair > 0) & (pair + 2 < time.size)]
+    slope = np.diff(position, axis=0) / np.diff(time)[:, None]
+    before, after = slope[pair - 1], slope[pair + 1]
+    channel = np.abs(before - after).argmax(axis=1)[:, None]
+    step = position[pair + 1] - position[pair] - after * (time[pair + 1] - time[pair])[:, None]
+    kink = np.take_along_axis(step, channel, 1) / np.take_along_axis(before - after, channel, 1)
+    nearer = kink[:, 0] < 0.5 * (time[pair + 1] - time[pair])
+    on[np.where(nearer, pair + 1, pair)] = True
+    return on
+
+
+def _rounding(values: np.ndarray) -> float:
+    """How far from a line rounding takes a row [m]: the step between values, and a little for digits."""
+    steps = np.diff(np.unique(values))
+    fuzz = FUZZ * float(np.ptp(values))
+    return 1.05 * max(
+        float(steps[steps > fuzz].min(initial=np.inf)) if (steps > fuzz).any() else 0.0, fuzz
+    )
