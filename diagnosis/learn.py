@@ -35,10 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
-    from .assessment.measured_outputs import fitted
     from .gathering import gather
     from .identification import shares
     from .model import Model, read_model, ship_with, write_model
+    from .prediction_error.output_fit import fitted
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing

@@ -6,8 +6,9 @@ import pytest
 
 import diagnosis
 from cosim import InputError
-from diagnosis.assessment.measured_outputs import fitted, inseparable, named, rms
+from diagnosis.assessment.measured_outputs import inseparable, named, rms
 from diagnosis.model import Model, ship_with
+from diagnosis.prediction_error.output_fit import fitted
 from diagnosis.report.content import comparison_content
 from fmus.actuators.actuation import forces, output
 from fmus.actuators.response import total

@@ -1,0 +1,118 @@
+"""A described ship on its measured runs: each run predicted by what was learned of others.
+
+The runs are dealt into folds; each fold is left out in turn. With as many folds as runs each run is left
+out alone.
+"""
+
+from collections.abc import Iterator, Sequence
+from math import degrees
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Diagnosis, DiagnosisContent, Integrals, Model, diagnosis_content
+from diagnosis.progress import Advance
+
+from .study_report import Report
+
+
+class Fold(NamedTuple):
+    """What was learned without some runs: names of those, the diagnosis, and its content."""
+
+    left_out: Sequence[str]
+    found: Diagnosis
+    content: DiagnosisContent
+
+    @property
+    def errors(self) -> list[Any]:
+        """Of the runs left out."""
+        return [e for e in self.content.errors if e.held_out]
+
+
+def learn_folds(
+    runs: Sequence[Integrals], folds: int | None, model: Model, advance: Advance
+) -> Iterator[Fold]:
+    """Learn from the runs of all folds but one, for each fold.
+
+    Args:
+        runs: two or more.
+        folds: how many; None: one for each run.
+        model: the nominal one of the ship.
+        advance: receives the name of each step when it begins.
+
+    Raises:
+        InputError: there are too few runs.
+    """
+    count = min(folds or len(runs), len(runs))
+    if count < 2:
+        raise InputError(f"{len(runs)} runs in {count} folds: nothing is left to learn from")
+    for k in range(count):
+        out = [w for i, w in enumerate(runs) if i % count == k]
+        rest = [w for i, w in enumerate(runs) if i % count != k]
+        found = diagnosis.diagnose(rest, out, model=model, advance=advance)
+        yield Fold([w.run.name for w in out], found, diagnosis_content(found, None, []))
+
+
+def write_folds(report: Report, folds: Sequence[Fold]) -> None:
+    """Tables of errors before and after on the runs left out, and of what was found each time."""
+    errors = [e for fold in folds for e in fold.errors]
+    report.heading("Runs left out in turn")
+    outputs = sorted({name for e in errors for name in e.measured})
+    forces = ["X [N]", "Y [N]", "N [N m]"]
+    header = ["run", "position [m]", "heading [°]", *forces, *(f"{name} [N]" for name in outputs)]
+    rows = np.array([_numbers(e, outputs) for e in errors])  # (runs, quantities, 2)
+    names = [e.run for e in errors]
+    for told, pair in zip(names, rows, strict=True):
+        report.result(told, pair)
+    overall = {"root mean square": np.sqrt(np.mean(rows**2, axis=0)), "median": np.median(rows, axis=0)}
+    report.table(
+        header,
+        [[n, *map(_change, r)] for n, r in (*zip(names, rows, strict=True), *overall.items())],
+    )
+    report.result("overall", overall)
+    report.heading("What was found each time")
+    report.table(
+        ["left out", "verdict", "in the model", "withdrawn", "known only together"],
+        [
+            [
+                ", ".join(fold.left_out),
+                fold.content.verdict,
+                ", ".join(f"{e.id} ({_share(e.confidence)})" for e in fold.content.accepted) or "–",
+                ", ".join(w.id for w in fold.content.withdrawn) or "–",
+                "; ".join(", ".join(group) for group in fold.content.correlation.together) or "–",
+            ]
+            for fold in folds
+        ],
+        words=True,
+    )
+    report.heading("What these runs cannot tell")
+    report.items(dict.fromkeys(_open(folds)))
+
+
+def _numbers(e: Any, outputs: Sequence[str]) -> list[tuple[float, float]]:
+    """Before and after of every column of the table."""
+    p, h, w = e.window_position_rmse, e.window_heading_rmse, e.omega_rms
+    measured = [(e.measured[n].rms_before, e.measured[n].rms_after) for n in outputs]
+    pairs = [(p.before, p.after), (h.before, h.after), *zip(w.before, w.after, strict=True), *measured]
+    found = [tuple(np.nan if x is None else float(x) for x in pair) for pair in pairs]
+    found[1] = (degrees(found[1][0]), degrees(found[1][1]))
+    return [(a, b) for a, b in found]
+
+
+def _change(pair: Sequence[float]) -> str:
+    return f"{pair[0]:.3g} → {pair[1]:.3g}"
+
+
+def _share(confidence: float | None) -> str:
+    return "–" if confidence is None else f"{100.0 * confidence:.0f} %"
+
+
+def _open(folds: Sequence[Fold]) -> Iterator[str]:
+    """What the data leave open, a sentence each."""
+    for fold in folds:
+        yield from fold.content.inseparable
+        for e in fold.content.accepted:
+            if e.indistinguishable:
+                yield f"{e.id} and {', '.join(e.indistinguishable)}: {e.advice}"

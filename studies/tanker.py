@@ -1,0 +1,86 @@
+"""The tanker KVLCC2 on its free-running zig-zags: ``python -m studies.tanker DATA``.
+
+DATA is the folder of the files that HSVA measured for the SIMMAN workshops, in the form in which the
+repository of M. Alexandersson's thesis (2022) has them: ``z_AA_BB.csv``, with the columns named below.
+It is not part of this project.
+"""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Model
+from diagnosis.data import Run, read_frame
+from diagnosis.model import ship_with
+from diagnosis.progress import silent
+
+from .ship_folds import learn_folds, write_folds
+from .study_command import run_study, study_parser
+from .study_report import Report
+
+# Column of the files -> signal, factor to SI. The angle of the rudder has the opposite sign there.
+COLUMNS = {
+    "t": ("time", 1.0),
+    "x": ("x", 1.0),
+    "y": ("y", 1.0),
+    "psi_deg": ("psi", np.pi / 180.0),
+    "rudder_deg": ("rudder.delta", -np.pi / 180.0),
+    "rps": ("propeller.n", 1.0),
+    "thrust": ("propeller.thrust", 1.0),
+}
+
+
+def read(path: Path, model: Model) -> Run:
+    """A zig-zag as a run of the tanker.
+
+    Raises:
+        InputError: it has other columns.
+    """
+    table = pd.read_csv(path)
+    missing = [name for name in COLUMNS if name not in table]
+    if missing:
+        raise InputError(f"'{path}' has no column '{missing[0]}'")
+    signals = {signal: factor * table[name] for name, (signal, factor) in COLUMNS.items()}
+    return read_frame(pd.DataFrame(signals), path.stem, model.ship)
+
+
+def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
+    """Learn from the zig-zags, some left out in turn, and write what came out."""
+    files = sorted(data.glob("z_*.csv"))
+    if not files:
+        raise InputError(f"no zig-zags z_*.csv in '{data}'")
+    model = Model(ship=ship_with((), "kvlcc2"))
+    chosen = files[::4] if quick else files
+    runs = diagnosis.gather([read(f, model) for f in chosen], model=model, anyway=True)
+    report = Report(out, "KVLCC2, a tanker of 7 m: free-running zig-zags")
+    report.text(
+        f"{len(runs)} zig-zags; the nominal model is that of the MMG standard method "
+        f"(`ships/kvlcc2.toml`). Predictions over {runs[0].horizon:.3g} s; model error in windows of "
+        f"{runs[0].width:.3g} s. The measured thrust is used by no fit."
+    )
+    write_folds(report, list(learn_folds(runs, folds, model, silent)))
+    return report.write()
+
+
+def main() -> None:
+    """Command line; leaves with an exit code."""
+    parser = study_parser(
+        "tanker",
+        "What the zig-zags of KVLCC2 say that its model lacks.",
+        "  python -m studies.tanker ~/kvlcc2_hsva\n  python -m studies.tanker ~/kvlcc2_hsva --folds 3",
+        seeds=None,
+        jobs=False,
+    )
+    parser.add_argument("data", type=Path, metavar="DATA", help="folder of the files")
+    parser.add_argument("--folds", type=int, metavar="N", help="folds left out (one for each run)")
+    options = parser.parse_args()
+    folds = 2 if options.quick else options.folds
+    run_study(partial(study, options.data, options.out, folds, options.quick))
+
+
+if __name__ == "__main__":
+    main()
