@@ -42,10 +42,12 @@ from fmus.hull import (
 )
 from fmus.hull_functions import cross_flow
 from fmus.ship import ship
+from fmus.ship_description import Value
 from fmus.ships.ship_file import Term
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import Allocation, thrust
 from fmus.thrusters.allocation import allocate as allocate_three
+from fmus.thrusters.chain import Inputs
 
 speed = st.floats(-2.0, 2.0)
 share = st.floats(0.0, 1.0)
@@ -649,3 +651,25 @@ def test_an_azimuth_turns_by_the_shorter_way_where_it_can(alpha_max, way):
         turned.append(alpha)
     assert turned[1] - first == pytest.approx(0.5 * h * np.sign(way))
     assert turned[-1] - first == pytest.approx(way)
+
+
+def test_power_of_a_cycloidal_propeller_is_an_output_where_it_is_described():
+    """From idle to full with the force to 3/2, alike in all directions; none is told where none is given."""
+    cse1 = SHIPS["cse1"]
+    vsp, bow = cse1.actuators
+    watts = (Value("P_idle", 0.5, "made up", 0.0), Value("P_full", 4.5, "made up", 0.0))
+    described = cse1._replace(actuators=(vsp._replace(values=(*vsp.values, *watts)), bow))
+    thrusters = ship(description=described).thrusters
+    assert [v.name for v in variables(thrusters.outputs)][-1] == "vsp_power"
+    assert "vsp_power" not in [v.name for v in variables(ship(description=cse1).thrusters.outputs)]
+
+    def taken(*tau):
+        p = thrusters.params()
+        _, out = thrusters.step(thrusters.init(None, p), Inputs(Force(*tau)), p, 0.01)
+        return out.vsp_power
+
+    assert taken(0.0, 0.0, 0.0) == pytest.approx(0.5)
+    assert taken(1.165, 0.0, 0.0) == pytest.approx(4.5)
+    assert taken(-1.165 / 4.0, 0.0, 0.0) == pytest.approx(0.5 + 4.0 / 8.0)
+    aside = taken(0.0, 1.165 / 4.0, -0.4575 * 1.165 / 4.0)  # by the propeller alone
+    assert aside == pytest.approx(0.5 + 4.0 / 8.0)

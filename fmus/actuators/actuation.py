@@ -154,7 +154,9 @@ def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) 
 def measurable(ship: Description) -> dict[str, str]:
     """``ACTUATOR.OUTPUT`` of all that can be measured of a ship's actuators, and its unit."""
     return {
-        f"{a.part.name}.{name}": unit for a in actuators(ship) for name, unit in a.law.measurable.items()
+        f"{a.part.name}.{name}": unit
+        for a in actuators(ship)
+        for name, unit in a.law.measured(a.part).items()
     }
 
 

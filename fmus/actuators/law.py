@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..declare import DeclarationError
 from ..hull_functions import Change
 from ..ops import Number
+from ..ship_description import Part
 
 Span = tuple[Any, Any]
 
@@ -107,6 +108,11 @@ class Law:
     def race(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> Race | None:
         """Its race; None: it has none that others could work in."""
         return None
+
+    @classmethod
+    def measured(cls, part: Part) -> Mapping[str, str]:
+        """Those of ``measurable`` of which a description tells enough."""
+        return cls.measurable
 
     @classmethod
     def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:

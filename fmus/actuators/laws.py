@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..declare import POSITIVE, Range
 from ..ops import Number, atan2, clip, cos, fmax, fmin, power, signed_root, sin, sqrt, where
+from ..ship_description import Part
 from .law import Command, Flow, Law, Race, Span
 
 DIVISOR = Range(min=1e-6)
@@ -173,8 +174,17 @@ class TunnelThruster(Law):
         return (forces[0] / p.F,)
 
 
+class Cycloidal(NamedTuple):
+    F: Annotated[float, "N", "force to starboard at full command", DIVISOR] = 1.0
+    P_idle: Annotated[float, "W", "power at no command", POSITIVE] = 0.0
+    P_full: Annotated[float, "W", "power at full command, at rest; 0: not known", POSITIVE] = 0.0
+
+
 class VoithSchneider(Law):
-    """Voith Schneider propeller: a force in any direction, linear in two commands, (2.10)."""
+    """Voith Schneider propeller: a force in any direction, linear in two commands, (2.10).
+
+    Its power, (2.12), grows from idle with the force to 3/2, as that of an ideal propeller at rest does.
+    """
 
     name = "voith_schneider"
     commands = (
@@ -182,7 +192,9 @@ class VoithSchneider(Law):
         Command("sway", "1", "command in sway, -1...1"),
     )
     components = "XY"
-    Parameters = Tunnel
+    Parameters = Cycloidal
+    limiting = ("P_idle", "P_full")  # no part of the force, which is fitted
+    measurable: ClassVar[Mapping[str, str]] = {"power": "W"}
 
     @classmethod
     def limits(cls, p: Any) -> tuple[Span, ...]:
@@ -200,6 +212,16 @@ class VoithSchneider(Law):
     @classmethod
     def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
         return forces[0] / p.F, forces[1] / p.F
+
+    @classmethod
+    def measured(cls, part: Part) -> Mapping[str, str]:
+        return cls.measurable if part.number("P_full") > 0.0 else {}
+
+    @classmethod
+    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+        surge, sway = commands
+        share = fmin(1.0, sqrt(surge * surge + sway * sway))
+        return p.P_idle + (p.P_full - p.P_idle) * share * sqrt(share)
 
 
 class Azimuth(NamedTuple):

@@ -8,7 +8,9 @@ from ..actuators.actuation import (
     allocate,
     forces,
     layout,
+    measurable,
     ordered,
+    output,
     parameters,
     total,
     variable,
@@ -71,6 +73,18 @@ def rates_of(ship: Description) -> type[Any]:
     )
 
 
+def outputs_of(ship: Description) -> type[Any]:
+    """What can be measured of a ship's actuators beside their commands, as a group of variables."""
+    titles = {a.part.name: a.part.title for a in actuators(ship)}
+
+    def text(name: str) -> str:
+        of, what = name.split(".")
+        return f"{titles[of]}: {what}"
+
+    units = measurable(ship)
+    return group_of("Measured", [Variable(variable(n), unit, text(n), 0.0) for n, unit in units.items()])
+
+
 def described(effects: EffectSet, ship: Description) -> Component:
     """The FMU of a described ship's thrusters, with the effects that it may have."""
     shape = layout(ship)
@@ -88,12 +102,13 @@ def described(effects: EffectSet, ship: Description) -> Component:
         changed=groups.changes.params(),
     )
     commands: Any = commands_of(ship)
+    told = variables(commands) if ship.allocates else ()
+    beside = measurable(ship)
+    outputs: Any = group_of("Outputs", [*told, *variables(Applied), *variables(outputs_of(ship))])
     if ship.allocates:
         inputs: type[Any] = Inputs
-        outputs: Any = group_of("Outputs", [*variables(commands), *variables(Applied)])
     else:
         inputs = bundle("Inputs", request=commands(), velocity=Velocity())
-        outputs = Applied
 
     def prepare(p: Any) -> Prepared:
         plant = p.plant
@@ -114,8 +129,9 @@ def described(effects: EffectSet, ship: Description) -> Component:
         tau = shape.act(acting, shape.running(s.t + h, u, v, r, arriving, b), b)
         possible = total(forces(ship, given, (u, v, r), p.allocation))
         after = when(h > 0.0, lambda: past, lambda: s)
-        told = given if ship.allocates else ()
-        return after, outputs(*told, *possible, *tau)
+        shown = given if ship.allocates else ()
+        found = [output(ship, name, acting, (u, v, r), p.plant) for name in beside]
+        return after, outputs(*shown, *possible, *tau, *found)
 
     def step(s: Past, i: Any, p: Any, h: Number) -> tuple[Past, Any]:
         return prepared_step(s, i, prepare(p), h)
