@@ -17,6 +17,7 @@ from support.ships import (
     PROPELLER,
     RACE_RUDDER,
     SHIPS,
+    TABLE,
     believed,
     described,
     part,
@@ -168,6 +169,8 @@ LAWS = {
     "propeller_behind_hull": {**OPEN_WATER, "C_2_plus": 1.6, "C_2_minus": 1.1},
     "rudder_in_race": RACE_RUDDER,
     "azimuth_with_leg": LEG,
+    "force_table_ahead": TABLE,
+    "force_table_aside": TABLE,
 }
 RACE = Race(0.3, 1.2, 0.2)
 FLOWS = [Flow(race=RACE), Flow(1.0, 0.0, 1.0, race=RACE), Flow(-0.6, 0.0, -0.6, race=RACE)]

@@ -10,6 +10,7 @@ from ..hull import Triple
 from ..ops import Number, clip, fmax, where, wrap
 from ..ship_description import Description
 from . import azimuth_leg as azimuth_leg  # registers laws, as the next two do
+from . import force_table as force_table  # registers its laws
 from . import laws as laws
 from . import standard_method as standard_method
 from .failings import Actuator, goes_round

@@ -66,6 +66,10 @@ OPEN_WATER = {
 AZIMUTH = {"k_ahead": 0.5, "k_astern": 0.3, "n_max": 10.0}
 LEG = {**AZIMUTH, "area": 0.02, "drag": 0.3, "drag_slope": 0.3, "lift": 0.5}
 RACE_RUDDER = {"area": 0.02, "span": 0.25, "hull_force": 0.2, "gamma_minus": 0.6, "inflow_lever": -1.0}
+# A dead band astern, and more force ahead.
+TABLE = {
+    f"F_{k}": f for k, f in enumerate((-3.0, -2.0, -1.0, -0.2, -0.1, 0.0, 0.8, 2.0, 3.5, 4.5, 5.0), 1)
+}
 # Every law that is asked for force, in one ship.
 EVERY_LAW = described(
     part("port", "fixed_propeller", {**PROPELLER, "x": -1.0, "y": -0.4}),
@@ -74,6 +78,8 @@ EVERY_LAW = described(
     part("pod", "azimuth", {**AZIMUTH, "x": -0.8}),
     part("bow", "tunnel_thruster", {"x": 0.8, "F": 6.0}),
     part("vsp", "voith_schneider", {"x": 0.2, "F": 9.0}),
+    part("jet", "force_table_ahead", {**TABLE, "x": -0.9, "y": 0.1}),
+    part("stern", "force_table_aside", {**TABLE, "x": -0.9}),
     part("tug", "given_force", {"F_X": 5.0, "F_Y": 7.0, "x": 0.9}),
     terms={"X_absu_u": -20.0, "Y_absu_v": -80.0, "N_uuv": -3.0, "N_r": -30.0, "Y_vvr": -1.0},
     functions=(part("cross_flow", "cross_flow", {"cross_flow_length": 2.0}),),
