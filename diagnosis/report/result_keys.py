@@ -85,6 +85,8 @@ class RunErrors(Part):
 
     measured: ``ACTUATOR.OUTPUT`` -> its error, of outputs that are measured and not fitted.
     coverage_90: share of the windows' samples, positions and headings alike, within the 90 % band.
+    trial: of a manoeuvring trial its measures, [measured, before, after] each; of what comes several
+    times, as overshoots do, a list of these; null: the run is none.
     """
 
     run: str
@@ -94,6 +96,7 @@ class RunErrors(Part):
     omega_rms: AxesChange
     measured: dict[str, MeasuredError] = {}
     coverage_90: Number = None
+    trial: dict[str, list[Number] | list[list[Number]]] | None = None
 
 
 class RegionResult(Part):
