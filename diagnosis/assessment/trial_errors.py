@@ -84,7 +84,8 @@ def trial_errors(smoothed: Smoothed, before: Model, after: Model) -> TrialErrors
     seen = Passage(*(column[rows] for column in whole))
     found = [_measures(seen, run.trial, ship)]
     for _, pose in parts:
-        x, y, psi = (np.interp(seen.time, time, column) for column in pose.T)
+        columns = (pose[:, 0], pose[:, 1], np.unwrap(pose[:, 2]))
+        x, y, psi = (np.interp(seen.time, time, column) for column in columns)
         found.append(_measures(Passage(seen.time, x, y, psi, seen.order), run.trial, ship))
     return _together(found)
 

@@ -19,6 +19,8 @@ Numbers = Annotated[list[Number], BeforeValidator(list)]
 COVARIATE, UNIT = (Field(validation_alias=AliasPath("covariate", name)) for name in ("id", "unit"))
 SHARE = Field(validation_alias="share")
 Axes = Literal["X", "Y", "N", "XY", "XYN"]
+# Measured, before, after; or a list of these.
+Triples = Annotated[list[list[Number]] | list[Number], Field(union_mode="left_to_right")]
 
 
 class Part(BaseModel):
@@ -96,7 +98,7 @@ class RunErrors(Part):
     omega_rms: AxesChange
     measured: dict[str, MeasuredError] = {}
     coverage_90: Number = None
-    trial: dict[str, list[Number] | list[list[Number]]] | None = None
+    trial: dict[str, Triples] | None = None
 
 
 class RegionResult(Part):
