@@ -136,6 +136,7 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis.model",
     "diagnosis.progress",
     "diagnosis.report",
+    "diagnosis.sensors",
     "diagnosis.smoothing",
 )
 
