@@ -11,14 +11,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from rich.table import Table
 
 from .command import BAD_INPUT, Output, complain, program, run_command
 from .errors import InputError
 from .files import atomic_write
 from .results.log import CSV, Log, read_log
 from .results.performance import MetricsError, compute, over_time, table
-from .results.run_options import RunOptions, read_options
-from .trials.trial_outcome import outcome_of_log, sheet
+from .results.run_options import read_options
+from .scenario.roles import Roles
+from .trials.trial_outcome import sheet, simulated_trial
 
 
 def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
@@ -58,10 +60,9 @@ examples:
     return parser
 
 
-def _read(folder: Path, run: RunOptions) -> Log:
-    trial = [] if run.trial is None else [*run.roles.pose, run.trial.order]
+def _read(folder: Path, roles: Roles) -> Log:
     try:
-        return read_log(folder, trial or run.roles.of("pose", "velocity", "target", "force"))
+        return read_log(folder, roles.of("pose", "velocity", "target", "force"))
     except InputError:
         # A column or the log is missing: reading everything finds out which.
         return read_log(folder)
@@ -72,16 +73,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         run = read_options(options.folder)
-        log = _read(options.folder, run)
+        if run.trial is not None and options.out is None:
+            trial = simulated_trial(options.folder, options.start, options.stop)
+            _show(dict(trial.measures), sheet(trial), options.json)
+            return 0
+        log = _read(options.folder, run.roles)
         start = run.start if options.start is None else options.start
         stop = run.stop if options.stop is None else options.stop
-        trial = None
-        if run.trial is None:
-            metrics = compute(log, start, stop, run.roles)
-        else:
-            length = 0.0 if run.outline is None else run.outline.length
-            trial = outcome_of_log(log, run.trial, run.roles, length, start, stop)
-            metrics = dict(trial.measures)
+        metrics = compute(log, start, stop, run.roles)
         if options.out is not None:
             if options.out.resolve().parent == options.folder.resolve() and options.out.name == CSV:
                 raise InputError(f"'{options.out}' is the log itself")
@@ -92,11 +91,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         complain(f"'{options.out}' cannot be written: {error.strerror}")
         return BAD_INPUT
-    if options.json:
+    _show(metrics, table(metrics), options.json)
+    return 0
+
+
+def _show(metrics: Mapping[str, float], shown: Table, as_json: bool) -> None:
+    if as_json:
         print(json.dumps(metrics, indent=2))
     else:
-        Output().print(table(metrics) if trial is None else sheet(trial))
-    return 0
+        Output().print(shown)
 
 
 if __name__ == "__main__":

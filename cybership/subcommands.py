@@ -21,6 +21,7 @@ SUBCOMMANDS = {
     "run": Subcommand("cosim.run", "run a scenario: log, metrics, pictures"),
     "metrics": Subcommand("cosim.metrics", "metrics of a finished run"),
     "plots": Subcommand("cosim.plots", "pictures of runs, laid over each other; PNG, SVG or PDF"),
+    "trial": Subcommand("diagnosis.measure_trial", "measures of a manoeuvring trial, run or measured"),
     "columns": Subcommand("diagnosis.propose_columns", "what must be told of a measurement of your own"),
     "compare": Subcommand("diagnosis.compare", "where does a model fail against measured runs?"),
     "learn": Subcommand("diagnosis.learn", "which physical effect does the model lack?"),

@@ -12,6 +12,7 @@ from cosim import InputError
 from fmus.scale import Scale
 
 from .assessment.plausibility import refuse_implausible
+from .assessment.trial_errors import measured_passage
 from .data import Run, Track, clean, read, thinned
 from .data.unit_check import GO_ON
 from .model import Integrals, Model, integrals
@@ -65,6 +66,9 @@ def gather(
     advance(f"smoothing {', '.join(run.name for run in runs)}")
     smoothed = for_each(lambda run: _smoothed(run, anyway, scale), _distinct(runs, names))
     windows = [_windows(s, anyway, horizon) for s in smoothed]
+    for s in smoothed:
+        if s.track.run.trial is not None:
+            measured_passage(s, model.ship)  # refuses what is no trial
     if not anyway:
         refuse_implausible(windows, model)
     return windows

@@ -52,7 +52,17 @@ DIAGNOSIS_LAYERS = (
     ("analysis",),
     ("open_loop",),
     ("interactive", "command_line"),
-    ("compare", "learn", "pca", "pls", "propose_columns", "replay", "sysid", "watch"),  # commands
+    (
+        "compare",
+        "learn",
+        "measure_trial",
+        "pca",
+        "pls",
+        "propose_columns",
+        "replay",
+        "sysid",
+        "watch",
+    ),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.
@@ -126,6 +136,7 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis.model",
     "diagnosis.progress",
     "diagnosis.report",
+    "diagnosis.sensors",
     "diagnosis.smoothing",
 )
 

@@ -7,7 +7,7 @@ from ..lazy import lazy_names
 if TYPE_CHECKING:
     from .measures import KINDS, MEASURES, measure
     from .ship_passage import Passage, executes, passage
-    from .trial_outcome import Outcome, outcome, sheet
+    from .trial_outcome import Outcome, outcome, sheet, simulated_trial
     from .trial_picture import draw_trial
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "outcome",
     "passage",
     "sheet",
+    "simulated_trial",
 ]
 
 __getattr__ = lazy_names(
@@ -36,5 +37,6 @@ __getattr__ = lazy_names(
         "outcome": "trial_outcome",
         "passage": "ship_passage",
         "sheet": "trial_outcome",
+        "simulated_trial": "trial_outcome",
     },
 )

@@ -55,7 +55,7 @@ KINDS: Mapping[str, Callable[[Passage, float], dict[str, float]]] = {
     "spiral": spiral_measures,
 }
 # Angles of the zig-zags that the resolution has limits for, and how far one may be off [rad].
-TEN, TWENTY, OFF = math.radians(10.0), math.radians(20.0), math.radians(1.5)
+TEN, TWENTY, OFF = math.radians(10.0), math.radians(20.0), math.radians(2.5)
 
 
 class Limits(NamedTuple):

@@ -99,13 +99,12 @@ def released(p: Passage) -> float | None:
 
 def approach_speed(p: Passage, execute: float, length: float) -> float:
     """Speed over ground [m/s] on the last ship's length before an execute, or what there is of it."""
-    way = p.way
-    end = float(np.interp(execute, p.time, way))
-    behind = float(np.interp(end - length, way, p.time))
-    behind = min(behind, float(p.time[np.searchsorted(p.time, execute) - 1]))
-    if behind < execute:
-        return p.along(behind, execute) / (execute - behind)
-    return p.along(p.time[0], p.time[1]) / float(p.time[1] - p.time[0])
+    end = float(np.interp(execute, p.time, p.way))
+    begin = float(np.interp(end - length, p.way, p.time))
+    first = max(0, int(np.searchsorted(p.time, min(begin, execute), "right")) - 1)
+    last = max(first + 1, int(np.searchsorted(p.time, execute, "right")) - 1)
+    moved = np.hypot(p.x[last] - p.x[first], p.y[last] - p.y[first])
+    return float(moved / (p.time[last] - p.time[first]))
 
 
 def first_crossing(time: np.ndarray, values: np.ndarray, level: float) -> float | None:

@@ -10,8 +10,9 @@ from rich.table import Table
 from ..errors import InputError
 from ..files import write_json
 from ..formats.outline import Trial
-from ..results.log import TRIAL, Log
+from ..results.log import TRIAL, Log, read_log
 from ..results.performance import MetricsError
+from ..results.run_options import read_options
 from ..scenario.roles import Roles
 from .measures import MEASURES, limits, measure
 from .ship_passage import Passage, executes, passage
@@ -92,6 +93,28 @@ def outcome_of_log(
         return outcome(trial.kind, passage(*columns), length)
     except InputError as error:
         raise MetricsError(str(error)) from None
+
+
+def simulated_trial(folder: Path, start: float | None = None, stop: float | None = None) -> Outcome:
+    """The trial that a finished run is.
+
+    Args:
+        folder: of the run.
+        start, stop: first and last time used [s]; None: as its scenario says.
+
+    Raises:
+        InputError: it is none, or its log cannot be read or lacks a column.
+    """
+    run = read_options(folder)
+    if run.trial is None:
+        raise InputError(f"'{folder}' is no run of a manoeuvring trial")
+    start, stop = (run.start if start is None else start), (run.stop if stop is None else stop)
+    log = read_log(folder, [*run.roles.pose, run.trial.order])
+    length = 0.0 if run.outline is None else run.outline.length
+    try:
+        return outcome_of_log(log, run.trial, run.roles, length, start, stop)
+    except MetricsError as error:
+        raise InputError(str(error)) from None
 
 
 def sheet(found: Outcome, title: str = "") -> Table:

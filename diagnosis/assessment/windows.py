@@ -180,23 +180,28 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
 
 
-def free_run(smoothed: Smoothed, model: Model) -> np.ndarray:
-    """A run as a model predicts it from its first state, by the commands that were given.
+def free_run(smoothed: Smoothed, model: Model, begin: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """A run as a model predicts it from one state, by the commands that were given.
 
     Args:
         smoothed: the run, of which ``LONGEST_FREE`` seconds at the most.
         model: what predicts it.
+        begin: the state is that of the last sample before [s], else of the first there is.
 
     Returns:
-        (n, 3), pose [m, m, rad] at equal distances in time; not finite where the model runs away.
+        (n,), times at equal distances [s], and (n, 3), pose [m, m, rad]; not finite where the model
+        runs away.
     """
-    first = np.flatnonzero(smoothed.used)[:1]
+    usable = np.flatnonzero(smoothed.used)
+    before = usable[smoothed.time[usable] <= begin]
+    first = before[-1:] if before.size else usable[:1]
     step, five = RunWindows(smoothed, first, first, first).step_and_commands
     h = max(step, FREE_STEP * smoothed.scale.time)
     longest = LONGEST_FREE * smoothed.scale.time
     seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
     starts = Starts(((smoothed, first),), h, int(seconds / h), five)
-    return predict(starts, model)[:, :, 0, 0]
+    pose = predict(starts, model)[:, :, 0, 0]
+    return smoothed.time[first[0]] + h * np.arange(len(pose)), pose
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
+from cosim.trials import KINDS
 
 from .channels import BESIDE, outputs
 from .unit_factors import UNITS
@@ -111,6 +112,15 @@ class Layout(BaseModel):
     skip: int = Field(default=0, ge=0, le=MOST_SKIPPED, description="lines before that of the names")
     units_line: bool = Field(default=False, description="whether the line below the names is of units")
     columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
+    trial: str | None = Field(default=None, description="the manoeuvring trial that it is, as zigzag")
+
+    @field_validator("trial")
+    @classmethod
+    def _is_trial(cls, value: str | None) -> str | None:
+        if value is not None and value not in KINDS:
+            hint = nearest(value, KINDS) or f"; there are {', '.join(KINDS)}"
+            raise ValueError(f"'{value[:SHOWN]}' is no manoeuvring trial{hint}")
+        return value
 
     @field_validator("encoding")
     @classmethod

@@ -15,6 +15,7 @@ import pandas as pd
 
 from cosim import InputError
 from cosim.errors import nearest
+from cosim.results import read_options
 from fmus.effects.cse1 import ASIDE
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
@@ -75,6 +76,7 @@ class Run:
         measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
         noise: signal -> standard deviation that the file beside tells [SI].
         ship: that was measured; None: CyberShip Enterprise 1.
+        trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Run:
     measured: Mapping[str, np.ndarray] = field(default_factory=dict)
     noise: Mapping[str, float] = field(default_factory=dict)
     ship: Description | None = None
+    trial: str | None = None
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
@@ -141,7 +144,9 @@ def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None)
     if is_matlab:
         return replace(_run(name, read_matlab(path), f"'{path}'", of), file=path)
     table = _tabular(path, layout, of.commands)
-    return replace(_of_table(name, table, f"'{path}'", of), file=path)
+    run = replace(_of_table(name, table, f"'{path}'", of), file=path)
+    told = read_options(path.parent).trial if path.name in LOGS else None
+    return run if told is None else replace(run, trial=told.kind)
 
 
 class _Table(NamedTuple):
@@ -150,12 +155,13 @@ class _Table(NamedTuple):
     columns: dict[str, np.ndarray]
     called: dict[str, str]
     noise: dict[str, float]
+    trial: str | None
 
 
 def _of_table(name: str, table: _Table, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
     run = _run(name, table.columns, where, of)
-    return replace(run, called=table.called or None, noise=table.noise)
+    return replace(run, called=table.called or None, noise=table.noise, trial=table.trial)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
@@ -280,7 +286,7 @@ def _signals(
         if column.noise is not None:
             noise[signal] = column.noise * UNITS[quantities[signal]].get(column.unit or "", 1.0)
     called = {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
-    return _Table(columns, called, noise)
+    return _Table(columns, called, noise, layout.trial)
 
 
 def column_names(path: Path, layout: Layout) -> list[str]:

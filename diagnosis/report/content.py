@@ -10,6 +10,7 @@ from fmus.effects.text import Found
 
 from ..assessment.evaluation import Evaluation
 from ..assessment.measured_outputs import inseparable, named, rms
+from ..assessment.trial_errors import trial_errors
 from ..identification.findings import Finding
 from ..model.ship_model import of_one_run, parameter_and_run
 from ..prediction_error.unrecorded import Unrecorded
@@ -198,6 +199,7 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
             for name in named(e.integrals, e.model)
         },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
+        trial=trial_errors(e.smoothed, e.model, e.learned or e.model),
     )
 
 

@@ -19,6 +19,8 @@ Numbers = Annotated[list[Number], BeforeValidator(list)]
 COVARIATE, UNIT = (Field(validation_alias=AliasPath("covariate", name)) for name in ("id", "unit"))
 SHARE = Field(validation_alias="share")
 Axes = Literal["X", "Y", "N", "XY", "XYN"]
+# Measured, before, after; or a list of these.
+Triples = Annotated[list[list[Number]] | list[Number], Field(union_mode="left_to_right")]
 
 
 class Part(BaseModel):
@@ -85,6 +87,8 @@ class RunErrors(Part):
 
     measured: ``ACTUATOR.OUTPUT`` -> its error, of outputs that are measured and not fitted.
     coverage_90: share of the windows' samples, positions and headings alike, within the 90 % band.
+    trial: of a manoeuvring trial its measures, [measured, before, after] each; of what comes several
+    times, as overshoots do, a list of these; null: the run is none.
     """
 
     run: str
@@ -94,6 +98,7 @@ class RunErrors(Part):
     omega_rms: AxesChange
     measured: dict[str, MeasuredError] = {}
     coverage_90: Number = None
+    trial: dict[str, Triples] | None = None
 
 
 class RegionResult(Part):

@@ -57,7 +57,7 @@ def free(e: Evaluation) -> "Figure":
     far = MAX_REACH * (high - low).max()
     models = [(e.model, BEFORE, "before" if e.learned else "predicted")]
     models += [(e.learned, AFTER, "after")] if e.learned else []
-    paths = [(free_run(e.smoothed, model)[:, :2], colour, label) for model, colour, label in models]
+    paths = [(free_run(e.smoothed, model)[1][:, :2], colour, label) for model, colour, label in models]
     near = [np.clip(_finite(path), low - far, high + far) for path, _, _ in paths]
     figure, panel = _map(np.concatenate([measured, *near]))
     panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")

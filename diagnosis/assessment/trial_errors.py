@@ -1,0 +1,107 @@
+"""A manoeuvring trial as it was measured, and as models predict it from one state."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim import InputError
+from cosim.trials import Passage, executes, measure, passage
+from fmus.ship import Ship
+
+from ..data import Run
+from ..model import Model
+from ..smoothing import Smoothed
+from .windows import free_run
+
+APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
+NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")
+
+# Name -> measured, before, after; of what comes several times a list of these.
+TrialErrors = dict[str, Any]
+
+
+def length_of(ship: Ship) -> float:
+    """Length between perpendiculars [m]."""
+    assert ship.vessel.outline is not None
+    return ship.vessel.outline.length
+
+
+def order_under_trial(run: Run, ship: Ship) -> np.ndarray:
+    """(n,), what was ordered: the angle of rudders or azimuths, where there are none the yaw moment.
+
+    Of several angles the mean; of a stop the surge force.
+    """
+    if run.trial == "stop":
+        return run.tau_cmd[:, 0]
+    angles = [k for k, unit in enumerate((ship.commands or {}).values()) if unit == "rad"]
+    if run.commands is None or not angles:
+        return run.tau_cmd[:, 2]
+    return run.commands[:, angles].mean(axis=1)
+
+
+def measured_passage(smoothed: Smoothed, ship: Ship) -> Passage:
+    """The trial that a run is, as it was measured.
+
+    Raises:
+        InputError: the order under trial never changes.
+    """
+    run = smoothed.track.run
+    x, y, psi = smoothed.eta.T
+    found = passage(smoothed.time, x, y, psi, order_under_trial(run, ship))
+    try:
+        executes(found)
+    except InputError as error:
+        raise InputError(f"run '{run.name}': {error}") from None
+    return found
+
+
+def trial_errors(smoothed: Smoothed, before: Model, after: Model) -> TrialErrors | None:
+    """Measures of a trial: measured, and as two models predict it by the commands that were given.
+
+    All three are from shortly before the first execute on, where the predictions begin; the instants
+    at which the order is put over are those of the measurement.
+
+    Args:
+        smoothed: the run.
+        before, after: the initial and the learned model.
+
+    Returns:
+        Name of a measure -> [measured, before, after]; ``overshoot`` and ``overshoot_time`` -> a list of
+        these; None in place of what a track does not tell. None for a run that is no trial.
+    """
+    run = smoothed.track.run
+    if run.trial is None:
+        return None
+    ship = before.ship
+    whole = measured_passage(smoothed, ship)
+    begin = executes(whole)[0] - APPROACH * smoothed.scale.time
+    parts = [free_run(smoothed, before, begin)]
+    parts.append(parts[0] if after is before else free_run(smoothed, after, begin))
+    time, _ = parts[0]
+    rows = (whole.time >= time[0]) & (whole.time <= time[-1])
+    seen = Passage(*(column[rows] for column in whole))
+    found = [_measures(seen, run.trial, ship)]
+    for _, pose in parts:
+        columns = (pose[:, 0], pose[:, 1], np.unwrap(pose[:, 2]))
+        x, y, psi = (np.interp(seen.time, time, column) for column in columns)
+        found.append(_measures(Passage(seen.time, x, y, psi, seen.order), run.trial, ship))
+    return _together(found)
+
+
+def _measures(p: Passage, trial: str, ship: Ship) -> Mapping[str, float]:
+    """The measures of a track; none of one that runs away."""
+    return measure(trial, p, length_of(ship)) if all(np.isfinite(c).all() for c in p) else {}
+
+
+def _together(found: list[Mapping[str, float]]) -> TrialErrors:
+    told: TrialErrors = {}
+    for name in dict.fromkeys(name for each in found for name in each):
+        triple = [each.get(name) for each in found]
+        numbered = NUMBERED.fullmatch(name)
+        if numbered is None:
+            told[name] = triple
+        else:
+            told.setdefault(numbered[1], []).append(triple)
+    return told

@@ -1,0 +1,177 @@
+"""Manoeuvring trials that were measured: the same measures, and beside them what models predict."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.command import command
+from support.measured import DATA, needs_data
+
+import cosim
+import diagnosis
+from cosim.trials import executes, measure, passage
+from diagnosis.assessment.trial_errors import trial_errors
+from diagnosis.compare import main as compare_main
+from diagnosis.measure_trial import main as trial_main
+
+ORDERS = ["thrusters.tau_cmd_X", "thrusters.tau_cmd_Y", "thrusters.tau_cmd_N"]
+COLUMNS = ["time", "vessel.x", "vessel.y", "vessel.psi", *ORDERS]
+NAMES = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
+
+
+@pytest.fixture(scope="module")
+def sailed(tmp_path_factory):
+    """Folders of a zig-zag and a circle of the Otter."""
+    folder = tmp_path_factory.mktemp("sailed")
+    for kind in ("zigzag", "circle"):
+        cosim.simulate(f"otter_{kind}", folder / kind, stop=60.0)
+    return folder
+
+
+def as_file(sailed, kind, folder, trial="same", noise=0.002, **others):
+    """The measurement of a run as a file, 10 samples a second, with a file beside."""
+    log = cosim.read_log(sailed / kind, COLUMNS)
+    table = pd.DataFrame({new: log[old][::5] for new, old in zip(NAMES, COLUMNS, strict=True)})
+    table[["x", "y", "psi"]] += noise * np.random.default_rng(1).standard_normal((len(table), 3))
+    table["psi"] = (table["psi"] + np.pi) % (2.0 * np.pi) - np.pi
+    table = table.assign(**others)
+    table.to_csv(folder / f"{kind}.csv", index=False)
+    told = kind if trial == "same" else trial
+    (folder / f"{kind}.csv.json").write_text(json.dumps({"trial": told}))
+    return folder / f"{kind}.csv"
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "circle"])
+def test_a_measured_trial_has_the_measures_of_the_simulated_one(sailed, tmp_path, kind):
+    file = as_file(sailed, kind, tmp_path)
+    done = command(trial_main, file, "--ship", "otter", "--out", tmp_path / "measured")
+    assert done.returncode == 0, done.stderr
+    assert f"Trial: {kind}" in done.stdout
+    assert command(trial_main, sailed / kind, "--out", tmp_path / "simulated").returncode == 0
+    measured, simulated = (
+        json.loads((tmp_path / name / "trial.json").read_text()) for name in ("measured", "simulated")
+    )
+    assert measured["trial"] == simulated["trial"] == kind
+    assert measured["limits"].keys() == simulated["limits"].keys()
+    assert measured["executes"] == pytest.approx(simulated["executes"], abs=0.11)
+    assert measured["measures"].keys() == simulated["measures"].keys()
+    for name, value in simulated["measures"].items():
+        assert measured["measures"][name] == pytest.approx(value, rel=0.03, abs=0.12), name
+    assert (tmp_path / "measured" / "trial.png").exists()
+
+
+def test_the_option_says_which_trial_and_which_part(sailed, tmp_path):
+    file = as_file(sailed, "circle", tmp_path, trial=None)
+    out = tmp_path / "out"
+    done = command(
+        trial_main, file, "--ship", "otter", "--trial", "circle", "--from", 10, "--to", 45, "--out", out
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads((out / "trial.json").read_text())
+    assert told["executes"] == pytest.approx([20.0], abs=0.11)
+    assert "tactical_diameter" in told["measures"]
+    assert "circle_speed" not in told["measures"]
+
+
+@pytest.mark.parametrize(
+    ("trial", "others", "arguments", "message"),
+    [
+        (None, {}, (), "does not say which trial it is"),
+        ("zig-zag", {}, (), "is no manoeuvring trial; did you mean 'zigzag'?"),
+        ("same", {"tau_N": 1.0}, (), "never changes"),
+        ("same", {}, ("--from", 1e6), "too short"),
+    ],
+)
+def test_mistakes_are_one_line(sailed, tmp_path, trial, others, arguments, message):
+    file = as_file(sailed, "zigzag", tmp_path, trial, **others)
+    done = command(trial_main, file, "--ship", "otter", *arguments, "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert message in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def errors(files, ship, learned=None):
+    """errors[].trial of runs, before and after."""
+    craft = diagnosis.model.ship_with((), ship)
+    model = diagnosis.Model(ship=craft)
+    after = model if learned is None else model.plus(learned)
+    runs = diagnosis.gather(files, model=model)
+    return [trial_errors(w.smoothed, model, after) for w in runs]
+
+
+def test_the_model_of_the_ship_predicts_its_trial_and_another_one_does_not(sailed, tmp_path):
+    files = [as_file(sailed, kind, tmp_path) for kind in ("zigzag", "circle")]
+    zigzag, circle = errors(files, "otter", {"delta_N_r": 25.0})
+    for name in ("advance", "transfer", "tactical_diameter"):
+        measured, before, after = circle[name]
+        assert before == pytest.approx(measured, rel=0.02)
+        assert after < 0.98 * before
+    measured, before, after = zigzag["overshoot"][0]
+    assert before == pytest.approx(measured, abs=0.01)
+    assert after > 1.05 * before
+    assert len(zigzag["overshoot"]) > 2
+    assert errors([as_file(sailed, "zigzag", tmp_path, trial=None)], "otter") == [None]
+
+
+def test_compare_writes_them(sailed, tmp_path):
+    file = as_file(sailed, "zigzag", tmp_path)
+    done = command(compare_main, file, "--ship", "otter", "--out", tmp_path / "found")
+    assert done.returncode == 0, done.stderr
+    told = json.loads((tmp_path / "found" / "comparison.json").read_text())["errors"][0]["trial"]
+    assert [len(triple) for triple in told["overshoot"]] == [3] * len(told["overshoot"])
+    assert len(told["check_angle"]) == 3
+
+
+def test_a_log_of_a_trial_is_one_to_the_diagnosis(sailed):
+    found = errors([sailed / "zigzag"], "otter")[0]
+    assert found["overshoot"][0][1] == pytest.approx(found["overshoot"][0][0], abs=0.005)
+
+
+# Real ones
+
+TANKER = {"time": "t", "psi": {"name": "psi_deg", "unit": "deg"}, "propeller.n": "rps",
+          "rudder.delta": {"name": "rudder_deg", "unit": "deg", "flip": True}}  # fmt: skip
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "check"), [("z_10_10_p", 10.0), ("z_10_10_s", 10.0), ("z_20_10_s", 10.0)]
+)
+def test_zigzags_of_the_tanker(name, check, tmp_path):
+    """The order turns at the heading that the file's name tells, and 10/10 is as the basin's."""
+    file = tmp_path / f"{name}.csv"
+    file.write_bytes((DATA / "kvlcc2_hsva" / file.name).read_bytes())
+    (tmp_path / f"{file.name}.json").write_text(json.dumps({"trial": "zigzag", "columns": TANKER}))
+    found = errors([file], "kvlcc2")[0]
+    assert np.degrees(found["check_angle"][0]) == pytest.approx(check, abs=1.5)
+    measured, before, after = np.array(found["overshoot"]).T
+    assert 3.0 < np.degrees(measured[0]) < 15.0
+    assert (before == after).all()
+    assert before == pytest.approx(measured, rel=0.6)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("part", "begin", "end", "advance", "transfer", "diameter"),
+    [
+        (1, 489.0, 684.0, 104.2, 40.6, 92.3),
+        (1, 1215.0, 1399.0, 87.3, 48.5, 95.8),
+        (1, 2317.0, 2557.0, 151.5, 122.3, 254.1),
+        (2, 7109.0, 7369.0, 86.7, 39.7, 92.1),
+        (2, 7577.0, 7736.0, 117.1, 58.0, 125.4),
+    ],
+)
+def test_circles_of_the_research_vessel(part, begin, end, advance, transfer, diameter):
+    """Against circles that were measured by others in the same log: a metre is a fifth of a second."""
+    log = pd.read_csv(DATA / "gunnerus" / f"trial_{part}.csv")
+    log = log[(log.tvec >= begin - 12.0) & (log.tvec <= end)]
+    psi = np.radians(log.psi.to_numpy())
+    jumps = np.abs((np.diff(psi) + np.pi) % (2.0 * np.pi) - np.pi) > 0.2  # interpolated through 360
+    whole = ~(np.append(jumps, False) | np.append(False, jumps))
+    p = passage(*(c[whole] for c in (log.tvec, log.N, log.E, psi, log.Azi)))
+    found = measure("circle", p, 33.9)
+    assert executes(p)[0] == pytest.approx(begin, abs=1.0)
+    assert found["advance"] == pytest.approx(advance, abs=1.5)
+    assert found["transfer"] == pytest.approx(transfer, abs=0.7)
+    assert found["tactical_diameter"] == pytest.approx(diameter, abs=0.7)
