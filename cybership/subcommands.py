@@ -23,6 +23,7 @@ SUBCOMMANDS = {
     "plots": Subcommand("cosim.plots", "pictures of runs, laid over each other; PNG, SVG or PDF"),
     "trial": Subcommand("diagnosis.measure_trial", "measures of a manoeuvring trial, run or measured"),
     "columns": Subcommand("diagnosis.propose_columns", "what must be told of a measurement of your own"),
+    "repair": Subcommand("diagnosis.repair", "what a run's own channels show to be wrong, repaired"),
     "compare": Subcommand("diagnosis.compare", "where does a model fail against measured runs?"),
     "learn": Subcommand("diagnosis.learn", "which physical effect does the model lack?"),
     "campaign": Subcommand("cosim.campaign", "many runs: grids and samples, one table, differences"),

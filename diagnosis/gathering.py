@@ -19,6 +19,7 @@ from .model import Integrals, Model, integrals
 from .model.weak_form import WIDTH
 from .parallel import for_each
 from .progress import Advance, silent
+from .sensors import Examined, examine
 from .smoothing import Smoothed, smooth
 
 # Samples in a window of the weak form. Derived: with so many its kernel's slope integrates a velocity
@@ -36,12 +37,15 @@ def gather(
 ) -> list[Integrals]:
     """Read and smooth measured runs, and refuse those whose files say something else than was meant.
 
+    Faults of the channels that the channels themselves repair are repaired, see :mod:`.sensors`.
+
     All commands, and :func:`diagnosis.load`, get their runs here.
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`, or runs that were read.
         advance: progress callback.
-        anyway: whether a file is believed whose units, signs or columns seem to be other ones than said.
+        anyway: whether a file is believed whose units, signs or columns seem to be other ones than said,
+            or whose channels contradict each other beyond repair.
         model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
             default.
         horizon: length of the windows in which models predict the runs [s]; by default that of the ship.
@@ -96,10 +100,27 @@ def _distinct(runs: Sequence[Run], paths: Sequence[str | Path]) -> list[Run]:
 
 
 def _smoothed(run: Run, anyway: bool, scale: Scale) -> Smoothed:
-    track = clean(run, anyway, scale)
+    """A run as far as its own channels repair it, judged and smoothed."""
+    examined = examine(run, scale)
+    if not anyway:
+        _refuse_unrepaired(examined)
+    repaired = replace(examined.run, notes=(*examined.run.notes, *examined.notes))
+    track = clean(repaired, anyway, scale)
     if not anyway:
         _refuse_rare(track)
-    return smooth(thinned(track))
+    return replace(smooth(thinned(track)), sensors=examined)
+
+
+def _refuse_unrepaired(examined: Examined) -> None:
+    """Refuse a run with a fault of its channels that these cannot repair.
+
+    Raises:
+        InputError: there is one.
+    """
+    for finding in examined.findings:
+        if not finding.repaired:
+            told = "what else is measured does not tell how to repair that"
+            raise InputError(f"run '{examined.run.name}': {finding.sentence}; {told}; {GO_ON}")
 
 
 def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> Integrals:

@@ -59,6 +59,7 @@ DIAGNOSIS_LAYERS = (
         "pca",
         "pls",
         "propose_columns",
+        "repair",
         "replay",
         "sysid",
         "watch",

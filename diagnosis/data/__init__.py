@@ -7,6 +7,7 @@ from .proposal import propose
 from .reading import Run, read, read_frame
 from .ship_of_logs import ship_of_logs
 from .thinning import thinned
+from .writing import layout_beside, table_of
 
 __all__ = [
     "Counts",
@@ -14,6 +15,7 @@ __all__ = [
     "Track",
     "clean",
     "in_order",
+    "layout_beside",
     "line_beside",
     "lost",
     "other_columns",
@@ -22,5 +24,6 @@ __all__ = [
     "read_frame",
     "repeated",
     "ship_of_logs",
+    "table_of",
     "thinned",
 ]

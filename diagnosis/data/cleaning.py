@@ -12,6 +12,7 @@ from fmus.ops import wrap
 from fmus.scale import CSE1, Scale
 
 from .reading import Run
+from .telegrams import filled
 from .unit_check import refuse_time, refuse_units
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -24,6 +25,7 @@ LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by th
 # s, or LONG periods if that is longer: gaps are told, and over one between commands none is known.
 # Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
 HELD = 0.5
+EMPTY = 2.5  # sampling periods between two measurements, of which the rows between may be empty (chosen)
 NEAR = 1.0  # s, before and after a gap of the heading, by whose yaw rate it is unwrapped (chosen)
 
 
@@ -118,6 +120,11 @@ def clean(run: Run, anyway: bool = False, scale: Scale = CSE1) -> Track:
     fresh = np.flatnonzero(~dropped & ~repeats)
     if fresh.size < 4:
         raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
+    between = np.zeros_like(repeats)
+    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2])
+    if between.any():
+        fresh = fresh[~between[fresh]]
+        notes.append("rows between two measurements were filled by straight lines: they do not count")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
     steps = np.minimum(np.diff(run.time), GAP * scale.time)
@@ -125,13 +132,16 @@ def clean(run: Run, anyway: bool = False, scale: Scale = CSE1) -> Track:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
         )
-    between = np.zeros_like(repeats)
     if period > 1.5 * row:  # a log that is faster than the measurement
-        last = run.time[fresh][np.maximum(np.searchsorted(fresh, np.arange(repeats.size)) - 1, 0)]
-        between = repeats & (run.time - last < period - 0.5 * row)
+        after = np.searchsorted(fresh, np.arange(repeats.size))
+        last = run.time[fresh][np.maximum(after - 1, 0)]
+        between |= repeats & (run.time - last < period - 0.5 * row)
+        until = run.time[fresh][np.minimum(after, fresh.size - 1)] - last
+        between |= np.isnan(run.pose).all(axis=1) & (until < EMPTY * period)
+        dropped &= ~between
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
-    pose = np.where((dropped | repeats)[:, None], np.nan, run.pose)
+    pose = np.where((dropped | repeats | between)[:, None], np.nan, run.pose)
     refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period, NEAR * scale.time)
     _moves(pose[fresh], where)

@@ -40,6 +40,7 @@ def comparison_content(
     return result_keys.ComparisonContent(
         data=_data(comparison.evaluations),
         windows=_lengths(comparison.evaluations[0]),
+        sensors=[s for e in comparison.evaluations for s in _sensors(e)],
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         **_provenance(comparison, model, files),
@@ -88,6 +89,7 @@ def diagnosis_content(
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
         windows=_lengths(comparison.evaluations[0]),
+        sensors=[s for e in comparison.evaluations for s in _sensors(e)],
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         where_after=result_keys.WhereResult.model_validate(comparison.after),
@@ -181,6 +183,12 @@ def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
         name: sum(getattr(r, name) for r in runs) for name in result_keys.SampleCounts.model_fields
     }
     return result_keys.Data(runs=runs, **totals)
+
+
+def _sensors(e: Evaluation) -> Iterator[result_keys.SensorResult]:
+    """Faults of a run's channels."""
+    for f in e.smoothed.sensors.findings if e.smoothed.sensors else ():
+        yield result_keys.SensorResult.model_validate({"run": e.name, **vars(f)})
 
 
 def _errors(e: Evaluation) -> result_keys.RunErrors:

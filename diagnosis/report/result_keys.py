@@ -4,9 +4,20 @@ All numbers are in SI; a number that is not finite, or not known, is null.
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AliasPath, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    AliasChoices,
+    AliasPath,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
+
+from ..sensors.constants import Kind
 
 
 def _finite(value: float | None) -> float | None:
@@ -82,6 +93,31 @@ class MeasuredError(Part):
     rms_after: Number
 
 
+class SensorResult(Part):
+    """A fault of a channel that other channels of the run show, in a stretch of the log's time [s].
+
+    alike: what would look the same. repaired: whether the channels repaired it, for all that follows.
+    """
+
+    run: str
+    channel: str
+    kind: Kind
+    value: Number
+    unit: str
+    ci95: tuple[Number, Number]
+    start: Annotated[Number, Field(validation_alias=AliasChoices("start", "from"))]
+    end: Annotated[Number, Field(validation_alias=AliasChoices("end", "to"))]
+    sentence: str
+    alike: list[str]
+    repaired: bool
+
+    @model_serializer(mode="wrap")
+    def _ends(self, content: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """In the files the ends have the names that Python keeps to itself."""
+        told: dict[str, Any] = content(self)
+        return {{"start": "from", "end": "to"}.get(name, name): told[name] for name in told}
+
+
 class RunErrors(Part):
     """Window prediction error of a run [m], [rad], and RMS of the model error [N, N, N m].
 
@@ -142,6 +178,7 @@ class ComparisonContent(Part):
 
     data: Data
     windows: WindowLengths
+    sensors: list[SensorResult] = []
     errors: list[RunErrors]
     where: WhereResult
     runs: list[str]
@@ -307,6 +344,7 @@ class DiagnosisContent(Part):
     ranking: list[RankedResult]
     data: Data
     windows: WindowLengths
+    sensors: list[SensorResult] = []
     errors: list[RunErrors]
     where: WhereResult
     where_after: WhereResult

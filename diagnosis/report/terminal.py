@@ -8,8 +8,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from ..sensors import sensor_lines
 from .headline import is_sure, told, verdict_title
-from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult
+from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, SensorResult
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
 MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
@@ -18,6 +19,7 @@ MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
 def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.compare``."""
     yield from _data(r.data)
+    yield from _sensors(r.sensors)
     yield from _lines("Where the model fails", r.where.sentences)
     yield from _errors(r, learned=False)
     yield from _files(r.files, out)
@@ -26,6 +28,7 @@ def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
 def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.learn``."""
     yield from _data(r.data)
+    yield from _sensors(r.sensors)
     yield from _lines("Where the model fails", r.where.sentences)
     yield from _lines("What is left without an explanation", [r.remainder.sentence])
     if not r.effects:
@@ -109,6 +112,14 @@ def _data(data: Data) -> Iterator[RenderableType]:
     notes = [f"{r.run}: {note}" for r in data.runs for note in r.notes]
     if notes:
         yield from _lines("Found in the data", notes)
+
+
+def _sensors(found: Sequence[SensorResult]) -> Iterator[RenderableType]:
+    """What the channels of each run say of each other."""
+    lines = [f"{run}: {line}" for run in dict.fromkeys(f.run for f in found) for line in
+             sensor_lines([f for f in found if f.run == run])]  # fmt: skip
+    if lines:
+        yield from _lines("What channels say of each other", lines)
 
 
 def _run(name: str, held_out: bool) -> Text:

@@ -2,5 +2,6 @@
 
 from .examination import examine
 from .sensor_finding import Examined, SensorFinding
+from .sensor_text import sensor_lines
 
-__all__ = ["Examined", "SensorFinding", "examine"]
+__all__ = ["Examined", "SensorFinding", "examine", "sensor_lines"]

@@ -18,6 +18,7 @@ from fmus.scale import Scale
 
 from ..data import Counts, Track
 from ..data.cleaning import noise
+from ..sensors import Examined
 from .command_motion import CommandResponse, Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
@@ -52,6 +53,7 @@ class Smoothed:
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
+        sensors: what the run's channels say of each other; None where nobody asked.
     """
 
     track: Track
@@ -68,6 +70,7 @@ class Smoothed:
     jerk: np.ndarray
     delay: float
     late: bool
+    sensors: Examined | None = None
 
     @property
     def time(self) -> np.ndarray:

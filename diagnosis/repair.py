@@ -1,0 +1,99 @@
+"""Repair a measurement by its own channels: ``python -m diagnosis.repair RUN --out FILE``."""
+
+if __name__ == "__main__":
+    from cosim.watch import watched
+
+    watched()  # before all other imports, which take a while
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosim import InputError
+from cosim.command import program, run_command
+
+from .command_line import Done, run
+from .progress import Advance
+from .result_folder import together
+
+if TYPE_CHECKING:
+    from .sensors import Examined
+
+KINDS = (".csv", ".parquet")
+ALONE = (
+    "the pose is all that is measured: nothing says the same twice, so nothing can be held against it"
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    return run(repair, _parser().parse_args(arguments))
+
+
+def repair(options: argparse.Namespace, advance: Advance) -> Done:
+    """Run the command with parsed options."""
+    from .data import layout_beside, read, table_of  # only now: they take a second to import
+    from .model import ship_with
+    from .sensors import examine
+
+    out = options.out
+    if out.suffix not in KINDS:
+        raise InputError(f"'{out}' is neither .csv nor .parquet")
+    if out.exists() and not options.overwrite:
+        raise InputError(f"'{out}' is there already; --overwrite replaces it")
+    craft = ship_with((), options.ship)
+    advance("reading")
+    measured = read(options.run, of=craft)
+    advance("what channels say of each other")
+    found = examine(measured, craft.scale)
+    beside = f"{out.name}.json"
+    with together(out.parent, (out.name, beside)) as new:
+        table = table_of(found.run)
+        if out.suffix == ".csv":
+            table.to_csv(new / out.name, index=False)
+        else:
+            table.to_parquet(new / out.name, index=False)
+        told = layout_beside(found.run)
+        (new / beside).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    return Done(0, [*_told(found), f"written: {out}, {out}.json"])
+
+
+def _told(found: "Examined") -> list[str]:
+    """What was found and done, a line each."""
+    from .sensors import sensor_lines
+
+    beside = ", ".join(found.run.measured)
+    first = f"measured beside the pose: {beside}" if beside else ALONE
+    lines = [*sensor_lines(found.findings), *found.notes]
+    if beside and not found.findings:
+        lines.append("no fault: what says the same twice agrees")
+    return [first, *lines]
+
+
+def _parser() -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(
+        prog=program("diagnosis.repair"),
+        description="Hold the channels of a measurement that say the same twice against each other, "
+        "and repair what they show to be wrong: clock, scale, offset, place, delay, wrapped angles, units. "
+        "No model of the ship is used.",
+        epilog="examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
+        "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
+    made.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="CSV or Parquet file; FILE.json beside it tells the noise",
+    )
+    made.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")
+    made.add_argument("--overwrite", action="store_true", help="also over a file that is there")
+    return made
+
+
+if __name__ == "__main__":
+    run_command(main)
