@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog=program("diagnosis.repair"),
         description="Hold the channels of a measurement that say the same twice against each other, "
-        "and repair what they show to be wrong: clock, scale, offset, place, delay, wrapped angles, units. "
+        "and repair what they show to be wrong: clock, scale, offset, place, delay, wraps, units. "
         "No model of the ship is used.",
         epilog="examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
         "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",

@@ -5,9 +5,9 @@ from .cleaning import Counts, Track, clean, in_order, lost, repeated
 from .other_columns import other_columns
 from .proposal import propose
 from .reading import Run, read, read_frame
+from .run_table_file import layout_beside, table_of
 from .ship_of_logs import ship_of_logs
 from .thinning import thinned
-from .writing import layout_beside, table_of
 
 __all__ = [
     "Counts",
