@@ -97,6 +97,13 @@ class Run:
     ship: Description | None = None
     trial: str | None = None
 
+    @property
+    def commanded(self) -> dict[str, np.ndarray]:
+        """Signal -> (n,), the commands in the form in which they were given."""
+        forms = [(self.signals, self.commands), (FIVE, self.five), (POWER, self.power)]
+        given = [form for form in forms if form[1] is not None] or [(TAU, self.tau_cmd)]
+        return {s: c for names, table in given for s, c in zip(names, table.T, strict=True)}
+
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
         columns = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from .columns import FIVE, POSE, POWER, TAU, Column, Layout, read_layout
+from .columns import POSE, Column, Layout, read_layout
 from .reading import Run
 
 # What the file beside a measurement says of its text, and of columns that have other names now.
@@ -14,14 +13,8 @@ OF_TEXT = {"separator", "decimal", "encoding", "skip", "units_line", "columns"}
 
 def table_of(run: Run) -> pd.DataFrame:
     """All that was measured and commanded, by its own names and in SI."""
-    groups = [(POSE, run.pose), (run.signals, run.commands), (FIVE, run.five), (POWER, run.power)]
-    if run.commands is None and run.five is None:
-        groups.append((TAU, run.tau_cmd))
-    columns: dict[str, np.ndarray] = {"time": run.time}
-    for names, values in groups:
-        if values is not None:
-            columns |= dict(zip(names, values.T, strict=True))
-    return pd.DataFrame(columns | dict(run.measured))
+    pose = dict(zip(POSE, run.pose.T, strict=True))
+    return pd.DataFrame({"time": run.time, **pose, **run.commanded, **run.measured})
 
 
 def layout_beside(run: Run) -> dict[str, Any]:
