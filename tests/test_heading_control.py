@@ -132,6 +132,27 @@ def test_it_starts_with_the_force_that_keeps_the_motion(psi, u, r):
     assert flatten(out.demand.tau) == pytest.approx([-X, 0.0, -N], abs=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.1, 0.4])
+def test_the_wave_filter_leaves_a_share_of_the_waves_and_all_of_the_rest(share):
+    """Of a heading that swings, the moment's amplitude; of one that is off, the moment itself."""
+    w = 1.2
+
+    def moments(swing, **values):
+        p = with_values(HEADING, integral=0.0, **values)
+        s, rows = HEADING.init(Inputs(), p), []
+        for k in range(3000):
+            psi = 0.01 * (math.sin(w * k * H) if swing else 1.0)
+            r = 0.01 * w * math.cos(w * k * H) if swing else 0.0
+            s, out = HEADING.step(s, Inputs(Estimate(psi_hat=psi, r_hat=r)), p, H)
+            rows.append(out.demand.tau.tau_N)
+        return np.array(rows)
+
+    waves, constant = (moments(swing, omega_wave=w, zeta_wave=share)[1500:] for swing in (True, False))
+    whole = moments(True)[1500:]
+    assert np.ptp(waves) / np.ptp(whole) == pytest.approx(share, rel=0.05)
+    assert constant == pytest.approx(moments(False)[1500:], rel=1e-6)
+
+
 # Line of sight
 
 
@@ -236,7 +257,9 @@ def test_port_and_starboard_are_alike():
     assert there[2][-1] == pytest.approx(math.atan2(40.0, 15.0), abs=0.1)
 
 
-@pytest.mark.parametrize("ratio", [10.0, pytest.param(100.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "ratio", [10.0, *(pytest.param(x, marks=pytest.mark.slow) for x in (0.5, 150.0))]
+)
 def test_a_ship_of_another_size_sails_the_same_in_its_own_lengths(ratio):
     small, large = (voyage(d, 60.0, CORNER) for d in (OTTER, scaled(OTTER, ratio)))
     assert large == pytest.approx(small, rel=1e-6, abs=1e-6)

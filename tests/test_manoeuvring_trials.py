@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 from support.command import command
-from support.project import COMPONENTS
+from support.project import COMPONENTS, ROOT
 from support.ships import PROPELLER, SHIPS, described, part, scaled
 
 import cosim
@@ -361,3 +362,9 @@ def test_a_trial_is_told_by_its_fmu(kind):
 def test_a_trial_in_python_and_compiled_is_the_same(tmp_path):
     found = [cosim.simulate("otter_zigzag", tmp_path / str(n), native=n).metrics for n in (False, True)]
     assert found[0] == found[1]
+
+
+def test_the_page_defines_every_measure():
+    page = (ROOT / "docs" / "trials.md").read_text(encoding="utf-8")
+    numbered = re.compile(r"_[23]$")  # between the first and the fourth overshoot
+    assert [m.name for m in MEASURES if f"`{m.name}`" not in page and not numbered.search(m.name)] == []

@@ -25,6 +25,8 @@ from .recorder import Recorder
 if TYPE_CHECKING:
     import pandas
 
+TRIAL = "trial"  # name of a trial's picture
+
 
 @dataclass(repr=False)
 class Result:
@@ -70,7 +72,8 @@ class Result:
         """Draw one of the pictures of a run.
 
         Args:
-            name: ``trajectory``, ``errors``, ``metrics``, ``forces`` or ``model_error``.
+            name: ``trajectory``, ``errors``, ``metrics``, ``forces`` or ``model_error``; ``trial`` of a
+                manoeuvring trial.
 
         Returns:
             The picture, which shows itself in a notebook.
@@ -80,6 +83,10 @@ class Result:
         """
         from ..results import drawing
 
+        if name == TRIAL and self.trial is not None:
+            from ..trials.trial_picture import draw_trial
+
+            return draw_trial(self.trial)
         if name not in drawing.PICTURES:
             raise InputError(f"no picture '{name}'{nearest(name, drawing.PICTURES)}")
         label = self.folder.name

@@ -15,6 +15,13 @@ damps more. The speed wanted is the target's velocity along its heading; it pass
 first order, and the surge force is feed-forward and a PI law of the same kind. All is tuned in
 frequencies, so it fits any ship whose inertia and damping are told.
 
+Waves move the heading faster than a rudder should. With ``omega_wave``, the frequency at which they are
+met, the feedback of heading and rate passes a notch filter (Fossen 2021, ch. 13),
+
+    (s^2 + 2 zeta_wave omega_wave s + omega_wave^2) / (s + omega_wave)^2,
+
+which leaves the share ``zeta_wave`` of them there, and slow motion as it is.
+
 The integrals follow the force that acts where the thrusters tell it (anti-windup by back-calculation).
 The references start from the ship's own heading, rate and speed, so there is no jolt at the start.
 
@@ -26,7 +33,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import POSITIVE, Component, Range, group_of, variables
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
-from ..ops import Number, clip, cos, fmax, sin, where, wrap
+from ..ops import Number, clip, cos, exp, fmax, sin, where, wrap
 from ..signals import Force, Target
 from .backstepping import HELD, Demand, Errors, Inputs, acting
 
@@ -50,6 +57,8 @@ class Params(NamedTuple):
     omega_u_d: Annotated[float, "rad/s", "pole of the speed reference", FREQUENCY] = 0.2
     inertia: Inertia = Inertia()
     damping: Any = KnownDamping()
+    omega_wave: Annotated[float, "rad/s", "frequency of the waves as met; 0: no filter", POSITIVE] = 0.0
+    zeta_wave: Annotated[float, "1", "share of the waves that the filter leaves", Range(0.0, 1.0)] = 0.1
 
 
 class Reference(NamedTuple):
@@ -61,13 +70,21 @@ class Reference(NamedTuple):
     u: Any = 0.0
 
 
+class Notch(NamedTuple):
+    """The feedback through one low pass and through two [N.m.s, N.m.s2]."""
+
+    once: Any = 0.0
+    twice: Any = 0.0
+
+
 class State(NamedTuple):
-    """Reference, integral parts of surge force and yaw moment [N, N m], force asked for last."""
+    """Reference, integral parts of surge force and yaw moment [N, N m], last force, wave filter."""
 
     reference: Reference = Reference()
     surge: Any = 0.0
     yaw: Any = 0.0
     tau: Force = Force()
+    notch: Notch = Notch()
 
 
 class Outputs(NamedTuple):
@@ -95,16 +112,38 @@ def follow(d: Reference, t: Target, p: Params, h: Number) -> Reference:
     return Reference(d.psi + h * r, r, r_dot, d.u + h * p.omega_u_d * (wanted_speed(t) - d.u))
 
 
+def feedback(d: Reference, i: Inputs, p: Params) -> Number:
+    """K_P (psi_d - psi) + K_D (r_d - r) [N m]."""
+    _, _, (_, _, m_r) = mass_matrix(p.inertia)
+    K_D = fmax(2.0 * p.zeta_psi * p.omega_psi * m_r + p.damping.N_r, 0.0)
+    K_P = m_r * p.omega_psi * p.omega_psi
+    return K_P * wrap(d.psi - i.estimate.psi_hat) + K_D * (d.r - i.estimate.r_hat)
+
+
+def filtered(n: Notch, moment: Number, p: Params, h: Number) -> Notch:
+    """The wave filter after h [s] of a moment that is held."""
+    w = where(p.omega_wave > 0.0, p.omega_wave, 1.0)
+    decay, end = exp(-w * h), moment / w
+    return Notch(
+        end + (n.once - end) * decay,
+        n.twice * decay + end / w * (1.0 - decay) + (n.once - end) * h * decay,
+    )
+
+
+def without_waves(n: Notch, moment: Number, p: Params) -> Number:
+    """The moment behind the wave filter."""
+    w = p.omega_wave
+    return moment - 2.0 * (1.0 - p.zeta_wave) * w * (n.once - w * n.twice)
+
+
 def law(s: State, i: Inputs, p: Params) -> Outputs:
     """The force of a state, and what it is made of."""
     e, t, d, c = i.estimate, i.target, s.reference, p.damping
     (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
     turn, r, u = wrap(d.psi - e.psi_hat), d.r - e.r_hat, d.u - e.u_hat
     K_P_u = fmax(2.0 * p.zeta_u * p.omega_u * m_u + c.X_u, 0.0)
-    K_D = fmax(2.0 * p.zeta_psi * p.omega_psi * m_r + c.N_r, 0.0)
-    K_P = m_r * p.omega_psi * p.omega_psi
     lX = m_u * p.omega_u_d * (wanted_speed(t) - d.u) + K_P_u * u + s.surge
-    lN = m_r * d.r_dot + K_P * turn + K_D * r + s.yaw
+    lN = m_r * d.r_dot + without_waves(s.notch, feedback(d, i, p), p) + s.yaw
     nX = 0.0 - (c.X_u + c.X_absu_u * abs(d.u) + c.X_uuu * d.u * d.u) * d.u
     nN = 0.0 - (c.N_r + c.N_absr_r * abs(d.r)) * d.r
     ahead, aside = rotate_to_body(e.psi_hat, e.x_hat - t.x_t, e.y_hat - t.y_t)
@@ -138,6 +177,7 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
         s.surge + seen * (K_I_u * (d.u - e.u_hat) + w_u * (acted.tau_X - s.tau.tau_X)),
         s.yaw + seen * (K_I * wrap(d.psi - e.psi_hat) + w * (acted.tau_N - s.tau.tau_N)),
         s.tau,
+        filtered(s.notch, feedback(d, i, p), p, h),
     )
     out = law(s, i, p)
     asked = Force(*[where(h > 0.0, new, old) for new, old in zip(out.demand.tau, s.tau, strict=True)])
