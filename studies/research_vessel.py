@@ -96,14 +96,14 @@ def read(path: Path, model: Model) -> Run:
 
 
 def cut(run: Run, examined: Examined, manoeuvres: Sequence[Manoeuvre]) -> Iterator[Run]:
-    """The manoeuvres of a repaired trial, each as a run with its name."""
+    """The manoeuvres of a repaired trial, each as a run of the rows with a telegram, with its name."""
     kept = np.ones(run.time.size, bool)
     for f in examined.findings:
         if f.kind == "clock_gap":  # its rows are left out
             kept &= (run.time <= f.start) | (run.time >= f.end)
-    log = run.time[kept]
+    log, telegram = run.time[kept], np.isfinite(examined.run.pose).all(axis=1)
     for m in manoeuvres:
-        part = examined.run.rows((log >= m.start - BEFORE) & (log <= m.end))
+        part = examined.run.rows(telegram & (log >= m.start - BEFORE) & (log <= m.end))
         yield replace(part, name=m.name)
 
 

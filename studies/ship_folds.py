@@ -72,6 +72,7 @@ def write_folds(report: Report, folds: Sequence[Fold]) -> None:
         [[n, *map(_change, r)] for n, r in (*zip(names, rows, strict=True), *overall.items())],
     )
     report.result("overall", overall)
+    report.text(_windows(report, folds))
     report.heading("What was found each time")
     report.table(
         ["left out", "verdict", "in the model", "withdrawn", "known only together"],
@@ -89,6 +90,20 @@ def write_folds(report: Report, folds: Sequence[Fold]) -> None:
     )
     report.heading("What these runs cannot tell")
     report.items(dict.fromkeys(_open(folds)))
+
+
+def _windows(report: Report, folds: Sequence[Fold]) -> str:
+    """The medians over all windows of the runs left out, before and after."""
+    found = []
+    for e in (e for fold in folds for e in fold.found.comparison.evaluations if e.held_out):
+        for k, of in enumerate((e.before.errors, e.after.errors)):
+            if of is not None:
+                found += [(k, p, degrees(h)) for p, h in zip(of.position, of.heading, strict=True)]
+    every = np.array(found)
+    medians = [np.median(every[every[:, 0] == k, 1:], axis=0) for k in (0, 1)]
+    report.result("medians of windows", medians)
+    (p, h), (q, i) = medians
+    return f"Median of all windows: position {p:.3g} → {q:.3g} m, heading {h:.3g} → {i:.3g}°."
 
 
 def _numbers(e: Any, outputs: Sequence[str]) -> list[tuple[float, float]]:

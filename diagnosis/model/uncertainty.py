@@ -67,7 +67,8 @@ def omega_std(w: Integrals, model: Model | None = None) -> np.ndarray:
     gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN))) / time**5
     x, y, psi = (density * gain).T
     heading = s.eta[:, 2]
-    c2 = w.smooth @ np.where(w.known, np.cos(heading) ** 2, 0.0)
+    # Weights of samples at uneven distances sum to a little more or less than one.
+    c2 = np.clip(w.smooth @ np.where(w.known, np.cos(heading) ** 2, 0.0), 0.0, 1.0)
     surge, sway = c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y
     floor = FLOOR * s.scale.forces
     return np.sqrt(np.column_stack([surge, sway, psi]) @ (mass**2).T + floor**2)

@@ -39,6 +39,7 @@ from .shooting import UNKNOWN, Around, Shooting
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
 STEPS = 6  # of Gauss-Newton, at the most
 ENOUGH = 0.1  # of cost, which is twice a log likelihood, that a step may still gain
+ROUNDING = 1e-10  # of the largest variance in a window
 POWERS = 5  # iterations of k, which changes by less than 1 % after three
 
 
@@ -168,9 +169,11 @@ class PredictionFit:
         missed /= np.maximum(np.bincount(s.run, seen.sum(axis=1), len(s.runs)), 1.0)[:, None]
         missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
         found = np.zeros((len(r), r[0].size, r[0].size))
-        found[fine] = np.linalg.inv(
-            np.linalg.cholesky(_square(V, s.noise[fine] + missed[s.run[fine], None]))
-        )
+        whole = _square(V, s.noise[fine] + missed[s.run[fine], None])
+        # Of a ship that turns far within a window rounding alone would make it indefinite.
+        diagonal = np.einsum("wii->wi", whole)
+        diagonal += ROUNDING * diagonal.max(axis=1, keepdims=True)
+        found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
         return found
 
     def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
