@@ -4,10 +4,9 @@ A part is a run; of a single training run it is one of some stretches of time. W
 is its model error, by blocks, and the error of its window predictions, by windows.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,30 +66,12 @@ class Part:
         """Mean square errors in the windows that begin here, of each model."""
         if self._windows is None:
             return [(np.zeros(0), np.zeros(0))] * len(models)
-        clocks = sorted({m.clock for m in models})
         inside = (self._windows.start >= self._span[0]) & (self._windows.start <= self._span[1])
-        found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        for clock in clocks:
-            chosen = [k for k, m in enumerate(models) if m.clock == clock]
-            residuals = self._windows.residuals(stacked([models[k] for k in chosen]))
-            each = np.broadcast_to(residuals, (len(chosen), *residuals.shape[-2:]))
-            errors = self._windows.summary(each)
-            for k, position, heading in zip(chosen, errors.position, errors.heading, strict=True):
-                found[k] = (position[inside] ** 2, heading[inside] ** 2)
-        return [found[k] for k in range(len(models))]
-
-
-def stacked(models: Sequence[Model]) -> Model:
-    """Several models with the same clock as one whose parameters are arrays (p, 1) where they differ."""
-
-    def together(part: str) -> dict[str, Any]:
-        values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
-        names = dict.fromkeys(name for each in values for name in each)
-        of = models[0].ship.parameters[part]
-        columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
-        return {n: x[:, None] if np.ptp(x) else float(x[0]) for n, x in columns.items()}
-
-    return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
+        errors = self._windows.summary(np.stack(self._windows.residuals_of_each(models)))
+        return [
+            (position[inside] ** 2, heading[inside] ** 2)
+            for position, heading in zip(errors.position, errors.heading, strict=True)
+        ]
 
 
 def losses(

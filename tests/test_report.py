@@ -18,7 +18,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, PredictionError, evaluate_run
-from diagnosis.assessment.windows import free_run
+from diagnosis.assessment.windows import free_runs
 from diagnosis.model import integrals
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.report import (
@@ -512,7 +512,7 @@ def test_a_whole_run_is_predicted_from_its_first_state(data):
     measured = s.eta[np.flatnonzero(s.used)[0] :]
     away = {}
     for name, model in (("true", Model().plus(HIDDEN)), ("nominal", Model())):
-        _, pose = free_run(s, model)
+        _, (pose,) = free_runs(s, [model])
         assert pose[0] == pytest.approx(measured[0], abs=1e-6)
         at = np.linspace(0, len(pose) - 1, len(measured)).round().astype(int)
         away[name] = np.hypot(*(pose[at] - measured).T[:2]).max()

@@ -10,7 +10,7 @@ from .evaluation import Evaluation, PredictionError, evaluate_run
 from .regions import ErrorRegions, Profile, Region, find_regions
 from .remainder import AxisRemainder, Remainder
 from .stability import OperatingRegion, Stability, check_stability, least_dissipation
-from .windows import WindowErrors, Windows, free_run
+from .windows import WindowErrors, Windows, free_runs
 
 __all__ = [
     "LEVELS",
@@ -29,7 +29,7 @@ __all__ = [
     "check_stability",
     "evaluate_run",
     "find_regions",
-    "free_run",
+    "free_runs",
     "least_dissipation",
     "omega_std",
 ]

@@ -89,9 +89,9 @@ def evaluate_run(
         held_out: whether nothing was learned from the run.
     """
     windows = _windows([w.smoothed], w.horizon)
-    first = _prediction_error(w, windows, before)
-    last = first if after is None else _prediction_error(w, windows, after)
-    return Evaluation(before, w, windows, held_out, first, last, learned=after)
+    models = [before] if after is None else [before, after]
+    errors = _prediction_errors(w, windows, [m.during(w.run.name) for m in models])
+    return Evaluation(before, w, windows, held_out, errors[0], errors[-1], learned=after)
 
 
 def _windows(runs: Sequence[Smoothed], length: float) -> Windows | None:
@@ -101,8 +101,12 @@ def _windows(runs: Sequence[Smoothed], length: float) -> Windows | None:
         return None
 
 
-def _prediction_error(w: Integrals, windows: Windows | None, model: Model) -> PredictionError:
+def _prediction_errors(
+    w: Integrals, windows: Windows | None, models: Sequence[Model]
+) -> list[PredictionError]:
     if windows is None:
-        return PredictionError(omega(w, model), np.zeros((0, 3)), None)
-    residuals = windows.residuals(model)
-    return PredictionError(omega(w, model), residuals, windows.summary(residuals))
+        return [PredictionError(omega(w, model), np.zeros((0, 3)), None) for model in models]
+    return [
+        PredictionError(omega(w, model), residuals, windows.summary(residuals))
+        for model, residuals in zip(models, windows.residuals_of_each(models), strict=True)
+    ]

@@ -13,7 +13,7 @@ from fmus.ship import Ship
 from ..data import Run
 from ..model import Model
 from ..smoothing import Smoothed
-from .windows import free_run
+from .windows import free_runs
 
 APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
 NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")
@@ -77,13 +77,11 @@ def trial_errors(smoothed: Smoothed, before: Model, after: Model) -> TrialErrors
     ship = before.ship
     whole = measured_passage(smoothed, ship)
     begin = executes(whole)[0] - APPROACH * smoothed.scale.time
-    parts = [free_run(smoothed, before, begin)]
-    parts.append(parts[0] if after is before else free_run(smoothed, after, begin))
-    time, _ = parts[0]
+    time, predicted = free_runs(smoothed, [before, after], begin)
     rows = (whole.time >= time[0]) & (whole.time <= time[-1])
     seen = Passage(*(column[rows] for column in whole))
     found = [_measures(seen, run.trial, ship)]
-    for _, pose in parts:
+    for pose in predicted:
         columns = (pose[:, 0], pose[:, 1], np.unwrap(pose[:, 2]))
         x, y, psi = (np.interp(seen.time, time, column) for column in columns)
         found.append(_measures(Passage(seen.time, x, y, psi, seen.order), run.trial, ship))

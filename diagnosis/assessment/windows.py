@@ -15,7 +15,7 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..model import Model
-from ..model.prediction import LONGEST_STEP, Starts, predict
+from ..model.prediction import LONGEST_STEP, Starts, by_clock, predict
 from ..model.weak_form import HORIZON
 from ..smoothing import Smoothed
 
@@ -122,6 +122,14 @@ class Windows:
         found[..., 2] = wrap(found[..., 2])
         return found if models else found[0]
 
+    def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
+        """Residuals (samples, 3) of some models, many predicted at once."""
+        found: dict[int, np.ndarray] = {}
+        for chosen, together in by_clock(models):
+            each = np.broadcast_to(self.residuals(together), (len(chosen), *self.measured.shape))
+            found |= zip(chosen, each, strict=True)
+        return [found[k] for k in range(len(models))]
+
     def errors(self, model: Model | None = None) -> WindowErrors:
         """The window prediction error of a model, argument as of :meth:`residuals`."""
         return self.summary(self.residuals(model))
@@ -180,17 +188,19 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
 
 
-def free_run(smoothed: Smoothed, model: Model, begin: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """A run as a model predicts it from one state, by the commands that were given.
+def free_runs(
+    smoothed: Smoothed, models: Sequence[Model], begin: float = -np.inf
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """A run as models predict it from one state, by the commands that were given.
 
     Args:
         smoothed: the run, of which ``LONGEST_FREE`` seconds at the most.
-        model: what predicts it.
+        models: what predicts it.
         begin: the state is that of the last sample before [s], else of the first there is.
 
     Returns:
-        (n,), times at equal distances [s], and (n, 3), pose [m, m, rad]; not finite where the model
-        runs away.
+        (n,), times at equal distances [s], and for each model (n, 3), pose [m, m, rad]; not finite where
+        the model runs away.
     """
     usable = np.flatnonzero(smoothed.used)
     before = usable[smoothed.time[usable] <= begin]
@@ -200,8 +210,12 @@ def free_run(smoothed: Smoothed, model: Model, begin: float = -np.inf) -> tuple[
     longest = LONGEST_FREE * smoothed.scale.time
     seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
     starts = Starts(((smoothed, first),), h, int(seconds / h), five)
-    pose = predict(starts, model)[:, :, 0, 0]
-    return smoothed.time[first[0]] + h * np.arange(len(pose)), pose
+    found: dict[int, np.ndarray] = {}
+    for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
+        poses = predict(starts, together)
+        found |= {k: poses[:, :, min(n, poses.shape[2] - 1), 0] for n, k in enumerate(chosen)}
+    times = smoothed.time[first[0]] + h * np.arange(starts.steps + 1)
+    return times, [found[k] for k in range(len(models))]
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ parameters. Of the five commands of the real ship each propeller is a thruster s
 there is one.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -163,6 +163,26 @@ def propagate(
             forces = layout.act(tuple(shares), now, thrusters)
             s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
         yield s
+
+
+def by_clock(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
+    """Models of one ship that are predicted at once, those with the same clock; which, and in one."""
+    for clock in sorted({m.clock for m in models}):
+        chosen = [k for k, m in enumerate(models) if m.clock == clock]
+        yield chosen, stacked([models[k] for k in chosen])
+
+
+def stacked(models: Sequence[Model]) -> Model:
+    """Several models with the same clock as one whose parameters are arrays (p, 1) where they differ."""
+
+    def together(part: str) -> dict[str, Any]:
+        values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
+        names = dict.fromkeys(name for each in values for name in each)
+        of = models[0].ship.parameters[part]
+        columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
+        return {n: x[:, None] if np.ptp(x) else float(x[0]) for n, x in columns.items()}
+
+    return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
 
 
 def singles(model: Model) -> list[Model]:
