@@ -108,7 +108,8 @@ def _smoothed(run: Run, anyway: bool, scale: Scale) -> Smoothed:
     track = clean(repaired, anyway, scale)
     if not anyway:
         _refuse_rare(track)
-    return replace(smooth(thinned(track)), sensors=examined)
+    smoothed = smooth(thinned(track), agreeing=examined.agreeing)
+    return replace(smoothed, sensors=examined)
 
 
 def _refuse_unrepaired(examined: Examined) -> None:

@@ -69,7 +69,9 @@ def evidence(run: Run) -> Evidence | None:
     rate = _whole(run, "r") if _given(run, "r") else None
     if by is None and rate is None:
         return None
-    return Evidence(run, rows, psi, None if by is None else _velocity(run, by, psi), rate, by, between)
+    return Evidence(
+        run, rows, psi, None if by is None else velocity_over_ground(run, by, psi), rate, by, between
+    )
 
 
 def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -90,7 +92,7 @@ def _whole(run: Run, name: str) -> np.ndarray:
     return np.interp(run.time, run.time[there], values[there])
 
 
-def _velocity(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
+def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
     """Velocity (n, 2) to north and east [m/s]."""
     if by == ("x_dot", "y_dot"):
         return np.column_stack([_whole(run, name) for name in by])

@@ -30,18 +30,24 @@ BETTER = 1e-3
 
 
 def with_commands(
-    even: Problem, smoothness: np.ndarray, fit: Fit, weights: np.ndarray, commands: Commands
-) -> tuple[np.ndarray, Fit, CommandResponse]:
+    even: Problem,
+    alone: Problem,
+    smoothness: np.ndarray,
+    fit: Fit,
+    weights: np.ndarray,
+    commands: Commands,
+) -> tuple[Problem, np.ndarray, Fit, CommandResponse]:
     """A smoothing spline beside the response to the commands, if that is likelier than a spline alone.
 
     Args:
         even: the pose, with an even penalty.
-        smoothness, fit: (3,), of a spline that knows of no commands, and the spline.
+        alone: with the penalty of a spline that knows of no commands.
+        smoothness, fit: (3,), of that spline, and the spline.
         weights: (n,), of the samples.
         commands: commands and headings.
 
     Returns:
-        Smoothness (3,) and spline of what is left beside the response, and the response.
+        What is left beside the response, its smoothness (3,) and spline, and the response.
     """
     response = CommandResponse.none(commands.psi.size)
     least = likeliest(even, weights, smoothness)[1] - PARAMETERS
@@ -57,6 +63,6 @@ def with_commands(
         rest, smoother, response, least = left, near, tried, cost - BETTER
         fit = solve(rest, smoother, weights)
     if rest is even:
-        return smoothness, fit, response
+        return alone, smoothness, fit, response
     adapted, smoother = adapt(rest, smoother, weights)
-    return smoother, solve(adapted, smoother, weights), response
+    return adapted, smoother, solve(adapted, smoother, weights), response

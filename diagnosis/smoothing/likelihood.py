@@ -66,7 +66,7 @@ class Criterion:
     def __init__(self, w: Weighted, channel: int) -> None:
         p = w.problem
         self._equations, self._rank = Equations(w, channel), p.grid.rank
-        self._z, self._variance = p.z[:, [channel]], p.sigma[channel] ** 2
+        self._z, self._variance = p.right(channel), p.sigma[channel] ** 2
 
     def _parts(self, decades: float) -> tuple[System, float, float]:
         """The system, and the sums of squares of residuals and roughness in units of the noise."""

@@ -14,12 +14,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, get_lapack_funcs
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from .spline import DEGREE, POINTS, WIDTH, Basis, Knots, gram, penalty
 
 NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
 GBTRF: Any = get_lapack_funcs("gbtrf", dtype=complex)  # LU factors of a banded matrix
+
+
+class Rates(NamedTuple):
+    """Measured derivatives of the channels, beside the pose.
+
+    Attributes:
+        z: (m, 3), measurements [m/s, m/s, rad/s].
+        b: first derivative of the spline's basis at them.
+        sigma: (3,), standard deviation of their noise; infinite where a channel has none.
+    """
+
+    z: np.ndarray
+    b: Basis
+    sigma: np.ndarray
 
 
 class Problem(NamedTuple):
@@ -34,6 +48,7 @@ class Problem(NamedTuple):
         stiffness: (3, intervals), weight V of each interval in the penalty of each channel.
         sigma: (3,), standard deviation of the noise [m, m, rad].
         average: intervals over which the squared jerk is averaged, where the penalty is adapted to it.
+        rates: measured derivatives, which count as further rows of z = B c; None: there are none.
     """
 
     rows: np.ndarray
@@ -44,6 +59,18 @@ class Problem(NamedTuple):
     stiffness: np.ndarray
     sigma: np.ndarray
     average: int
+    rates: Rates | None = None
+
+    def right(self, channel: int) -> np.ndarray:
+        """(n + m, 1): what the spline of a channel is to follow, all with the noise of the pose."""
+        if self.rates is None:
+            return self.z[:, [channel]]
+        return np.vstack([self.z[:, [channel]], self.share(channel) * self.rates.z[:, [channel]]])
+
+    def share(self, channel: int) -> float:
+        """Noise of a channel of the pose over that of its derivative [s]; zero where there is none."""
+        assert self.rates is not None
+        return float(self.sigma[channel] / self.rates.sigma[channel])
 
 
 class Weighted:
@@ -60,6 +87,8 @@ class Weighted:
         self.basis = _scaled(p.b.matrix, self.root)
         self.transposed = self.basis.T.tocsr()
         self.normal = gram(p.b, weights, p.grid.size)
+        if p.rates is not None:
+            self.rates = gram(p.rates.b, np.ones(len(p.rates.z)), p.grid.size)
 
 
 class Equations:
@@ -72,10 +101,15 @@ class Equations:
 
     def __init__(self, w: Weighted, channel: int) -> None:
         p, stiffness = w.problem, w.problem.stiffness[channel]
-        self.root, self.basis, self.normal = w.root, w.basis, w.normal
+        self.root, self.basis, self.normal, transposed = w.root, w.basis, w.normal, w.transposed
+        if p.rates is not None:
+            share = p.share(channel)
+            self.root = np.vstack([w.root, np.ones((len(p.rates.z), 1))])
+            self.basis = csr_array(vstack([w.basis, share * p.rates.b.matrix]))
+            self.normal, transposed = w.normal + share**2 * w.rates, self.basis.T.tocsr()
         self.rough = _scaled(p.rough, np.repeat(np.sqrt(stiffness), POINTS)[:, None])
         self.penalty = penalty(p.grid, stiffness)
-        self.transposed = w.transposed, self.rough.T.tocsr()
+        self.transposed = transposed, self.rough.T.tocsr()
 
 
 def _scaled(matrix: csr_array, factors: np.ndarray) -> csr_array:
@@ -158,5 +192,5 @@ def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:
     """The smoothing spline of each channel, for weights (n,) of the samples."""
     shared = Weighted(p, weights)
     a, b, c = (System(Equations(shared, k), float(smoothness[k])) for k in range(3))
-    parts = [system.solve(p.z[:, [k]]) for k, system in enumerate((a, b, c))]
+    parts = [system.solve(p.right(k)) for k, system in enumerate((a, b, c))]
     return Fit(np.hstack(parts), (a, b, c))

@@ -22,6 +22,8 @@ from ..sensors import Examined
 from .command_motion import CommandResponse, Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
+from .likelihood import adapt
+from .measured_rates import ALONE, Agreeing, measured_rates
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
 from .spline import Knots, basis, inverse_band, knots, roughness, variance
@@ -103,11 +105,12 @@ class Smoothed:
         return self.track.counts(int(self.spikes.sum()))
 
 
-def smooth(track: Track, driven: bool = True) -> Smoothed:
+def smooth(track: Track, driven: bool = True, agreeing: Agreeing = ALONE) -> Smoothed:
     """Smooth a run.
 
     Args:
         track: the run.
+        agreeing: channels of velocity and yaw rate that count beside the pose, and their noise.
         driven: whether the response to the commands is modelled, see :mod:`.command_response`. Without,
             the spline follows whatever is quick, and noise with it.
 
@@ -117,7 +120,7 @@ def smooth(track: Track, driven: bool = True) -> Smoothed:
     rows = np.flatnonzero(track.valid)
     while True:
         try:
-            found = _smooth(track, rows, driven)
+            found = _smooth(track, rows, driven, agreeing)
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
         except LinAlgError as error:
@@ -128,7 +131,7 @@ def smooth(track: Track, driven: bool = True) -> Smoothed:
             return found
 
 
-def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
+def _smooth(track: Track, rows: np.ndarray, driven: bool, agreeing: Agreeing) -> Smoothed:
     """Smooth a run by some of its rows."""
     time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
     scale = track.scale
@@ -143,13 +146,20 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool) -> Smoothed:
     local = np.full(3, LOCAL * (track.period / grid.spacing) ** 5)
     adapted, smoothness, weights = robust(even, local)
     fit, response = solve(adapted, smoothness, weights), CommandResponse.none(time.size)
+    psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
     if driven:
-        psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
         first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
         still = idle(scale)
         slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
         commands = Commands(track, psi, grid, bool(slow))
-        smoothness, fit, response = with_commands(even, smoothness, fit, weights, commands)
+        left = with_commands(even, adapted, smoothness, fit, weights, commands)
+        adapted, smoothness, fit, response = left
+    rates = measured_rates(track, dense, psi, agreeing, grid)
+    if rates is not None:
+        at, beside = rates
+        beside = beside._replace(z=beside.z - response.eta_dot[at])
+        adapted, smoothness = adapt(adapted._replace(rates=beside), smoothness, weights)
+        fit = solve(adapted, smoothness, weights)
     inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
     spikes = track.valid.copy()
     spikes[rows] = False
