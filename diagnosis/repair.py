@@ -8,6 +8,7 @@ if __name__ == "__main__":
 import argparse
 import json
 from collections.abc import Sequence
+from math import degrees, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,12 @@ from .progress import Advance
 from .result_folder import together
 
 if TYPE_CHECKING:
+    from fmus.scale import Scale
+
+    from .data import Run
     from .sensors import Examined
 
+WINDOW = 8.0  # s, times the scale of the ship: of a prediction
 KINDS = (".csv", ".parquet")
 ALONE = (
     "the pose is all that is measured: nothing says the same twice, so nothing can be held against it"
@@ -57,7 +62,9 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
             table.to_parquet(new / out.name, index=False)
         told = layout_beside(found.run)
         (new / beside).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    return Done(0, [*_told(found), f"written: {out}, {out}.json"])
+    return Done(
+        0, [*_told(found), *_closed(measured, found.run, craft.scale), f"written: {out}, {out}.json"]
+    )
 
 
 def _told(found: "Examined") -> list[str]:
@@ -70,6 +77,23 @@ def _told(found: "Examined") -> list[str]:
     if beside and not found.findings:
         lines.append("no fault: what says the same twice agrees")
     return [first, *lines]
+
+
+def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
+    """What windows of the length of a prediction miss by, before and after."""
+    from .sensors import closure
+
+    window = WINDOW * scale.time
+    pairs = [closure(run, window, window) for run in (before, after)]
+    position, heading = zip(*pairs, strict=True)
+    lines = []
+    if all(map(isfinite, position)):
+        shown = " -> ".join(f"{x:.3g}" for x in position)
+        lines.append(f"position by speed and heading over {window:.3g} s misses by (median): {shown} m")
+    if all(map(isfinite, heading)):
+        shown = " -> ".join(f"{degrees(x):.3g}" for x in heading)
+        lines.append(f"heading by yaw rate over {window:.3g} s in turns misses by (RMS): {shown}°")
+    return lines
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -138,6 +138,7 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis.progress",
     "diagnosis.report",
     "diagnosis.sensors",
+    "diagnosis.sensors",
     "diagnosis.smoothing",
 )
 
