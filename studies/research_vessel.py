@@ -18,7 +18,7 @@ import pandas as pd
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.assessment import free_run
+from diagnosis.assessment import free_runs
 from diagnosis.data import Run, read_frame
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
@@ -140,8 +140,8 @@ def circles(report: Report, folds: Sequence[Fold], model: Model) -> None:
                 continue
             s = e.smoothed
             known = np.isfinite(s.eta).all(axis=1)
-            tracks = [(s.time[known], s.eta[known])]
-            tracks += [free_run(s, m) for m in (model, fold.found.learned.model)]
+            time, free = free_runs(s, [model, fold.found.learned.model])
+            tracks = [(s.time[known], s.eta[known]), *((time, pose) for pose in free)]
             rows.append((e.name, [steady(*track) for track in tracks]))
     report.heading("Circles")
     report.text("Each with its measured commands from its first state; what was learned, of other runs.")

@@ -10,7 +10,7 @@ from support.measured import DATA
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.assessment import free_run
+from diagnosis.assessment import free_runs
 from diagnosis.model import ship_with
 from diagnosis.sensors import examine
 from studies import research_vessel, ship_folds, tanker
@@ -50,7 +50,8 @@ def test_the_sea_trial_is_repaired_and_cut_into_its_manoeuvres():
     assert all(np.isfinite(p.pose).all() for p in parts)
     circle = next(p for p in parts if p.name == "circle to port, 20°")
     (w,) = diagnosis.gather([circle], model=model, anyway=True, horizon=60.0)
-    speed, rate = steady(*free_run(w.smoothed, model))
+    time, (pose,) = free_runs(w.smoothed, [model])
+    speed, rate = steady(time, pose)
     assert speed == pytest.approx(3.74, rel=0.16)
     assert np.degrees(rate) == pytest.approx(3.47, rel=0.16)
 
