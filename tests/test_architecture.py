@@ -1,13 +1,14 @@
 """Imports between the packages go one way, in the order stated here, and use public names only.
 
 Imports are read from the source: also those inside functions, those for type checking only, and the names that
-an ``__init__`` imports on demand (``lazy_names``).
+an ``__init__`` imports on demand, from the stub beside it (``lazy_names``).
 """
 
 import ast
 import re
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -172,29 +173,26 @@ def absolute(module, node, path):
 
 
 def on_demand(module, node):
-    """Modules that a call ``lazy_names(__name__, {name: module})`` or ``import_module`` names."""
+    """Modules that a call ``import_module`` names."""
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
         return
-    if node.func.id == "lazy_names":
-        for value in targets_of(node.args[1]):
-            yield f"{module}.{value}"
-    elif node.func.id == "import_module" and isinstance(node.args[0], ast.Constant):
+    if node.func.id == "import_module" and isinstance(node.args[0], ast.Constant):
         name = node.args[0].value
         yield f"{module}{name}" if name.startswith(".") else name
 
 
-def targets_of(node):
-    """Modules of a table of names, also of one that has the same module for all: ``dict.fromkeys``."""
-    if isinstance(node, ast.Call):
-        return [ast.literal_eval(node.args[1])]
-    return ast.literal_eval(node).values()
+def statements(path):
+    """All nodes of a file, and of the stub that says what an ``__init__`` imports on demand."""
+    for each in (path, path.with_suffix(".pyi")):
+        if each.exists():
+            yield from ast.walk(ast.parse(each.read_text()))
 
 
 @cache
 def imports(module, path):
     """(imported module, imported name or "") of each import of a file, of this project only."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in statements(path):
         if isinstance(node, ast.Import):
             found += [(alias.name, "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -222,6 +220,13 @@ def layer_of(module):
 def public_names(module):
     """The ``__all__`` of a module; without one what it defines, but for names that begin with an underscore."""
     path = sources(module.partition(".")[0])[module]
+    stub = path.with_suffix(".pyi")
+    if stub.exists():
+        return [
+            alias.asname
+            for node in ast.parse(stub.read_text()).body
+            for alias in getattr(node, "names", [])
+        ]
     tree = ast.parse(path.read_text())
     defined = []
     for node in tree.body:
@@ -358,11 +363,11 @@ def test_public_names_of_diagnosis_exist(module):
 @pytest.mark.parametrize(
     "module", [name for name, path in sources("cosim").items() if path.name == "__init__.py"]
 )
-def test_public_names_exist_and_are_sorted(module):
+def test_public_names_exist_and_are_told(module):
     names = public_names(module)
-    assert names == sorted(names)
-    found = __import__(module, fromlist=names)
+    found = import_module(module)
     assert all(hasattr(found, name) for name in names)
+    assert getattr(found, "__all__", names) == sorted(names)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         found.nothing  # noqa: B018
 

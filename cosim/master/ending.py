@@ -14,7 +14,7 @@ from ..errors import InputError, nearest
 from ..files import update_json, write_json
 from ..results import log as logs
 from ..results import performance
-from ..results.log_frame import log_frame
+from ..results.log_table import log_frame
 from ..results.picture_files import Drawn
 from ..results.run_options import RunOptions, read_options
 from ..system.system import System

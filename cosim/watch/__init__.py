@@ -2,10 +2,4 @@
 
 from ..lazy import lazy_names
 
-TYPE_CHECKING = False  # typing itself takes a while to import
-if TYPE_CHECKING:
-    from .watching import watched
-
-__all__ = ["watched"]
-
-__getattr__ = lazy_names(__name__, {"watched": "watching"})
+__all__, __getattr__, __dir__ = lazy_names(__name__, __file__)

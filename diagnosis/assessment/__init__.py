@@ -4,32 +4,6 @@ Prediction errors over windows of some seconds, regions in which the model error
 elsewhere, and whether a learned model is stable.
 """
 
-from ..model.uncertainty import omega_std
-from .bands import LEVELS, Bands
-from .evaluation import Evaluation, PredictionError, evaluate_run
-from .regions import ErrorRegions, Profile, Region, find_regions
-from .remainder import AxisRemainder, Remainder
-from .stability import OperatingRegion, Stability, check_stability, least_dissipation
-from .windows import WindowErrors, Windows, free_runs
+from cosim.lazy import lazy_names
 
-__all__ = [
-    "LEVELS",
-    "AxisRemainder",
-    "Bands",
-    "ErrorRegions",
-    "Evaluation",
-    "OperatingRegion",
-    "PredictionError",
-    "Profile",
-    "Region",
-    "Remainder",
-    "Stability",
-    "WindowErrors",
-    "Windows",
-    "check_stability",
-    "evaluate_run",
-    "find_regions",
-    "free_runs",
-    "least_dissipation",
-    "omega_std",
-]
+__all__, __getattr__, __dir__ = lazy_names(__name__, __file__)

@@ -1,0 +1,2 @@
+from .analysed_run import FinishedRun as FinishedRun
+from .analysed_run import analyse_runs as analyse_runs

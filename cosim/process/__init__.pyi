@@ -1,0 +1,4 @@
+from .run_state import STATE as STATE
+from .scratch import scratch_folder as scratch_folder
+from .spawned import end_with_parent as end_with_parent
+from .spawned import without_program as without_program

@@ -1,0 +1,12 @@
+from .canvas import thin as thin
+from .drawing import draw as draw
+from .log import Log as Log
+from .log import read_log as read_log
+from .log_table import log_frame as log_frame
+from .performance import MetricsError as MetricsError
+from .performance import compute as compute
+from .performance import over_time as over_time
+from .performance import tracking as tracking
+from .picture_files import Drawn as Drawn
+from .run_options import read_options as read_options
+from .track import hulls as hulls

@@ -1,0 +1,11 @@
+from .measures import KINDS as KINDS
+from .measures import MEASURES as MEASURES
+from .measures import measure as measure
+from .ship_passage import Passage as Passage
+from .ship_passage import executes as executes
+from .ship_passage import passage as passage
+from .trial_outcome import Outcome as Outcome
+from .trial_outcome import outcome as outcome
+from .trial_outcome import sheet as sheet
+from .trial_outcome import simulated_trial as simulated_trial
+from .trial_picture import draw_trial as draw_trial

@@ -1,0 +1,1 @@
+from .watching import watched as watched

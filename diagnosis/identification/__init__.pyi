@@ -1,0 +1,10 @@
+from .findings import Finding as Finding
+from .findings import Findings as Findings
+from .findings import Ranked as Ranked
+from .findings import Suspect as Suspect
+from .methods import DEFAULT as DEFAULT
+from .methods import METHODS as METHODS
+from .methods import Method as Method
+from .methods import method as method
+from .prior import Prior as Prior
+from .prior import shares as shares

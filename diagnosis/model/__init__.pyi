@@ -1,0 +1,11 @@
+from .parameter_set import read_model as read_model
+from .parameter_set import ship_with as ship_with
+from .parameter_set import write_model as write_model
+from .ship_model import Model as Model
+from .ship_model import of_one_run as of_one_run
+from .ship_model import of_run as of_run
+from .thrust import Response as Response
+from .weak_form import Integrals as Integrals
+from .weak_form import integrals as integrals
+from .weak_form import omega as omega
+from .weak_form import told_apart as told_apart
