@@ -37,7 +37,7 @@ from .hidden_effects.__main__ import PROBLEMS
 from .hidden_effects.answers import window_shares, within_bands
 from .hidden_effects.cells import cells
 from .hidden_effects.problems import Problem, kept, make
-from .hidden_effects.reliability_diagram import interval
+from .hidden_effects.reliability_diagram import interval, mean_and_error
 from .hidden_effects.scoring import off_by
 
 RUNS = ("random_run1", "run1", "dptest1", "dptest3")  # of CyberShip Enterprise 1
@@ -49,7 +49,8 @@ class Found:
 
     Attributes:
         inside: of each interval whether it holds the true value.
-        damping: how many standard deviations X_u, Y_v and N_r are off.
+        damping: how many standard deviations X_u, Y_v and N_r are off, mean of each ship: motion tells
+            force over mass, so that those of one ship are off together.
         shares: for each band the share within it of each window.
     """
 
@@ -67,8 +68,7 @@ class Found:
         found = []
         if self.inside:
             found.append(f"| {name}: 95 % intervals that hold the truth | {_share(self.inside)} |")
-            error = np.std(self.damping, ddof=1) / np.sqrt(len(self.damping))
-            mean = f"{np.mean(self.damping):.2f} ± {error:.2f} standard deviations"
+            mean = "{:.2f} ± {:.2f} standard deviations".format(*mean_and_error(self.damping))
             found.append(f"| {name}: damping X_u, Y_v, N_r is off by, mean | {mean} |")
         for level, each in zip(LEVELS, self.shares, strict=True):
             if each:
@@ -95,9 +95,9 @@ def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     return fit_predictions(train, shootings(train), at, prior), prior, runs
 
 
-def simulated(seeds: int, noise: str, folder: Path) -> Found:
+def simulated(seeds: Sequence[int], noise: str, folder: Path) -> Found:
     """Ships in process noise."""
-    found, todo = Found(), list(cells(["process noise"], [], [noise], [True], range(seeds)))
+    found, todo = Found(), list(cells(["process noise"], [], [noise], [True], seeds))
     for _ in make(todo, folder):
         pass
     for cell in todo:
@@ -109,7 +109,7 @@ def simulated(seeds: int, noise: str, folder: Path) -> Found:
         names = [n.partition(".")[2] for n in posterior.names]
         held, damping = off_by(problem, names, posterior.mean, posterior.covariance)
         found.inside += held
-        found.damping += damping
+        found.damping.append(float(np.mean(damping)))
         (e,) = evaluate(runs[-1:], Model(), model).evaluations
         bands = prediction_bands(e.smoothed, e.windows, model, posterior, fit.push)
         if bands is not None:
@@ -140,12 +140,14 @@ def answered(folder: Path) -> Found:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--seeds", type=int, default=3, metavar="N", help="of six ships each (3)")
+    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="of these (0)")
     parser.add_argument("--noise", default="n4", help="of the measurement (n4)")
     parser.add_argument("--problems", type=Path, default=PROBLEMS, metavar="DIR", help=f"({PROBLEMS})")
     parser.add_argument("--answers", type=Path, metavar="DIR", help="of the benchmark")
     parser.add_argument("--ship", action="store_true", help="the measured ship, half an hour")
     options = parser.parse_args()
-    rows = simulated(options.seeds, options.noise, options.problems).rows("process noise")
+    seeds = range(options.first, options.first + options.seeds)
+    rows = simulated(seeds, options.noise, options.problems).rows("process noise")
     if options.answers:
         rows += answered(options.answers).rows("hidden effects")
     if options.ship:

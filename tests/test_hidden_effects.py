@@ -31,12 +31,20 @@ from benchmarks.hidden_effects.fleet import Order, ProcessNoise, sail_all
 from benchmarks.hidden_effects.foreign_physics import FOREIGN_PHYSICS
 from benchmarks.hidden_effects.manoeuvres import Manoeuvre, manoeuvres
 from benchmarks.hidden_effects.problems import Problem, kept, make
-from benchmarks.hidden_effects.reliability_diagram import Told, bins, draw_diagram, interval, tables
+from benchmarks.hidden_effects.reliability_diagram import (
+    Told,
+    bins,
+    draw_diagram,
+    interval,
+    mean_and_error,
+    tables,
+)
 from benchmarks.hidden_effects.results import Results, Row
 from benchmarks.hidden_effects.scoring import row, same_coefficients
 from benchmarks.hidden_effects.separation import NOTHING, Rivals, flat
 from benchmarks.hidden_effects.simulated_runs import STEP, Hidden, Voyage, build, sail
 from benchmarks.hidden_effects.summary import write
+from benchmarks.hidden_effects.targets import bias
 from benchmarks.hidden_effects.truth import Motion, force, motion, over, windows
 from cosim import InputError
 from diagnosis import Model, Run
@@ -404,6 +412,19 @@ def test_process_noise_has_the_size_and_the_time_that_it_says():
     later = round(2.0 / STEP)
     kept = np.mean(series[:-later] * series[later:], axis=0) / series.var(axis=0)
     assert kept == pytest.approx(np.exp(-1.0), abs=0.1)
+
+
+def test_damping_of_one_ship_counts_as_one():
+    """Its coefficients are off together: three of each say no more than one, and the error stays."""
+    off = np.random.default_rng(2).standard_normal(12)
+
+    def told(of_each):
+        return bias([Row("N_r", "n1", "wrong", 0, damping=[str(z)] * of_each) for z in off])
+
+    assert told(1) == told(3)
+    assert told(1).endswith("(12 ships)")
+    assert mean_and_error([-1.0, 1.0]) == pytest.approx((0.0, 1.0))
+    assert mean_and_error(4 * [2.0]) == pytest.approx((2.0, 0.0))
 
 
 def test_in_process_noise_every_interval_counts_and_damping_by_its_sum():

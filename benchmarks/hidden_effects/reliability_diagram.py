@@ -66,6 +66,11 @@ def interval(right: int, count: int) -> tuple[float, float]:
     return low, high
 
 
+def mean_and_error(each: Sequence[float]) -> tuple[float, float]:
+    """Mean of independent numbers, at least two, and its standard error."""
+    return float(np.mean(each)), float(np.std(each, ddof=1) / np.sqrt(len(each)))
+
+
 def bins(findings: Sequence[Told], least: int = LEAST) -> list[Bin]:
     """Bins by confidence, from the surest down: each ends at an edge where it holds enough findings.
 

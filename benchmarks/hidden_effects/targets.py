@@ -1,11 +1,11 @@
 """The targets of the benchmark, and the numbers that were reached."""
 
 from collections.abc import Callable, Iterable, Sequence
-from statistics import mean, median, stdev
+from statistics import mean, median
 
 from .cost import Cost
 from .draw import FOREIGN
-from .reliability_diagram import interval
+from .reliability_diagram import interval, mean_and_error
 from .results import Row
 from .simulated_runs import NOISE
 
@@ -159,11 +159,14 @@ def reached(rows: Rows) -> str:
 
 
 def bias(rows: Rows) -> str:
-    """Mean of how far damping is off, with its standard error."""
-    off = [float(z) for r in rows for z in r.damping]
+    """Mean of how far damping is off, with its standard error.
+
+    Motion tells force over mass: the coefficients of one ship are off together, and count as one.
+    """
+    off = [mean(float(z) for z in r.damping) for r in rows if r.damping]
     if len(off) < 2:
         return "-"
-    return f"{mean(off):.2f} +- {stdev(off) / len(off) ** 0.5:.2f} ({len(off)})"
+    return "{:.2f} +- {:.2f} ({} ships)".format(*mean_and_error(off), len(off))
 
 
 def coverage(rows: Rows) -> str:
