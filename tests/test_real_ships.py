@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.ships import SHIPS
+from support.ships import SHIPS, scaled
 
-from fmus.actuators.actuation import forces, measurable, output
+from fmus.actuators.actuation import command_units, forces, measurable, output
 from fmus.actuators.azimuth_leg import AzimuthLeg
 from fmus.actuators.law import Flow
 from fmus.actuators.response import total
@@ -242,9 +242,29 @@ def test_the_research_vessel_turns_as_in_its_sea_trial(order):
     assert (speed, degrees(yaw_rate)) == pytest.approx(CIRCLES[order], rel=0.16)
 
 
-# Effects on parameters
+# Both
 
 COMMANDS = {"kvlcc2": (SHAFT, 0.2), "gunnerus": (0.2, 2.5)}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("ratio", [0.2, 5.0])
+@given(st.floats(0.5, 1.2), drift, st.floats(-0.4, 0.4))
+def test_a_ship_of_another_size_is_the_same_by_froudes_law(name, ratio, u, v, turn):
+    d = SHIPS[name]
+    large, at = scaled(d, ratio), type(d.scale)(ratio)
+    nu = (u, v, turn / d.length)
+    commands = [
+        c * at.factor(unit) for c, unit in zip(COMMANDS[name], command_units(d).values(), strict=True)
+    ]
+    nu_there = [x * k for x, k in zip(nu, at.speeds, strict=True)]
+    found = acceleration(large, nu_there, commands)
+    units = ("m/s2", "m/s2", "rad/s2")
+    back = [x / at.factor(unit) for x, unit in zip(found, units, strict=True)]
+    assert back == pytest.approx(acceleration(d, nu, COMMANDS[name]), rel=1e-9, abs=1e-12)
+
+
+# Effects on parameters
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -38,7 +38,7 @@ def scaled(d: Description, ratio: float) -> Description:
     def of_actuator(a, name):
         command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
         if command is not None:
-            return f"{command.unit}.1/s" if command.unit == "1" else f"{command.unit}/s"
+            return {"1": "1/s", "1/s": "1/s2"}.get(command.unit, f"{command.unit}/s")
         return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
 
     return d._replace(
