@@ -17,11 +17,11 @@ from cosim.dispatch import FinishedRun
 from cosim.results import draw, read_options
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
-from .outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
-from .store_verdicts import store_claims
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
+from .tracking.outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
+from .tracking.store_verdicts import store_claims
+from .tracking.verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
 
 PATHS = ("ellipse", "eight")
 SENSES = ("mdf", "kalman")

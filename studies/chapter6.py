@@ -14,15 +14,15 @@ import cosim
 from cosim.results import draw, read_options
 from diagnosis.model import read_model
 
-from . import sysid4
-from .chapter6_runs import FEW, Plant, folder, run
-from .found import FAULTY, Runs, label, lost, mean
-from .lessons import lessons
-from .model_loops import parameters_of
-from .observations import observations, other_sections
+from .basin_trials import sysid4
+from .basin_trials.chapter6_runs import FEW, Plant, folder, run
+from .basin_trials.found import FAULTY, Runs, label, lost, mean
+from .basin_trials.lessons import lessons
+from .basin_trials.observations import observations, other_sections
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS
+from .error_models.model_loops import parameters_of
 from .study_command import run_study, study_parser
 from .study_report import Report
-from .trials import CONTROLLERS, LABELS, TRIALS
 
 LEFT_OUT = "Experiments on spikes, stores and delay: not made of this ship (`--trials`)."
 

@@ -16,13 +16,13 @@ from cosim.dispatch import FinishedRun
 from cosim.results import draw, read_options
 from fmus.controller.models import SURGE
 
-from . import sysid4
-from .lap_pictures import errors_picture, force_picture
+from .basin_trials import sysid4
+from .error_models.lap_pictures import errors_picture, force_picture
 from .monte_carlo import Content, Interval, interval, paired, run_all, run_each, shipped, vary
-from .outcome import AXES, Log, missing, rms, true_states
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import Verdict, finite_ratio, listed
+from .tracking.outcome import AXES, Log, missing, rms, true_states
+from .tracking.verdict import Verdict, finite_ratio, listed
 
 IMPROVED = "controller_cl_improved"
 ORIGINALS = ("controller_cl_win_eps", "controller_cl_win_z2", "controller_abs", "controller_bs")

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from scipy import stats
 
-from .monte_carlo import Interval, interval, ratio
+from ..monte_carlo import Interval, interval, ratio
 from .outcome import TRUE_PHI, Outcome, columns
 
 FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..monte_carlo import Interval, interval, paired
+from ..study_report import Report
 from .estimates_replayed import OBSERVERS, SIGNALS
-from .monte_carlo import Interval, interval, paired
-from .study_report import Report
 
 Runs = Mapping[str, Sequence[Mapping[str, Mapping[str, float]]]]
 Row = tuple[str, str, str]

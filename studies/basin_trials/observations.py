@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from math import isnan
 
+from ..monte_carlo import Interval
+from ..tracking.verdict import Verdict, listed
 from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
-from .monte_carlo import Interval
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
-from .verdict import Verdict, listed
 
 MUCH = 1.5  # times that count as "substantially"; chosen
 

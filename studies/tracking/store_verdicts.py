@@ -1,6 +1,6 @@
 """What chapter 5 says of the store, each with the result of our runs."""
 
-from .monte_carlo import interval
+from ..monte_carlo import interval
 from .outcome import columns
 from .verdict import FOUR, ORDERS, PRINTED, Paths, Table, Verdict, error, in_order, short
 
