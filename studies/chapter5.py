@@ -210,8 +210,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
     )
     report.heading("What the thesis concludes, and what comes out here")
     rows = [*claims(by_path), *store_claims(by_path), *goals(by_path)]
-    report.table(["thesis", "here", "numbers and reason"], [list(row) for row in rows], words=True)
-    report.result("claims", [row._asdict() for row in rows])
+    report.verdicts("claims", rows, "numbers and reason")
     differences(report, by_path)
     for path, table in by_path.items():
         tables(report, path, table)

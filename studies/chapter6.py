@@ -93,17 +93,12 @@ def study(
         + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
-    seen = observations(found)
-    report.table(["thesis", "here", "numbers"], [list(row) for row in seen], words=True)
-    report.result("observations", [row._asdict() for row in seen])
+    report.verdicts("observations", observations(found))
     for section, rows in other_sections(found).items():
         report.heading(section)
-        report.table(["thesis", "here", "numbers"], [list(row) for row in rows], words=True)
-        report.result(section, [row._asdict() for row in rows])
+        report.verdicts(section, rows)
     report.heading("Lessons learned (6.5)")
-    rows = lessons(found)
-    report.table(["thesis", "here", "numbers and cause"], [list(row) for row in rows], words=True)
-    report.result("lessons", [row._asdict() for row in rows])
+    report.verdicts("lessons", lessons(found), "numbers and cause")
     report.heading("The trials")
     report.text(
         "Means over the seeds with their 95 % intervals, over the runs that kept up with the target; "

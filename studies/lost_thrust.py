@@ -21,9 +21,8 @@ from .basin_trials import sysid4
 from .basin_trials.trials import HARD, gains
 from .monte_carlo import Content, run_all, shipped, vary
 from .study_command import run_study, study_parser
-from .study_report import Report
+from .study_report import Report, Verdict
 from .tracking.outcome import AXES, Log, missing
-from .tracking.verdict import Verdict
 
 NU = ("u", "v", "r")
 N_R, DELTA_N = 8, 13  # places of N_r in (7.2) and of delta_N after (7.5)

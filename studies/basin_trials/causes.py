@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..tracking.verdict import Verdict, listed, worse
+from ..study_report import Verdict
+from ..tracking.verdict import listed, worse
 from .found import BLOCKED, FRESH, OPENED, PRINTED, REGULAR, Found, kept, lost, mean, share
 from .margin import margins
 from .store_contents import StoreContents

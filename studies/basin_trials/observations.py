@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 
 from ..monte_carlo import Interval
-from ..tracking.verdict import Verdict, listed
+from ..study_report import Verdict
+from ..tracking.verdict import listed
 from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
 

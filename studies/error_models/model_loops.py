@@ -13,9 +13,8 @@ from diagnosis.model import Model
 
 from ..basin_trials.trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
 from ..monte_carlo import Content, run_all, vary
-from ..study_report import Report
+from ..study_report import Report, Verdict
 from ..tracking.outcome import LEARNED_FROM, Log, rms
-from ..tracking.verdict import Verdict
 from .lap_pictures import errors_picture, force_picture
 
 SLOW, EIGHT = TRIALS[0], TRIALS[1]
