@@ -369,6 +369,27 @@ class Component:
 KINDS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 
 
+def component(
+    name: str,
+    description: str,
+    init: Callable[[Any, Any], Any],
+    step: Callable[[Any, Any, Any, Any], tuple[Any, Any]],
+    **more: Any,
+) -> Component:
+    """A component of the classes that its functions say they take and give.
+
+    Args:
+        name: name of the FMU.
+        description: one line for people.
+        init: annotated ``init(i: Inputs, p: Params) -> State``.
+        step: annotated ``step(...) -> tuple[State, Outputs]``.
+        more: further attributes of the :class:`Component`.
+    """
+    inputs, params, state = get_type_hints(init).values()
+    _, outputs = get_args(get_type_hints(step)["return"])
+    return Component(name, description, params, state, inputs, outputs, init, step, **more)
+
+
 def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
     """Every (module name, component) of this project, found by importing the modules of all kinds.
 

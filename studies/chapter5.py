@@ -17,11 +17,11 @@ from cosim.dispatch import FinishedRun
 from cosim.results import draw, read_options
 
 from .monte_carlo import Content, interval, ratio, run_all, run_each, shipped, vary
-from .outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
-from .store_verdicts import store_claims
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
+from .tracking.outcome import LEARNED_FROM, PHI, Outcome, columns, outcome, true_states
+from .tracking.store_verdicts import store_claims
+from .tracking.verdict import CONTROLLERS, FOUR, OLD, PRINTED, claims, goals, short
 
 PATHS = ("ellipse", "eight")
 SENSES = ("mdf", "kalman")
@@ -210,8 +210,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float | None, jobs: int | No
     )
     report.heading("What the thesis concludes, and what comes out here")
     rows = [*claims(by_path), *store_claims(by_path), *goals(by_path)]
-    report.table(["thesis", "here", "numbers and reason"], [list(row) for row in rows], words=True)
-    report.result("claims", [row._asdict() for row in rows])
+    report.verdicts("claims", rows, "numbers and reason")
     differences(report, by_path)
     for path, table in by_path.items():
         tables(report, path, table)

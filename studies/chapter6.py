@@ -14,15 +14,15 @@ import cosim
 from cosim.results import draw, read_options
 from diagnosis.model import read_model
 
-from . import sysid4
-from .chapter6_runs import FEW, Plant, folder, run
-from .found import FAULTY, Runs, label, lost, mean
-from .lessons import lessons
-from .model_loops import parameters_of
-from .observations import observations, other_sections
+from .basin_trials import sysid4
+from .basin_trials.chapter6_runs import FEW, Plant, folder, run
+from .basin_trials.found import FAULTY, Runs, label, lost, mean
+from .basin_trials.lessons import lessons
+from .basin_trials.observations import observations, other_sections
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS
+from .error_models.model_loops import parameters_of
 from .study_command import run_study, study_parser
 from .study_report import Report
-from .trials import CONTROLLERS, LABELS, TRIALS
 
 LEFT_OUT = "Experiments on spikes, stores and delay: not made of this ship (`--trials`)."
 
@@ -93,17 +93,12 @@ def study(
         + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
     )
     report.heading("The ellipse at 0.16 m/s (6.4.4)")
-    seen = observations(found)
-    report.table(["thesis", "here", "numbers"], [list(row) for row in seen], words=True)
-    report.result("observations", [row._asdict() for row in seen])
+    report.verdicts("observations", observations(found))
     for section, rows in other_sections(found).items():
         report.heading(section)
-        report.table(["thesis", "here", "numbers"], [list(row) for row in rows], words=True)
-        report.result(section, [row._asdict() for row in rows])
+        report.verdicts(section, rows)
     report.heading("Lessons learned (6.5)")
-    rows = lessons(found)
-    report.table(["thesis", "here", "numbers and cause"], [list(row) for row in rows], words=True)
-    report.result("lessons", [row._asdict() for row in rows])
+    report.verdicts("lessons", lessons(found), "numbers and cause")
     report.heading("The trials")
     report.text(
         "Means over the seeds with their 95 % intervals, over the runs that kept up with the target; "

@@ -16,14 +16,15 @@ from cosim.dispatch import FinishedRun
 from diagnosis import analysis
 from diagnosis.analysis import Identified, Regressed, Samples
 
-from . import analysis_tables as tables
-from . import basin, sysid4
-from .model_loops import eigenvalues, write_loops
+from .basin_trials import sysid4
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS, scenario
+from .error_models import analysis_tables as tables
+from .error_models.model_loops import eigenvalues, write_loops
 from .monte_carlo import Content, run_all, vary
-from .outcome import AXES
+from .observers import basin
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .trials import CONTROLLERS, LABELS, TRIALS, scenario
+from .tracking.outcome import AXES
 
 STATE = [f"vessel.{n}" for n in ("u", "v", "r", "u_dot", "v_dot", "r_dot")]
 FORCE = [f"thrusters.tau_cmd_{a}" for a in AXES]

@@ -17,9 +17,18 @@ import cosim
 from cosim.command import BAD_INPUT, FAILED, run_command
 from cosim.dispatch import FinishedRun
 
-from . import basin, claims, pictures
-from .estimates_replayed import LOGGED, OBSERVERS, SIGNALS, UNITS, freezes, measures, observer, replay
 from .monte_carlo import Interval, interval, run_all, shipped, vary, without
+from .observers import basin, claims, pictures
+from .observers.estimates_replayed import (
+    LOGGED,
+    OBSERVERS,
+    SIGNALS,
+    UNITS,
+    freezes,
+    measures,
+    observer,
+    replay,
+)
 from .study_command import progress, study_parser
 from .study_report import Report
 

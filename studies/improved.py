@@ -16,13 +16,13 @@ from cosim.dispatch import FinishedRun
 from cosim.results import draw, read_options
 from fmus.controller.models import SURGE
 
-from . import sysid4
-from .lap_pictures import errors_picture, force_picture
+from .basin_trials import sysid4
+from .error_models.lap_pictures import errors_picture, force_picture
 from .monte_carlo import Content, Interval, interval, paired, run_all, run_each, shipped, vary
-from .outcome import AXES, Log, missing, rms, true_states
 from .study_command import progress, run_study, study_parser
-from .study_report import Report
-from .verdict import Verdict, finite_ratio, listed
+from .study_report import Report, Verdict
+from .tracking.outcome import AXES, Log, missing, rms, true_states
+from .tracking.verdict import finite_ratio, listed
 
 IMPROVED = "controller_cl_improved"
 ORIGINALS = ("controller_cl_win_eps", "controller_cl_win_z2", "controller_abs", "controller_bs")
@@ -188,9 +188,7 @@ def study(out: Path, seeds: Sequence[int], seconds: float, jobs: int | None) -> 
         "Noise 0.2 mm and 0.3 mrad, freezes of 0.1 to 1 s once in 20 s; `true` is one run with the "
         "ship's own state. All numbers are of the second lap; means over the seeds with 95 % intervals."
     )
-    rows = claims(found)
-    report.table(["thesis", "here", "numbers"], [list(row) for row in rows], words=True)
-    report.result("claims", [row._asdict() for row in rows])
+    report.verdicts("claims", claims(found))
     report.heading("The last lap")
     header = ["observer", "controller", "mean z1_x [m]", "RMS z1_x [m]", "RMS z1_y [m]"]
     header += [f"error of ω̂_{a} [{'N m' if a == 'N' else 'N'}]" for a in AXES]

@@ -17,13 +17,12 @@ from matplotlib.figure import Figure
 from cosim.dispatch import FinishedRun
 from diagnosis.analysis import GAMMA, SETTLED, Samples, explained, material, model_error, one_pass
 
-from . import sysid4
+from .basin_trials import sysid4
+from .basin_trials.trials import HARD, gains
 from .monte_carlo import Content, run_all, shipped, vary
-from .outcome import AXES, Log, missing
 from .study_command import run_study, study_parser
-from .study_report import Report
-from .trials import HARD, gains
-from .verdict import Verdict
+from .study_report import Report, Verdict
+from .tracking.outcome import AXES, Log, missing
 
 NU = ("u", "v", "r")
 N_R, DELTA_N = 8, 13  # places of N_r in (7.2) and of delta_N after (7.5)

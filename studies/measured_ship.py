@@ -17,8 +17,9 @@ from diagnosis import Diagnosis, Integrals, Model, diagnosis_content
 from diagnosis.identification import shares
 from diagnosis.progress import Advance, progress
 
-from . import basin, bollard, ship_tables
-from .leave_one_out import Fold, gather, leave_out
+from .measured import bollard, ship_tables
+from .measured.leave_one_out import Fold, gather, leave_out
+from .observers import basin
 from .study_command import run_study, study_parser
 from .study_report import Report
 

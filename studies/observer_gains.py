@@ -15,9 +15,9 @@ import numpy as np
 
 from cosim.dispatch import FinishedRun
 
-from .estimates_replayed import Log, freezes, lag, observer, peak_after, replay, roughness
 from .estimators import QUICK_STOP, STOP, variants
 from .monte_carlo import interval, run_all
+from .observers.estimates_replayed import Log, freezes, lag, observer, peak_after, replay, roughness
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from .chapter5 import PATHS, UNGATED, needed
 from .monte_carlo import Content, run_all, shipped, vary
-from .outcome import Outcome, outcome, true_states
-from .store_verdicts import FULL
 from .study_command import progress, run_study, study_parser
 from .study_report import Report
-from .verdict import CONTROLLERS, FOUR, ORDERS, in_order, short
+from .tracking.outcome import Outcome, outcome, true_states
+from .tracking.store_verdicts import FULL
+from .tracking.verdict import CONTROLLERS, FOUR, ORDERS, in_order, short
 
 WEIGHTS = (1.0, 0.1, 0.05, 0.01)
 # Of the table: fresh or stale, and whether samples of forces above 2 N are kept out.

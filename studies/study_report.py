@@ -7,7 +7,7 @@ import platform
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim import atomic_write
 
@@ -63,6 +63,14 @@ def _jsonable(value: Any) -> Any:
     return value
 
 
+class Verdict(NamedTuple):
+    """What the thesis says, what comes out here, and the numbers or the reason."""
+
+    thesis: str
+    here: str
+    numbers: str
+
+
 class Report:
     """Collects pieces and writes them at the end; figures are written as they come.
 
@@ -95,6 +103,17 @@ class Report:
         side = ":--" if words else "--:"
         lines = [header, [":--", *[side] * (len(header) - 1)], *([cell(c) for c in r] for r in rows)]
         self._pieces.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
+
+    def verdicts(self, name: str, rows: Sequence[Verdict], numbers: str = "numbers") -> None:
+        """A table of verdicts, which also go to ``results.json``.
+
+        Args:
+            name: in ``results.json``.
+            rows: the verdicts.
+            numbers: heading of the last column.
+        """
+        self.table(["thesis", "here", numbers], rows, words=True)
+        self.result(name, rows)
 
     def figure(self, name: str, figure: "Figure", caption: str) -> None:
         """Write ``<name>.png`` and embed it."""

@@ -30,7 +30,7 @@ from fmus.effects.linear_map import AXES, REGRESSORS, parameter, regressors
 from fmus.hull import RotationalDamping
 from fmus.signals import Force
 from fmus.vessel.vessel import COMPONENT, State
-from studies import sysid4
+from studies.basin_trials import sysid4
 
 MAP = STANDARD["linear_map"]
 

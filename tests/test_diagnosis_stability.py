@@ -29,7 +29,7 @@ from diagnosis.assessment.stability import (
     mass,
     sampled_motions,
 )
-from diagnosis.model import Model
+from diagnosis.model import Model, ship_with
 from diagnosis.model.weak_form import acceleration
 from fmus.declare import variables
 from fmus.hull import Damping
@@ -90,6 +90,17 @@ def test_it_falls_with_every_newton_that_pushes_the_ship_on():
 def test_what_does_not_depend_on_the_velocity_is_exempt(outside):
     nu = sampled_motions(OPERATING)
     assert np.allclose(force(Model(outside), nu), force(NOMINAL, nu), rtol=0.0, atol=1e-12)
+
+
+def test_the_damping_of_a_described_ship_and_its_changes_count():
+    """More resistance, as an effect or as the coefficient, is the same force; scaled is all of its own damping."""
+    nominal = Model(ship=ship_with((), "kvlcc2"))
+    nu = np.array([[1.0, 0.1, 0.02], [0.8, -0.2, -0.03]])
+    before = force(nominal, nu)
+    changed, other = (nominal.plus({name: 0.01}) for name in ("delta_R_0_prime", "R_0_prime"))
+    np.testing.assert_allclose(force(changed, nu), force(other, nu), rtol=1e-9)
+    assert (force(changed, nu)[:, 0] < before[:, 0]).all()
+    np.testing.assert_allclose(force(nominal.plus({"scale_damping": 0.5}), nu), 1.5 * before, rtol=1e-9)
 
 
 @pytest.mark.parametrize("whole", [False, slow(True)])

@@ -1,6 +1,7 @@
 """Manoeuvring trials that were measured: the same measures, and beside them what models predict."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -91,7 +92,7 @@ def test_mistakes_are_one_line(sailed, tmp_path, trial, others, arguments, messa
     assert not (tmp_path / "out").exists()
 
 
-def errors(files, ship, learned=None):
+def errors(files, ship, learned=None) -> list[Any]:
     """errors[].trial of runs, before and after."""
     craft = diagnosis.model.ship_with((), ship)
     model = diagnosis.Model(ship=craft)
@@ -121,6 +122,9 @@ def test_compare_writes_them(sailed, tmp_path):
     told = json.loads((tmp_path / "found" / "comparison.json").read_text())["errors"][0]["trial"]
     assert [len(triple) for triple in told["overshoot"]] == [3] * len(told["overshoot"])
     assert len(told["check_angle"]) == 3
+    for page in (done.stdout, (tmp_path / "found" / "report.html").read_text(encoding="utf-8")):
+        assert "Manoeuvring trials" in page
+        assert "overshoot_1" in page
 
 
 def test_a_log_of_a_trial_is_one_to_the_diagnosis(sailed):

@@ -5,8 +5,8 @@ import pytest
 
 from cosim.dispatch import FinishedRun
 from studies import chapter5
-from studies.outcome import BROKEN, PHI, outcome
-from studies.verdict import CONTROLLERS, FOUR
+from studies.tracking.outcome import BROKEN, PHI, outcome
+from studies.tracking.verdict import CONTROLLERS, FOUR
 
 METRICS = {"from": 20.0, "cross_track_rms": 0.3, "heading_rms": 0.4, "IAEW": 5.0, "IAEWWT": 6.0}
 

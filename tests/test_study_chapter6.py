@@ -11,9 +11,9 @@ from diagnosis import Model
 from diagnosis.model import write_model
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
-from studies import (
+from studies import chapter6
+from studies.basin_trials import (
     causes,
-    chapter6,
     chapter6_runs,
     lessons,
     margin,
@@ -22,10 +22,10 @@ from studies import (
     sysid4,
     trials,
 )
-from studies.estimates_replayed import parameters
-from studies.found import FAULTY, REGULAR, Found, share
+from studies.basin_trials.found import FAULTY, REGULAR, Found, share
 from studies.monte_carlo import shipped, vary
-from studies.outcome import missing, quick
+from studies.observers.estimates_replayed import parameters
+from studies.tracking.outcome import missing, quick
 
 SLOW = trials.TRIALS[0]
 

@@ -10,9 +10,19 @@ from scipy.io import savemat
 from support.project import ROOT
 
 from cosim import InputError
-from studies import basin, claims, estimators, observer_gains
-from studies.claims import ahead
-from studies.estimates_replayed import OBSERVERS, SIGNALS, freezes, held, lag, observer, replay, wraps
+from studies import estimators, observer_gains
+from studies.observers import basin, claims
+from studies.observers.claims import ahead
+from studies.observers.estimates_replayed import (
+    OBSERVERS,
+    SIGNALS,
+    freezes,
+    held,
+    lag,
+    observer,
+    replay,
+    wraps,
+)
 
 H = 0.01
 DATA = Path(os.environ.get("CYBERSHIP_DATA", ROOT.parent / "shared" / "data"))

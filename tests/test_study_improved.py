@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fmus.controller.models import SURGE
-from studies import improved, sysid4
+from studies import improved
+from studies.basin_trials import sysid4
 from studies.improved import IMPROVED, SURGE_ONLY, Lap, claims, surge_parts
 from studies.monte_carlo import vary
 

@@ -22,8 +22,9 @@ from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import allocate
 from fmus.thrusters.chain import Inputs
 from fmus.thrusters.thrusters import COMPONENT
-from studies import bollard, expected, leave_one_out, measured_ship, ship_tables
-from studies.expected import BY_HAND, STEERED, Fall
+from studies import measured_ship
+from studies.measured import bollard, expected, leave_one_out, ship_tables
+from studies.measured.expected import BY_HAND, STEERED, Fall
 
 CURVE = {"thrust_curve_ahead": 0.2, "thrust_curve_astern": -0.1, "thrust_curve_deadband": 0.2}
 COMMANDS = np.linspace(-1.0, 1.0, 11)

@@ -16,30 +16,24 @@ from diagnosis.analysis import NU, TAU, concurrent_passes
 from studies import (
     chapter5,
     chapter6,
-    chapter6_runs,
     chapter7,
-    claims,
-    estimates_replayed,
     estimators,
     improved,
-    lap_pictures,
     lost_thrust,
     measured_ship,
-    model_loops,
     observer_gains,
-    pictures,
     realtime,
-    ship_tables,
-    store_contents,
-    sysid4,
-    trials,
 )
-from studies.estimates_replayed import OBSERVERS, SIGNALS
-from studies.expected import BY_HAND, STEERED, Fall
-from studies.outcome import AXES, LEARNED_FROM, Outcome
-from studies.store_contents import StoreContents
+from studies.basin_trials import chapter6_runs, store_contents, sysid4, trials
+from studies.basin_trials.store_contents import StoreContents
+from studies.error_models import lap_pictures, model_loops
+from studies.measured import ship_tables
+from studies.measured.expected import BY_HAND, STEERED, Fall
+from studies.observers import claims, estimates_replayed, pictures
+from studies.observers.estimates_replayed import OBSERVERS, SIGNALS
 from studies.study_report import Report
-from studies.verdict import CONTROLLERS, FOUR, PRINTED
+from studies.tracking.outcome import AXES, LEARNED_FROM, Outcome
+from studies.tracking.verdict import CONTROLLERS, FOUR, PRINTED
 
 
 class MadeUp(dict):

@@ -5,14 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from studies import analysis_tables, chapter7, lost_thrust, model_loops, observations, sysid4, trials
-from studies.found import FAULTY, REGULAR, Found
+from studies import chapter7, lost_thrust
+from studies.basin_trials import observations, sysid4, trials
+from studies.basin_trials.found import FAULTY, REGULAR, Found
+from studies.error_models import analysis_tables, model_loops
 from studies.monte_carlo import Interval
-from studies.outcome import BROKEN, TRUE_PHI
-from studies.store_verdicts import full_rank, lack_of_rank, order, richer, saturated, stale
 from studies.store_weight import tables
 from studies.study_report import Report
-from studies.verdict import (
+from studies.tracking.outcome import BROKEN, TRUE_PHI
+from studies.tracking.store_verdicts import full_rank, lack_of_rank, order, richer, saturated, stale
+from studies.tracking.verdict import (
     CONTROLLERS,
     FOUR,
     ORDERS,

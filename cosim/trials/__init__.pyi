@@ -4,6 +4,7 @@ from .measures import measure as measure
 from .ship_passage import Passage as Passage
 from .ship_passage import executes as executes
 from .ship_passage import passage as passage
+from .trial_outcome import DEGREES as DEGREES
 from .trial_outcome import Outcome as Outcome
 from .trial_outcome import outcome as outcome
 from .trial_outcome import sheet as sheet

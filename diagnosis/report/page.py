@@ -19,6 +19,7 @@ from .profiles import QUANTITIES, binned_errors
 from .result_keys import Change, ComparisonContent, DiagnosisContent, StabilityResult
 from .shape import Curve, curves
 from .svg import data_uri, inline, style
+from .trial_rows import trial_rows
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -104,7 +105,14 @@ def _template() -> "Template":
         lstrip_blocks=True,
     )
     told_so = (told, data_uri, bounded)
-    filters = (formatting.number, formatting.unit, formatting.percent, formatting.plain, *told_so)
+    filters = (
+        formatting.number,
+        formatting.unit,
+        formatting.percent,
+        formatting.plain,
+        trial_rows,
+        *told_so,
+    )
     environment.filters |= {f.__name__: f for f in filters}
     environment.globals["times"] = formatting.times
     return environment.get_template("page.html")

@@ -11,6 +11,7 @@ from rich.text import Text
 from ..sensors import sensor_lines
 from .headline import is_sure, told, verdict_title
 from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, SensorResult
+from .trial_rows import trial_rows
 
 MAX_CANDIDATES = 5  # of the ranking; chosen
 MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
@@ -166,6 +167,14 @@ def _errors(r: ComparisonContent | DiagnosisContent, learned: bool) -> Iterator[
             measured.add_row(_run(e.run, e.held_out), name, cell(m.rms_before, m.rms_after))
     if measured.row_count:
         yield from _titled(f"Measured outputs of actuators and the model's{when}", measured)
+    trials = _table("run", "measure", "measured", "predicted", "unit")
+    for row in trial_rows(r.errors):
+        predicted = cell(row.before, row.after)
+        trials.add_row(
+            _run(row.run, row.held_out), row.measure, _number(row.measured), predicted, row.unit
+        )
+    if trials.row_count:
+        yield from _titled(f"Manoeuvring trials, from just before the first execute{when}", trials)
 
 
 def _stability(r: DiagnosisContent) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """Clock and constant faults of the channels of motion, estimated together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -54,8 +55,7 @@ def motion(run: Run, scale: Scale) -> Examined:
     """Clock, scales, offsets, places and delays of velocity and yaw rate against the pose."""
     e = evidence(run)
     if e is None:
-        note = "the pose is all there is: no other channel says anything of it"
-        return Examined(run, notes=(note,) if not run.measured else ())
+        return Examined(run)
     jumps = gaps(e)
     try:
         found = _estimated(e, columns(e, scale), jumps)
@@ -63,9 +63,23 @@ def motion(run: Run, scale: Scale) -> Examined:
         return Examined(run, notes=("the channels beside the pose do not determine a motion",))
     findings = [jump.finding for jump in jumps]
     findings += _clock(found) + _constants(found, e)
+    late = [f for f in findings if f.kind == "delay"]
+    if late:  # its column is a tangent: all else is estimated once it is gone
+        first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
+        rest = motion(first, scale)
+        return replace(rest, findings=(*_added(late, rest.findings),))
     fixes = [f for f in findings if f.repaired]
     repaired = corrected(e, _correction(found, jumps, fixes)) if fixes else run
     return Examined(repaired, tuple(findings), _leeway(e), _agreeing(found, e))
+
+
+def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
+    """Delays that were taken off with what is left of them, and all else."""
+    left = {(f.channel, f.kind): f.value for f in rest}
+    yield from (f for f in rest if (f.channel, f.kind) not in {(d.channel, d.kind) for d in late})
+    for f in late:
+        more = left.get((f.channel, f.kind), 0.0)
+        yield replace(f, value=f.value + more, ci95=(f.ci95[0] + more, f.ci95[1] + more))
 
 
 def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFinding]) -> Correction:

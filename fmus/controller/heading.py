@@ -30,7 +30,7 @@ An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Component, Range, group_of, variables
+from ..declare import POSITIVE, Range, component, group_of, variables
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
 from ..ops import Number, clip, cos, exp, fmax, sin, where, wrap
@@ -184,13 +184,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     return s._replace(tau=asked), out
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="controller_heading",
     description="Autopilot: heading and speed, without force in sway",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Outputs,
     init=init,
     step=step,
     held=HELD,

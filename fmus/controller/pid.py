@@ -10,7 +10,7 @@ An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Component
+from ..declare import component
 from ..frames import rotate_to_body
 from ..hull import Inertia, mass_matrix
 from ..ops import Number, clip, where, wrap
@@ -95,13 +95,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Demand]:
     return s, Demand(Force(X, Y, N), X, Y, N, 0.0, 0.0, 0.0, errors, *estimate)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="controller_pid",
     description="PID controller",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Demand,
     init=init,
     step=step,
 )

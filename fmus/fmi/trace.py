@@ -7,7 +7,7 @@ or ``math.sin()`` of one raises :class:`TraceError`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,6 +47,15 @@ class TraceError(Exception):
     """A component does with a value what cannot be traced."""
 
 
+def _operator(name: str, swapped: bool = False) -> Callable[[Symbol, Any], Any]:
+    """The method of a binary operation, with the symbol on its left, or swapped on its right."""
+
+    def method(self: Symbol, other: Any) -> Any:
+        return self.apply_operation(name, (other, self) if swapped else (self, other))
+
+    return method
+
+
 class Symbol:
     """A value that is not known yet: a variable, or an operation on other values."""
 
@@ -61,63 +70,21 @@ class Symbol:
         """The hook that :mod:`fmus.ops` looks for."""
         return Symbol(name, args)
 
-    def __add__(self, other: Any) -> Symbol:
-        return self.apply_operation("add", (self, other))
-
-    def __radd__(self, other: Any) -> Symbol:
-        return self.apply_operation("add", (other, self))
-
-    def __sub__(self, other: Any) -> Symbol:
-        return self.apply_operation("sub", (self, other))
-
-    def __rsub__(self, other: Any) -> Symbol:
-        return self.apply_operation("sub", (other, self))
-
-    def __mul__(self, other: Any) -> Symbol:
-        return self.apply_operation("mul", (self, other))
-
-    def __rmul__(self, other: Any) -> Symbol:
-        return self.apply_operation("mul", (other, self))
-
-    def __truediv__(self, other: Any) -> Symbol:
-        return self.apply_operation("div", (self, other))
-
-    def __rtruediv__(self, other: Any) -> Symbol:
-        return self.apply_operation("div", (other, self))
+    __add__, __radd__ = _operator("add"), _operator("add", swapped=True)
+    __sub__, __rsub__ = _operator("sub"), _operator("sub", swapped=True)
+    __mul__, __rmul__ = _operator("mul"), _operator("mul", swapped=True)
+    __truediv__, __rtruediv__ = _operator("div"), _operator("div", swapped=True)
+    __and__ = __rand__ = _operator("and")
+    __or__ = __ror__ = _operator("or")
+    __lt__, __le__ = _operator("lt"), _operator("le")
+    __gt__, __ge__ = _operator("gt"), _operator("ge")
+    __eq__, __ne__ = _operator("eq"), _operator("ne")
 
     def __neg__(self) -> Symbol:
         return self.apply_operation("neg", (self,))
 
     def __abs__(self) -> Symbol:
         return self.apply_operation("abs", (self,))
-
-    def __lt__(self, other: Any) -> Symbol:
-        return self.apply_operation("lt", (self, other))
-
-    def __le__(self, other: Any) -> Symbol:
-        return self.apply_operation("le", (self, other))
-
-    def __gt__(self, other: Any) -> Symbol:
-        return self.apply_operation("gt", (self, other))
-
-    def __ge__(self, other: Any) -> Symbol:
-        return self.apply_operation("ge", (self, other))
-
-    def __eq__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return self.apply_operation("eq", (self, other))
-
-    def __ne__(self, other: object) -> Symbol:  # pyright: ignore[reportIncompatibleMethodOverride]
-        return self.apply_operation("ne", (self, other))
-
-    def __and__(self, other: Any) -> Symbol:
-        return self.apply_operation("and", (self, other))
-
-    __rand__ = __and__
-
-    def __or__(self, other: Any) -> Symbol:
-        return self.apply_operation("or", (self, other))
-
-    __ror__ = __or__
 
     __hash__ = object.__hash__
 

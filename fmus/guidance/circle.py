@@ -7,7 +7,7 @@ taken back, and the rate that remains tells whether the ship is stable (ISO 1364
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Component
+from ..declare import POSITIVE, component
 from ..ops import Number, where
 from ..signals import Nothing
 from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, begun, first_side, given
@@ -37,13 +37,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Order]:
     return State(t), given(order, p)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_circle",
     description="Turning circle: an order that is held, with or without a pull-out",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Order,
     init=init,
     step=step,
     trial="circle",

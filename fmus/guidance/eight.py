@@ -7,7 +7,7 @@ u_t = 0.16 it is 0.01 to 0.03 m/s and a round takes 422 s.
 import math
 from typing import Annotated, NamedTuple
 
-from ..declare import Component, Range
+from ..declare import Range, component
 from ..ops import Number, cos, sin
 from ..signals import Nothing, Target
 from .pace import Clock, Pace, tick
@@ -53,13 +53,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     return State(theta, clock), target(point, *beat.rates(theta_dot, 0.0))
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_eight",
     description="Guidance along a figure of eight",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from ..declare import Component, Range
+from ..declare import Range, component
 from ..ops import Number, cos, sin, sqrt
 from ..signals import Nothing, Target
 from .pace import Clock, Pace, tick
@@ -55,13 +55,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     return State(theta, clock), target(point, *beat.rates(theta_dot, theta_ddot))
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_ellipse",
     description="Guidance along an ellipse at constant speed",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

@@ -24,7 +24,7 @@ are zero. An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import FIXED, Range, component
 from ..frames import rotate_to_body
 from ..ops import Number, atan2, clip, cos, not_, pick, sin, sqrt, where, wrap
 from ..signals import Estimate, Target
@@ -133,13 +133,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_los",
     description="Line-of-sight guidance along way points, by the ship's estimated position",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Outputs,
     init=init,
     step=step,
 )

@@ -7,7 +7,7 @@ combinations, crabbing and turning on the spot among them. The motion starts fro
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import FIXED, Range, component
 from ..ops import Number, cos, sin, wrap
 from ..signals import Nothing, Target
 
@@ -68,13 +68,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_multisine",
     description="Guidance at many frequencies in all axes, for identification",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

@@ -7,7 +7,7 @@ point may be changed during a run; the heading takes the shorter way.
 
 from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import FIXED, Range, component
 from ..ops import Number, exp, wrap
 from ..signals import Nothing, Target
 
@@ -69,13 +69,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_setpoint",
     description="Guidance to a set point along a smooth reference",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

@@ -7,7 +7,7 @@ A ship that keeps no course shows a loop: at small orders two rates, by the side
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Component, Range
+from ..declare import Range, component
 from ..ops import Number, clip, floor, where
 from ..signals import Nothing
 from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, begun, first_side, given
@@ -38,13 +38,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Order]:
     return State(t), given(where(begun(t, p.start, h), order, 0.0), p)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_spiral",
     description="Direct spiral: an order that goes in plateaus to the other side and back",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Order,
     init=init,
     step=step,
     trial="spiral",

@@ -7,7 +7,7 @@ of the approach to that of full astern, the rudder being amidships (IMO, MSC.137
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Component, Range
+from ..declare import POSITIVE, Range, component
 from ..ops import Number, where
 from ..signals import Nothing
 from .trial_order import START, begun
@@ -49,13 +49,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Outputs]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_stop",
     description="Stopping trial: full astern",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Outputs,
     init=init,
     step=step,
     trial="stop",

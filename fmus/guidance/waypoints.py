@@ -11,7 +11,7 @@ A leg straight back on the one before leaves no room to turn: the target then tu
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import FIXED, Component, Range, vector
+from ..declare import FIXED, Range, component, vector
 from ..ops import Number, floor, where, wrap
 from ..signals import Nothing, Target
 from .pace import Clock, Pace, tick
@@ -98,13 +98,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_waypoints",
     description="Guidance along a route through way points",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

@@ -9,7 +9,7 @@ An input that is NaN or infinite keeps its last finite value.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Component, Range
+from ..declare import Range, component
 from ..ops import Number, where
 from .trial_order import ANGLE, START, TENTH, Helm, Order, begun, first_side, given
 
@@ -50,13 +50,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Order]:
     return State(t, psi_0, order), given(order, p)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_zigzag",
     description="Zig-zag trial: an order that is reversed by the heading",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Order,
     init=init,
     step=step,
     trial="zigzag",

@@ -13,7 +13,7 @@ integrated numerically.
 
 from typing import Annotated, NamedTuple
 
-from ..declare import FIXED, Component, Range
+from ..declare import FIXED, Range, component
 from ..ops import Number, cos, fmin, sin
 from ..signals import Nothing, Target
 from .pace import Clock, Pace, tick
@@ -77,13 +77,9 @@ def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Target]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="guidance_zigzag_path",
     description="Guidance along a smooth zig-zag in a strip of the basin, back and forth",
-    params=Params,
-    state=State,
-    inputs=Nothing,
-    outputs=Target,
     init=init,
     step=step,
 )

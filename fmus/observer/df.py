@@ -6,7 +6,7 @@ turn. Only a sample that is NaN or infinite is left out, and the last one taken 
 
 from typing import Any, NamedTuple
 
-from ..declare import Component
+from ..declare import component
 from ..ops import Number, choose, is_finite, where
 from ..signals import Estimate
 from .derivative import (
@@ -50,13 +50,9 @@ def step(s: State, i: Inputs, p: Weights, h: Number) -> tuple[State, Estimate]:
     return state, Estimate(after.x, after.y, after.psi, *nu, *acceleration, 0.0)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="observer_df",
     description="Derivative filter without freeze and wrap handling",
-    params=Weights,
-    state=State,
-    inputs=Inputs,
-    outputs=Estimate,
     init=init,
     step=step,
     hold_nonfinite=False,

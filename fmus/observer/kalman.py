@@ -13,7 +13,7 @@ unstable above 0.04 m/s. A force that is NaN or infinite counts as zero.
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import Component, Range
+from ..declare import Range, component
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number, choose, clip, exp, finite, fmax, when, where
@@ -178,13 +178,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     return state, Estimate(m.x, m.y, m.psi, m.u, m.v, m.r, *known, frozen)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="observer_kalman",
     description="Kalman filter with the model of the hull and a disturbance that it learns",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Estimate,
     init=init,
     step=step,
     hold_nonfinite=False,

@@ -8,7 +8,7 @@ measurement ends in a wrong turn: lost for longer than ``rest_time``, the veloci
 
 from typing import NamedTuple
 
-from ..declare import Component
+from ..declare import component
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
 from ..ops import Number
 from ..signals import Estimate, Force
@@ -40,13 +40,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     return estimated(s, seen, corrected(ahead, sample, p.gains, h), sample.good, p.gains, h)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="observer_luenberger",
     description="Luenberger observer with the model of the hull",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Estimate,
     init=init,
     step=step,
     hold_nonfinite=False,

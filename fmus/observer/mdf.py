@@ -6,7 +6,7 @@ velocity. A pose that is lost for longer than ``rest_time`` is predicted with fa
 
 from typing import NamedTuple
 
-from ..declare import Component
+from ..declare import component
 from ..frames import rotate_to_earth
 from ..ops import Number, choose, where
 from ..signals import Estimate
@@ -69,13 +69,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     )
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="observer_mdf",
     description="Modified derivative filter: freezes bridged, heading continuous",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Estimate,
     init=init,
     step=step,
     hold_nonfinite=False,

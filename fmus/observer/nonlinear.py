@@ -7,7 +7,7 @@ fades.
 
 from typing import NamedTuple
 
-from ..declare import Component
+from ..declare import component
 from ..ops import Number
 from ..signals import Estimate
 from .correction import Gains, State, corrected, estimated, moved, start
@@ -29,13 +29,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Estimate]:
     return estimated(s, seen, corrected(ahead, sample, p.gains, h), sample.good, p.gains, h)
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="observer_nonlinear",
     description="Nonlinear observer on kinematics alone",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Estimate,
     init=init,
     step=step,
     hold_nonfinite=False,

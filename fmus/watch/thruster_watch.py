@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 from ..controller.backstepping import HELD, Inputs, acting
 from ..controller.eigen import dot
 from ..controller.models import FullBelief, everything
-from ..declare import POSITIVE, Component, Range
+from ..declare import POSITIVE, Range, component
 from ..hull import inertia_force
 from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
 from ..signals import Force
@@ -239,14 +239,10 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
     return choose(h > 0.0, after, s), told
 
 
-COMPONENT = Component(
+COMPONENT = component(
     name="watch_thrusters",
     any_ship=False,
     description="Detector of thrusters that lose force, by the model error",
-    params=Params,
-    state=State,
-    inputs=Inputs,
-    outputs=Outputs,
     init=init,
     step=step,
     held=HELD,

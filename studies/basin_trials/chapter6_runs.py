@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..monte_carlo import Content, run_all, vary
+from ..study_command import progress
 from .causes import DELAYS
 from .found import BLOCKED, FAULTY, FRESH, OPENED, PRINTED, REGULAR, Found
 from .margin import SETTINGS
-from .monte_carlo import Content, run_all, vary
 from .store_contents import logged, store_contents
-from .study_command import progress
 from .trials import ABS, CLE, CLZ, CONTROLLERS, TRIALS, Sailed, Trial, gains, sailed, scenario
 
 CL = ("controller_cl_win_eps", "controller_cl_win_z2", "controller_cl_svd_eps", "controller_cl_svd_z2")

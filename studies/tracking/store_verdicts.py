@@ -1,8 +1,9 @@
 """What chapter 5 says of the store, each with the result of our runs."""
 
-from .monte_carlo import interval
+from ..monte_carlo import interval
+from ..study_report import Verdict
 from .outcome import columns
-from .verdict import FOUR, ORDERS, PRINTED, Paths, Table, Verdict, error, in_order, short
+from .verdict import FOUR, ORDERS, PRINTED, Paths, Table, error, in_order, short
 
 MUCH = 3.0  # times an error that count as suffering; chosen
 FULL = 0.01  # sigma_min from which Condition 1 holds, ``rank_tolerance``

@@ -3,10 +3,11 @@
 from collections.abc import Mapping, Sequence
 from math import isnan
 
+from ..monte_carlo import Interval
+from ..study_report import Verdict
+from ..tracking.verdict import listed
 from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
-from .monte_carlo import Interval
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
-from .verdict import Verdict, listed
 
 MUCH = 1.5  # times that count as "substantially"; chosen
 

@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..monte_carlo import Interval, interval, paired
+from ..study_report import Report, Verdict
 from .estimates_replayed import OBSERVERS, SIGNALS
-from .monte_carlo import Interval, interval, paired
-from .study_report import Report
 
 Runs = Mapping[str, Sequence[Mapping[str, Mapping[str, float]]]]
-Row = tuple[str, str, str]
 
 
 def _each(found: Runs, variant: str, observer: str, measure: str) -> list[float]:
@@ -31,7 +30,7 @@ def _verdict(holds: bool) -> str:
     return "reproduced" if holds else "not reproduced"
 
 
-def lag_and_noise(found: Runs) -> Row:
+def lag_and_noise(found: Runs) -> Verdict:
     clean = "rich, no freezes"
     others = ("nonlinear", "luenberger")
     lags = all(_less(found, clean, "lag_u", o, "mdf") for o in others)
@@ -47,42 +46,42 @@ def lag_and_noise(found: Runs) -> Row:
         (False, True): "less noise reproduced, lag not",
     }.get((lags, quiet), "not reproduced")
     gains = "K_1 = 6 1/s, K_2 = 9 1/s²; others: `python -m studies.observer_gains`"
-    return said, verdict, f"u, rich without freezes, {gains}: {numbers}"
+    return Verdict(said, verdict, f"u, rich without freezes, {gains}: {numbers}")
 
 
-def held(found: Runs) -> Row:
+def held(found: Runs) -> Verdict:
     mdf, df = (_mean(found, "rich", o, "held") for o in ("mdf", "df"))
     holds = abs(mdf.mean - 1.0) < 0.05 and abs(df.mean) < 0.5
     numbers = f"share of u left after a freeze of at least 0.5 s: MDF {mdf}, DF {df}"
     said = "During a freeze the MDF keeps the velocity constant, the DF takes it to zero"
-    return said, _verdict(holds), numbers
+    return Verdict(said, _verdict(holds), numbers)
 
 
-def spikes(found: Runs) -> Row:
+def spikes(found: Runs) -> Verdict:
     holds = _less(found, "rich", "after_freeze_u", "mdf", "df")
     numbers = ", ".join(f"{o} {_mean(found, 'rich', o, 'after_freeze_u')} m/s" for o in OBSERVERS)
     said = "The spikes after a freeze are smaller with the MDF than with the DF"
-    return said, _verdict(holds), f"largest error of u within 1 s of a freeze, rich: {numbers}"
+    return Verdict(said, _verdict(holds), f"largest error of u within 1 s of a freeze, rich: {numbers}")
 
 
-def robust(found: Runs) -> Row:
+def robust(found: Runs) -> Verdict:
     holds = all(_less(found, "rich", "after_freeze_u", "df", o) for o in ("nonlinear", "luenberger"))
     numbers = ", ".join(
         f"{o} {_mean(found, 'rich', o, 'after_freeze_u')} m/s" for o in ("df", "nonlinear", "luenberger")
     )
     said = "The DF takes the jump after a freeze better than the nonlinear and the Luenberger observer"
-    return said, _verdict(holds), f"largest error of u within 1 s of a freeze, rich: {numbers}"
+    return Verdict(said, _verdict(holds), f"largest error of u within 1 s of a freeze, rich: {numbers}")
 
 
-def wrap(found: Runs) -> Row:
+def wrap(found: Runs) -> Verdict:
     df, mdf = (_mean(found, "ellipse", o, "after_wrap_r") for o in ("df", "mdf"))
     holds = df.mean > 1.0 > 10.0 * mdf.mean
     said = "The DF does not handle a wrap of the heading, the MDF does"
     numbers = f"largest error of r within 1 s of a wrap, ellipse: DF {df} rad/s, MDF {mdf} rad/s"
-    return said, _verdict(holds), numbers
+    return Verdict(said, _verdict(holds), numbers)
 
 
-def stuck(found: Runs) -> Row:
+def stuck(found: Runs) -> Verdict:
     upsets = "ellipse, upsets"
     counts = {o: sum(_each(found, upsets, o, "stuck")) for o in OBSERVERS}
     lost = [o for o in ("nonlinear", "luenberger") if counts[o] > 0.0]
@@ -90,7 +89,7 @@ def stuck(found: Runs) -> Row:
     verdict = f"reproduced for {' and '.join(lost)}" if lost else "mended: their velocity is limited"
     numbers = ", ".join(f"{o} {count:.0f}" for o, count in counts.items())
     runs = len(found[upsets])
-    return (
+    return Verdict(
         said,
         verdict,
         f"of {runs} runs with NaN, zeros and spikes of 10 m and 1 km left without: {numbers}",
@@ -101,8 +100,7 @@ def write(report: Report, found: Runs) -> None:
     """The table of claims, and what is new here: how far the Kalman filter is ahead."""
     rows = [claim(found) for claim in (lag_and_noise, held, spikes, robust, wrap, stuck)]
     report.heading("What the thesis says, and what comes out here")
-    report.table(["thesis", "here", "numbers"], rows, words=True)
-    report.result("claims", [dict(zip(("thesis", "here", "numbers"), row, strict=True)) for row in rows])
+    report.verdicts("claims", rows)
     report.heading("The Kalman filter beside the best of the others")
     report.text(
         "RMS error of the Kalman filter divided by that of whichever other observer is best for this "

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from ..study_report import Verdict
+from ..tracking.verdict import listed, worse
 from .found import BLOCKED, FRESH, OPENED, PRINTED, REGULAR, Found, kept, lost, mean, share
 from .margin import margins
 from .store_contents import StoreContents
 from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
-from .verdict import Verdict, listed, worse
 
 DELAYS = (0.0, 0.1, 0.3, 0.5, 1.0)
 SWINGS = 3.0  # times the swing without delay that count as an oscillation

@@ -6,7 +6,7 @@ from itertools import cycle
 import numpy as np
 from matplotlib.figure import Figure
 
-from .outcome import AXES, Log, missing
+from ..tracking.outcome import AXES, Log, missing
 
 UNITS = ("m", "m", "rad")
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")

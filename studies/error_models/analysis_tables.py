@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from diagnosis import analysis
 from diagnosis.analysis import NU, OMEGA, TAU, Regressed, Samples, correlations
 
-from .outcome import AXES, Log
-from .study_report import Report
+from ..study_report import Report
+from ..tracking.outcome import AXES, Log
 
 RECIPES = ("PLS1", "PLS2", "PLS3", "PLS4")
 POINTS = 2000  # at most in a scatter plot; chosen

@@ -12,7 +12,7 @@ import numpy as np
 from cosim.dispatch import FinishedRun
 from fmus.declare import Component, packer, variables
 
-from .estimates_replayed import Log, parameters
+from ..observers.estimates_replayed import Log, parameters
 
 WITHIN = 1.0  # s after a spike in which an observer's estimate still shows it
 

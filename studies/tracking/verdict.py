@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from scipy import stats
 
-from .monte_carlo import Interval, interval, ratio
+from ..monte_carlo import Interval, interval, ratio
+from ..study_report import Verdict
 from .outcome import TRUE_PHI, Outcome, columns
 
 FOUR = ("controller_cl_svd_eps", "controller_cl_svd_z2", "controller_cl_win_eps", "controller_cl_win_z2")
@@ -24,12 +25,6 @@ NEAR = 0.1  # of a coefficient, within which an estimate counts as converged; ch
 
 Table = Mapping[str, Mapping[str, list[Outcome]]]
 Paths = Mapping[str, Table]
-
-
-class Verdict(NamedTuple):
-    thesis: str
-    here: str
-    numbers: str
 
 
 def short(controller: str) -> str:

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from .monte_carlo import Interval, interval
+from ..monte_carlo import Interval, interval
+from ..tracking.verdict import finite_ratio
 from .store_contents import StoreContents
 from .trials import Sailed
-from .verdict import finite_ratio
 
 Runs = Mapping[str, Sequence[Sailed]]
 REGULAR, FAULTY = False, True

@@ -6,10 +6,11 @@ import numpy as np
 
 from fmus.hull import Inertia, mass_matrix
 
+from ..study_report import Verdict
+from ..tracking.verdict import finite_ratio, listed, worse
 from .causes import of_causes
 from .found import FAULTY, REGULAR, Found, kept, label, lost, mean, share, values
 from .trials import ABS, CLE, CLZ, HARD, LABELS, RBS, TRIALS
-from .verdict import Verdict, finite_ratio, listed, worse
 
 
 def guidance(found: Found) -> Verdict:

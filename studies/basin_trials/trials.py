@@ -11,9 +11,9 @@ from cosim.dispatch import FinishedRun
 from cosim.scenario import Roles
 from diagnosis.analysis import model_error
 
+from ..monte_carlo import Content, shipped, vary
+from ..tracking.outcome import AXES, SETTLED, Log, quick, rms
 from . import sysid4
-from .monte_carlo import Content, shipped, vary
-from .outcome import AXES, SETTLED, Log, quick, rms
 
 RBS, ABS = "controller_bs", "controller_abs"
 CLZ, CLE = "controller_cl_win_z2", "controller_cl_win_eps"

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from diagnosis import DiagnosisContent, EffectResult, Evaluation, Model
 
+from ..study_report import Report
 from . import bollard
 from .expected import AXES, BY_HAND, CURVE_WITHIN, STEERED, Fall, expectations, reason, wanted
 from .leave_one_out import Fold, at_full_power, commanded, fall, steered
-from .study_report import Report
 
 UNITS = ("N", "N", "N m")
 RUNS_AWAY = "runs away"

@@ -11,12 +11,11 @@ from diagnosis import analysis
 from diagnosis.analysis import Regressed
 from diagnosis.model import Model
 
+from ..basin_trials.trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
+from ..monte_carlo import Content, run_all, vary
+from ..study_report import Report, Verdict
+from ..tracking.outcome import LEARNED_FROM, Log, rms
 from .lap_pictures import errors_picture, force_picture
-from .monte_carlo import Content, run_all, vary
-from .outcome import LEARNED_FROM, Log, rms
-from .study_report import Report
-from .trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
-from .verdict import Verdict
 
 SLOW, EIGHT = TRIALS[0], TRIALS[1]
 TRACK = ["vessel.x", "vessel.y", "guidance.x_t", "guidance.y_t"]

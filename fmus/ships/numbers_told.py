@@ -1,0 +1,120 @@
+"""Numbers of a ship's file: in SI or in prime units, where each comes from, and how well it is known."""
+
+import re
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, PositiveFloat, Tag, model_validator
+
+from ..base_units import base_exponents
+from ..declare import DeclarationError
+from ..ship_description import Value
+
+FACTOR = re.compile(r"\|[uvr]\||[uvr]")  # of a product of speeds
+
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+
+
+class Strict(BaseModel):
+    """A table in which a key that is not known is an error."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+class Number(Strict):
+    """A number, where it comes from, and its standard deviation."""
+
+    value: Finite | None = Field(None, description="in SI units")
+    prime: Finite | None = Field(None, description="in place of value: in prime units, see prime")
+    origin: str = Field("guessed", description="weighed, tank test, borrowed, guessed, or a publication")
+    std: PositiveFloat | None = Field(
+        None, description="standard deviation in the number's unit", allow_inf_nan=False
+    )
+    share: float | None = Field(
+        None, ge=0.0, le=10.0, description="standard deviation as a share of the value; 0: exact"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> "Number":
+        if (self.value is None) == (self.prime is None):
+            raise ValueError("a number has value or prime")
+        if self.std is not None and self.share is not None:
+            raise ValueError("a number has std or share, not both")
+        if self.std is not None and 0.0 in (self.value, self.prime):
+            raise ValueError("a number that is 0 has no std: it stays as it is")
+        return self
+
+    def named(self, name: str, unit: str, of: "Prime | None") -> Value:
+        """The number as components read it.
+
+        Args:
+            name: of the parameter.
+            unit: of the parameter.
+            of: what a number in prime units is over.
+
+        Raises:
+            DeclarationError: it is in prime units, of a unit that has none or on a ship that has none.
+        """
+        size = 1.0 if self.prime is None else _size(name, unit, of)
+        value = size * (self.prime or self.value or 0.0)
+        share = 0.5 if self.share is None else self.share
+        if self.std is not None:
+            share = size * self.std / abs(value)
+        return Value(name, value, self.origin, share)
+
+
+class Prime(NamedTuple):
+    """What numbers in prime units are over: length L [m], and mass rho L^2 d / 2 [kg]."""
+
+    length: float
+    mass: float
+
+
+def _size(name: str, unit: str, of: Prime | None) -> float:
+    if of is None:
+        raise DeclarationError(f"{name}: a number in prime units needs the table 'prime'")
+    powers = base_exponents(unit)
+    if powers.get("s"):
+        raise DeclarationError(f"{name}: a number in {unit} has no prime unit without a speed")
+    return of.mass ** powers.get("kg", 0) * of.length ** powers.get("m", 0)
+
+
+def _form(given: Any) -> str:
+    return "table" if isinstance(given, (dict, Number)) else "number"
+
+
+Given = Annotated[
+    Annotated[Finite, Tag("number")] | Annotated[Number, Tag("table")], Discriminator(_form)
+]
+
+
+def valued(name: str, given: "float | Number", unit: str, of: Prime | None) -> Value:
+    number = given if isinstance(given, Number) else Number.model_validate({"value": given})
+    return number.named(name, unit, of)
+
+
+def _speed(factor: str) -> int:
+    """The place of a factor's speed among u, v and r."""
+    return "uvr".index(factor.strip("|"))
+
+
+class Term(Number):
+    """A damping force: a coefficient times a product of u, v, r, |u|, |v| and |r|."""
+
+    axis: Annotated[str, Field(pattern="^[XYN]$", description="X, Y or N")]
+    product: Annotated[str, Field(max_length=40, description="such as u, |u|u, uv or |v|r")]
+
+    @property
+    def name(self) -> str:
+        """The name of the coefficient, absolute values first, as in Y_absr_v."""
+        factors = FACTOR.findall(self.product)
+        sizes = [f"abs{x[1]}_" for x in sorted(factors, key=_speed) if len(x) == 3]
+        speeds = [x for x in sorted(factors, key=_speed) if len(x) == 1]
+        return "".join([f"{self.axis}_", *sizes, *speeds]).removesuffix("_")
+
+    @model_validator(mode="after")
+    def _is_product(self) -> "Term":
+        if not self.product or FACTOR.sub("", self.product):
+            raise ValueError(
+                f"'{self.product}' is no product of u, v, r, |u|, |v| and |r|, as |u|u or uv is"
+            )
+        return self

@@ -1,0 +1,1 @@
+"""The measured ship: each run left out in turn, targets, bollard pulls, tables."""

@@ -1,0 +1,223 @@
+"""Redundant channels of a run: a fault is named with its size, a clean run has none, and a repair closes."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.measured import DATA
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Run
+from diagnosis import repair as command
+from diagnosis.data.telegrams import filled
+from diagnosis.sensors import closure, examine
+from diagnosis.sensors.wraps import unwrapped
+from fmus.scale import CSE1, Scale
+
+H, SECONDS = 0.1, 160.0
+NOISE = (1e-3, 1e-3, 1e-3)
+
+
+def made(seed=0, turning=1.0):
+    """A run along bends by its velocities, all channels with noise."""
+    fine = 20
+    t = np.arange(round(SECONDS / H) * fine + 1) * H / fine
+    u = 0.25 + 0.08 * np.sin(0.21 * t)
+    v = 0.03 * np.sin(0.37 * t + 1.0)
+    r = turning * (0.12 * np.sin(0.29 * t) + 0.05 * np.sin(0.11 * t))
+    psi = np.cumsum(r) * H / fine
+    x = np.cumsum(u * np.cos(psi) - v * np.sin(psi)) * H / fine
+    y = np.cumsum(u * np.sin(psi) + v * np.cos(psi)) * H / fine
+    at = slice(None, None, fine)
+    rng = np.random.default_rng(seed)
+    pose = np.column_stack([x, y, psi])[at]
+    nu = np.column_stack([u, v, r])[at]
+    pose = pose + NOISE * rng.standard_normal(pose.shape)
+    nu = nu + 2e-3 * rng.standard_normal(nu.shape)
+    measured = dict(zip(("u", "v", "r"), nu.T, strict=True))
+    tau = np.column_stack([0.5 + 0.1 * np.sin(t[at]), 0.1 * np.cos(t[at]), 0.1 * np.sin(0.5 * t[at])])
+    return Run("made", t[at], pose, tau, measured=measured)
+
+
+def beside(run, **channels):
+    return replace(run, measured=dict(run.measured) | channels)
+
+
+def told(run, scale=CSE1):
+    return {(f.channel, f.kind): f for f in examine(run, scale).findings}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_nothing_is_told_of_a_clean_run(seed):
+    found = examine(made(seed), CSE1)
+    assert found.findings == ()
+    assert found.run.time.size == made(seed).time.size
+    assert set(found.agreeing) == {"u", "v", "r"}
+
+
+CONSTANT = {
+    "speed scale": (("u", "scale"), 0.95, lambda r: beside(r, u=0.95 * r.measured["u"], v=0.95 * r.measured["v"])),
+    "rate scale": (("r", "scale"), 1.05, lambda r: beside(r, r=1.05 * r.measured["r"])),
+    "rate offset": (("r", "offset"), 0.01, lambda r: beside(r, r=0.01 + r.measured["r"])),
+    "place": (("x", "place"), 0.3, lambda r: beside(r, v=r.measured["v"] - 0.3 * r.measured["r"])),
+    "axis": (("psi", "offset"), 0.04, lambda r: replace(r, pose=r.pose + np.array([0.0, 0.0, 0.04]))),
+    "late": (("r", "delay"), 0.5, lambda r: beside(r, r=np.interp(r.time - 0.5, r.time, r.measured["r"]))),
+    "even clock": (("time", "clock_rate"), 1.1, lambda r: replace(r, time=r.time / 1.1)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONSTANT)
+def test_a_constant_fault_is_named_with_its_size_and_repaired(name):
+    key, value, put = CONSTANT[name]
+    broken = put(made())
+    found = examine(broken, CSE1)
+    assert [(f.channel, f.kind) for f in found.findings] == [key]
+    assert found.findings[0].value == pytest.approx(value, rel=0.1)
+    assert not told(found.run)
+    assert closure(found.run, 30.0, 10.0).position < 0.02
+
+
+def test_a_unit_of_the_rate_is_named():
+    found = told(beside(made(), r=np.degrees(made().measured["r"])))
+    assert "deg/s in place of rad/s" in found["r", "scale"].sentence
+
+
+def test_findings_do_not_depend_on_where_and_how_the_earth_lies():
+    run = beside(made(), r=1.05 * made().measured["r"])
+    turn = 2.0
+    c, s = np.cos(turn), np.sin(turn)
+    x, y, psi = run.pose.T
+    other = replace(run, pose=np.column_stack([c * x - s * y + 1e3, s * x + c * y - 5e3, psi + turn]))
+    a, b = told(run)["r", "scale"].value, told(other)["r", "scale"].value
+    assert a == pytest.approx(b, abs=1e-4)
+
+
+def test_a_clock_that_wanders_is_told_by_its_stretches_and_repaired():
+    run = made()
+    log = run.time + 0.1 * 60.0 / (2.0 * np.pi) * np.sin(2.0 * np.pi * run.time / 60.0)
+    found = examine(replace(run, time=log), CSE1)
+    rates = [f for f in found.findings if f.kind == "clock_rate"]
+    assert len(rates) >= 3
+    assert min(f.value for f in rates) < 0.96
+    assert max(f.value for f in rates) > 1.04
+    assert {f.kind for f in found.findings} == {"clock_rate"}
+    between = found.run.time - found.run.time[0] - (run.time - run.time[0])
+    assert np.abs(between).max() < 0.2  # s; the log is up to 1.9 s off
+    assert (
+        closure(found.run, 30.0, 10.0).position
+        < 0.3 * closure(replace(run, time=log), 30.0, 10.0).position
+    )
+
+
+def test_seconds_that_the_log_lacks_are_told():
+    run = made()
+    keep = (run.time < 80.0) | (run.time > 90.0)
+    cut = run.rows(keep)
+    found = examine(replace(cut, time=np.where(cut.time < 80.0, cut.time, cut.time - 10.0)), CSE1)
+    (gap,) = found.findings
+    assert gap.kind == "clock_gap"
+    assert gap.ci95[0] < 10.0 < gap.ci95[1]
+    assert np.diff(found.run.time).max() == pytest.approx(gap.value, abs=0.3)
+
+
+def test_without_turns_clock_and_scale_are_one_and_learning_is_refused():
+    straight = made(turning=0.0)
+    run = beside(straight, u=0.9 * straight.measured["u"], v=0.9 * straight.measured["v"])
+    found = told(run)["u", "scale"]
+    assert found.alike == ("clock_rate",)
+    assert not found.repaired
+    with pytest.raises(InputError, match="a clock that runs at this rate would look the same"):
+        diagnosis.gather([run])
+    assert diagnosis.gather([run], anyway=True)
+
+
+def test_an_angle_interpolated_through_its_wrap_is_put_on_the_short_way():
+    true = np.linspace(5.9, 6.7, 33)
+    telegrams = np.mod(true[::4], 2.0 * np.pi)
+    seen = np.interp(np.arange(33), np.arange(0, 33, 4), telegrams)
+    repaired, rows = unwrapped(seen)
+    assert rows.size == 3
+    np.testing.assert_allclose(np.mod(repaired, 2.0 * np.pi), np.mod(true, 2.0 * np.pi), atol=1e-9)
+    assert unwrapped(np.mod(true, 2.0 * np.pi))[1].size == 0
+
+
+def test_rows_between_telegrams_do_not_count():
+    rng = np.random.default_rng(0)
+    at = np.arange(0.0, 200.0, 2.0)
+    position = np.cumsum(rng.normal(size=(at.size, 2)), axis=0)
+    t = np.arange(0.0, at[-1], 0.5)
+    line = np.column_stack([np.interp(t, at, column) for column in position.T]).round(3)
+    kept = t[~filled(t, line)]
+    assert 0.9 * at.size < kept.size < 1.1 * at.size
+    assert np.abs(kept[:, None] - at).min(axis=1).max() <= 0.5
+    assert not filled(t, line + 0.01 * rng.normal(size=line.shape)).any()
+
+
+def test_a_second_antenna_has_its_place():
+    run = made()
+    x, y, psi = run.pose.T
+    c, s = np.cos(psi), np.sin(psi)
+    second = {"x_2": x + 0.5 * c + 0.2 * s, "y_2": y + 0.5 * s - 0.2 * c, "psi_2": psi + 0.03}
+    found = told(beside(run, **second))
+    assert found["x_2", "place"].value == pytest.approx(0.5, abs=0.01)
+    assert found["y_2", "place"].value == pytest.approx(-0.2, abs=0.01)
+    assert found["psi_2", "offset"].value == pytest.approx(0.03, abs=1e-3)
+
+
+def test_the_smoother_is_sharper_with_channels_that_agree():
+    run = made()
+    rough = replace(run, pose=run.pose + 0.02 * np.random.default_rng(3).standard_normal(run.pose.shape))
+    agreeing = examine(rough, CSE1).agreeing
+    alone = diagnosis.smooth(diagnosis.clean(rough))
+    both = diagnosis.smooth(diagnosis.clean(rough), agreeing=agreeing)
+    assert (np.nanmean(both.nu_std, axis=0) < 0.5 * np.nanmean(alone.nu_std, axis=0)).all()
+    assert np.nanstd(both.nu[:, 2] - run.measured["r"]) < np.nanstd(alone.nu[:, 2] - run.measured["r"])
+
+
+def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
+    run = made()
+    pose = dict(zip(("x", "y", "psi"), run.pose.T, strict=True))
+    tau = dict(zip(("tau_X", "tau_Y", "tau_N"), run.tau_cmd.T, strict=True))
+    late = dict(run.measured) | {"r": 1.05 * run.measured["r"]}
+    pd.DataFrame({"time": run.time, **pose, **tau, **late}).to_csv(tmp_path / "a.csv", index=False)
+    told_beside = {"columns": {"r": {"name": "r", "noise": 0.002}}}
+    (tmp_path / "a.csv.json").write_text(json.dumps(told_beside))
+    assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
+    assert "r read 5.0% too much" in capsys.readouterr().out
+    again = diagnosis.read(tmp_path / "b.csv")
+    assert not told(again)
+    assert again.noise == {"r": 0.002}
+    assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 2
+
+
+def test_of_a_pose_alone_nothing_can_be_said(tmp_path, capsys):
+    run = made()
+    columns = dict(
+        zip(("x", "y", "psi", "tau_X", "tau_Y", "tau_N"), [*run.pose.T, *run.tau_cmd.T], strict=True)
+    )
+    pd.DataFrame({"time": run.time, **columns}).to_csv(tmp_path / "a.csv", index=False)
+    assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 0
+    assert "nothing says the same twice" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trial", ["trial_1", "trial_2"])
+def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
+    path = DATA / "gunnerus" / f"{trial}.csv"
+    if not path.is_file():
+        pytest.skip("no sea trial: CYBERSHIP_DATA names no folder that has it")
+    d = pd.read_csv(path)
+    zero = np.zeros((len(d), 3))
+    measured = {"u": d.u.to_numpy(), "v": d.v.to_numpy(), "r": np.radians(d.r.to_numpy())}
+    pose = np.column_stack([d.N, d.E, np.radians(d.psi)])
+    run = Run(trial, d.tvec.to_numpy(), pose, zero, measured=measured)
+    found = examine(run, Scale(33.9 / 1.105))
+    after = closure(found.run, 60.0, 20.0)
+    assert closure(run, 60.0, 20.0).position > 8.0
+    assert after.position < 2.0
+    assert np.degrees(after.heading) < 1.0
+    scale = next(f for f in found.findings if f.kind == "scale")
+    assert scale.value == pytest.approx(0.98, abs=0.005)
