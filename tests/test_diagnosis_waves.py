@@ -5,7 +5,7 @@ import pytest
 from support.cases import in_part
 from support.measured import sail, smoothed
 
-from diagnosis.identification.waves import find_waves, followed
+from diagnosis.identification.waves import AROUND, PEAK, find_waves, followed, inside, peak
 from diagnosis.model import Model
 
 MASS = Model().reference_mass
@@ -44,3 +44,17 @@ def test_half_of_a_motion_is_followed_where_a_quarter_of_the_noise_is_left():
     noise = S**2 * np.diag(MASS) ** 2 * white * (2.0 * np.pi * f[:, None]) ** 4
     np.testing.assert_allclose(followed(f, noise, white, MASS), S, atol=0.12)
     assert (followed(f, noise / S**2, white, MASS) == 1.0).all(), "without a corner all is followed"
+
+
+@pytest.mark.parametrize(("line", "found"), [(0.0, False), (30.0, True)])
+def test_the_flank_of_a_slow_motion_is_no_peak(line, found):
+    """A spectrum that falls steeply into the band is above its median there; a line on it is a peak."""
+    frequency = np.arange(126) * 0.04
+    slow = 1.0 + 1e3 * np.exp(-frequency / 0.06) * (1.0 + 0.2 * np.cos(60.0 * frequency))
+    power = slow * (1.0 + line * np.exp(-(((frequency - 0.5) / 0.04) ** 2)))
+    ones = np.ones((frequency.size, 3))
+    band = inside(frequency)[:, None] & np.ones((1, 3), bool)
+    _, highest = peak(frequency, power[:, None] * ones, ones, band, AROUND)
+    assert (highest.height > PEAK) == found
+    if found:
+        assert frequency[highest.row] == pytest.approx(0.5, abs=0.05)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import spectrogram
+from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 
@@ -25,7 +25,7 @@ from ..smoothing import Smoothed, smooth
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
-PEAK = 4.0  # times the spectrum around it
+PEAK = 4.0  # times the spectrum around it, and its own flanks
 FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes from the commands
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, width of the spectrum around
@@ -187,7 +187,11 @@ def peak(
     width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
-    height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
+    # Where the error of a slow motion falls towards the band, its flank is above the median, and no peak.
+    above = np.zeros_like(band)
+    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
+        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
+    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
 
