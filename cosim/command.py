@@ -25,6 +25,7 @@ __all__ = [
     "printable",
     "program",
     "run_command",
+    "whole_number",
 ]
 
 # Exit codes; 130 is what shells report after Ctrl-C (128 + SIGINT).
@@ -71,6 +72,18 @@ def complain(message: object, kind: str = "error: ") -> None:
 def program(module: str) -> str:
     """The name of a command in its usage line: ``cybership NAME`` if that began it."""
     return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
+
+
+def whole_number(least: int) -> Callable[[str], int]:
+    """Type of an option that takes a whole number from 0, 1 or 2 on."""
+    wanted = ("from zero on", "above zero", "from two on")[least]
+
+    def of(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"needs a whole number {wanted}, not '{text}'")
+        return int(text)
+
+    return of
 
 
 def folder_name(text: str) -> Path:

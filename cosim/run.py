@@ -22,6 +22,7 @@ from .command import (
     printable,
     program,
     run_command,
+    whole_number,
 )
 from .compiled.library import NATIVE, kind_of
 from .errors import InputError, SimulationError
@@ -206,18 +207,6 @@ def _positive(text: str) -> float:
     return value
 
 
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"needs a whole number from zero on, not '{text}'")
-    return int(text)
-
-
-def _members(text: str) -> int:
-    if not text.isdecimal() or int(text) < 2:
-        raise argparse.ArgumentTypeError(f"needs a whole number from two on, not '{text}'")
-    return int(text)
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=program("cosim.run"),
@@ -247,7 +236,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME|FILE.toml",
         help="another ship for FMUs with a bare name: a shipped one, or a description of your own",
     )
-    parser.add_argument("--seed", type=_seed, metavar="N", help="another seed of noise and faults")
+    parser.add_argument(
+        "--seed", type=whole_number(0), metavar="N", help="another seed of noise and faults"
+    )
     parser.add_argument(
         "--set",
         metavar="PATH=VALUE",
@@ -291,7 +282,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--ensemble",
-        type=_members,
+        type=whole_number(2),
         metavar="N",
         help="run N ships whose parameters are drawn from --posterior; bands of track and heading",
     )

@@ -11,13 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import cosim
-from cosim.command import BAD_INPUT, FAILED, folder_name, run_command
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"needs a whole number above zero, not '{text}'")
-    return int(text)
+from cosim.command import BAD_INPUT, FAILED, folder_name, run_command, whole_number
 
 
 def study_parser(
@@ -45,11 +39,11 @@ def study_parser(
     )
     if seeds is not None:
         parser.add_argument(
-            "--seeds", type=_count, metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
+            "--seeds", type=whole_number(1), metavar="N", default=seeds, help=f"seeds 0 to N-1 ({seeds})"
         )
     if jobs:
         parser.add_argument(
-            "--jobs", type=_count, metavar="N", help="runs at a time (one for each core)"
+            "--jobs", type=whole_number(1), metavar="N", help="runs at a time (one for each core)"
         )
     parser.add_argument(
         "--quick", action="store_true", help="few seeds and short runs, for a first look"

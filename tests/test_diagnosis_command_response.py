@@ -1,12 +1,11 @@
 """The response to the commands: known motions, gains found again, and no harm where nothing is known."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 from support.cases import slow
-from support.measured import DATA, NOISE, needs_data, sail
+from support.measured import DATA, NOISE, base, needs_data, true_nu
 
 from diagnosis import Run, clean, read, smooth
 from diagnosis.smoothing.command_motion import FORGETTING, Commands
@@ -14,20 +13,6 @@ from diagnosis.smoothing.spline import knots
 
 N = 3000
 INNER = slice(100, -100)
-
-
-@cache
-def sailed():
-    """The run that is varied, and its true velocity (n, 3)."""
-    return sail(60.0)
-
-
-def base():
-    return sailed()[0]
-
-
-def true_nu():
-    return sailed()[1]
 
 
 def commands(track, psi):

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.linalg import cholesky_banded
-from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
+from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoothed, true_nu
 
 from diagnosis import InputError, Run, clean, read, smooth
 from diagnosis.smoothing.likelihood import Criterion, likeliest
@@ -26,20 +26,6 @@ pytestmark = pytest.mark.numerical
 N = 3000
 INNER = slice(100, -100)
 JERK = np.array([2e-5, 5e-6, 2e-4])
-
-
-@cache
-def sailed():
-    """The run that is varied, and its true velocity (n, 3)."""
-    return sail(60.0)
-
-
-def base():
-    return sailed()[0]
-
-
-def true_nu():
-    return sailed()[1]
 
 
 @cache

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from support.cases import slow
 from support.command import command
 from support.measured import DATA, needs_data
 
@@ -30,7 +31,7 @@ def sailed(tmp_path_factory):
     return folder
 
 
-def as_file(sailed, kind, folder, trial="same", noise=0.002, **others):
+def as_file(sailed, kind, folder, trial: str | None = "same", noise=0.002, **others):
     """The measurement of a run as a file, 10 samples a second, with a file beside."""
     log = cosim.read_log(sailed / kind, COLUMNS)
     table = pd.DataFrame({new: log[old][::5] for new, old in zip(NAMES, COLUMNS, strict=True)})
@@ -43,7 +44,7 @@ def as_file(sailed, kind, folder, trial="same", noise=0.002, **others):
     return folder / f"{kind}.csv"
 
 
-@pytest.mark.parametrize("kind", ["zigzag", "circle"])
+@pytest.mark.parametrize("kind", ["zigzag", slow("circle")])
 def test_a_measured_trial_has_the_measures_of_the_simulated_one(sailed, tmp_path, kind):
     file = as_file(sailed, kind, tmp_path)
     done = command(trial_main, file, "--ship", "otter", "--out", tmp_path / "measured")
@@ -140,7 +141,7 @@ TANKER = {"time": "t", "psi": {"name": "psi_deg", "unit": "deg"}, "propeller.n":
 
 @needs_data
 @pytest.mark.parametrize(
-    ("name", "check"), [("z_10_10_p", 10.0), ("z_10_10_s", 10.0), ("z_20_10_s", 10.0)]
+    ("name", "check"), [("z_10_10_p", 10.0), slow(("z_10_10_s", 10.0)), slow(("z_20_10_s", 10.0))]
 )
 def test_zigzags_of_the_tanker(name, check, tmp_path):
     """The order turns at the heading that the file's name tells, and 10/10 is as the basin's."""

@@ -176,6 +176,20 @@ def test_import_installs_no_handlers():
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+def interrupt_twice(tmp_path):
+    """Ctrl-C, two times, for a run that has come to where its FMU hangs."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim.run", tmp_path / "s.json", "--out", tmp_path / "out"],
+        cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdout.readline() == "here\n"
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+    _, stderr = process.communicate(timeout=30)
+    assert faults(process.returncode, stderr, tmp_path / "out", {130}) == []
+
+
 @linux_only
 @pytest.mark.parametrize(
     "hang", ["while True: pass", "__import__('ctypes').PyDLL(None).sleep(1000)"], ids=["Python", "C"]
@@ -187,16 +201,7 @@ def test_second_ctrl_c_ends_a_hanging_fmu(plain_fmu, tmp_path, hang):
         f"if t > 0.095:\n    print('here', flush=True)\n    {hang}\nreturn True",
     )
     (tmp_path / "s.json").write_text(json.dumps(alone(fmu)))
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cosim.run", tmp_path / "s.json", "--out", tmp_path / "out"],
-        cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    assert process.stdout.readline() == "here\n"
-    for _ in range(2):
-        process.send_signal(signal.SIGINT)
-        time.sleep(0.3)
-    _, stderr = process.communicate(timeout=30)
-    assert faults(process.returncode, stderr, tmp_path / "out", {130}) == []
+    interrupt_twice(tmp_path)
     assert len(cosim.read_log(tmp_path / "out")["time"]) >= 10
 
 
@@ -204,16 +209,7 @@ def test_second_ctrl_c_ends_a_hanging_fmu(plain_fmu, tmp_path, hang):
 def test_ctrl_c_ends_an_fmu_that_hangs_while_it_terminates(plain_fmu, tmp_path):
     hang = "def stay():\n    print('here', flush=True)\n    while True: pass\nself.terminate = stay"
     (tmp_path / "s.json").write_text(json.dumps(alone(plain_fmu("Stays", f"{GAIN}\n{hang}\n"))))
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cosim.run", tmp_path / "s.json", "--out", tmp_path / "out"],
-        cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    assert process.stdout.readline() == "here\n"
-    for _ in range(2):
-        process.send_signal(signal.SIGINT)
-        time.sleep(0.3)
-    _, stderr = process.communicate(timeout=30)
-    assert faults(process.returncode, stderr, tmp_path / "out", {130}) == []
+    interrupt_twice(tmp_path)
     assert len(cosim.read_log(tmp_path / "out")["time"]) == 21
 
 

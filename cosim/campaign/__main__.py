@@ -17,7 +17,17 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from ..command import BAD_INPUT, FAILED, Output, complain, folder_name, printable, program, run_command
+from ..command import (
+    BAD_INPUT,
+    FAILED,
+    Output,
+    complain,
+    folder_name,
+    printable,
+    program,
+    run_command,
+    whole_number,
+)
 from ..compiled.library import NATIVE
 from ..errors import InputError, SimulationError
 from ..files import atomic_write
@@ -164,12 +174,6 @@ def _number(x: object) -> str:
     return f"{x:.4g}" if isinstance(x, float) else str(x)
 
 
-def _count(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"needs a whole number from zero on, not '{text}'")
-    return int(text)
-
-
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
@@ -194,7 +198,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--workers",
-        type=_count,
+        type=whole_number(0),
         metavar="N",
         help=f"processes on this computer ({os.cpu_count()}); 0: all in this one, without Dask",
     )

@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,21 @@ def sail(
     pose = true + noise * NOISE * np.random.default_rng(seed).standard_normal(true.shape)
     pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
     return Run("made", time, pose, tau_cmd), nu
+
+
+@cache
+def _minute():
+    return sail(60.0)
+
+
+def base():
+    """A run of a minute, to be varied."""
+    return _minute()[0]
+
+
+def true_nu():
+    """Its true velocity (n, 3)."""
+    return _minute()[1]
 
 
 def voyage(seconds, h, ship, thrusters, quick, craft=None, given=commands):
