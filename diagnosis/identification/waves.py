@@ -187,7 +187,7 @@ def peak(
     width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
-    # Where the error of a slow motion falls towards the band, its flank is above the median, and no peak.
+    # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
     above = np.zeros_like(band)
     for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
         above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
