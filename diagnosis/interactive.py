@@ -62,12 +62,8 @@ def load(
     """
     import pandas
 
-    every = sources if isinstance(sources, (list, tuple)) else [sources]
-    if model is None and ship is None:
-        files = [s.folder if isinstance(s, Result) else s for s in every]
-        told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
-        ship = told[0] if told else None
-    model = _model_of(model, ship)
+    every = _listed(sources)
+    model = _model_of(model, ship, every)
     found: list[str | Path | Run] = []
     for k, source in enumerate(every, 1):
         if isinstance(source, pandas.DataFrame):
@@ -82,24 +78,34 @@ def load(
     return gather(found, advance, anyway, model, horizon)
 
 
-def _model_of(model: Model | None, name: str | Path | None) -> Model:
-    """The initial model: a given one, or the nominal one of a ship.
+def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any]) -> Model:
+    """The initial model: a given one, or the nominal one of a ship, by default that of the runs.
 
     Raises:
-        InputError: no such ship, or both are given.
+        InputError: no such ship, model and ship are given, or the runs are of several ships.
     """
-    if model is None:
-        return Model(ship=ship_with((), name))
-    if name is not None:
+    if model is not None and name is not None:
         raise InputError("a model has its ship: give model or ship, not both")
-    return model
+    if model is not None:
+        return model
+    loaded = [w for w in runs if isinstance(w, Integrals)]
+    if loaded and name is None:
+        return session.nominal(loaded)
+    if name is None:
+        files = [run.folder if isinstance(run, Result) else run for run in runs]
+        told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
+        name = told[0] if told else None
+    return Model(ship=ship_with((), name))
 
 
-def _loaded(runs: Any, model: Model | None) -> Sequence[Integrals]:
-    """Runs that were loaded, or are now."""
-    if isinstance(runs, (list, tuple)) and runs and all(isinstance(w, Integrals) for w in runs):
-        return runs
-    return load(runs, model=model)
+def _are_loaded(runs: Any) -> bool:
+    """Whether these are runs from :func:`load`."""
+    return bool(runs) and all(isinstance(w, Integrals) for w in runs)
+
+
+def _listed(runs: Any) -> Sequence[Any]:
+    """Runs or their sources, of which one may stand alone."""
+    return runs if isinstance(runs, (list, tuple)) else [runs]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,10 +200,10 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    if model is not None or ship is not None:
-        model = _model_of(model, ship)
-        shares(model.ship, prior)  # before any work
-    none = isinstance(held_out, (list, tuple)) and not held_out
-    train, test = _loaded(runs, model), () if none else _loaded(held_out, model)
+    given, others = _listed(runs), _listed(held_out)
+    model = _model_of(model, ship, [*given, *others])
+    shares(model.ship, prior)  # before any work
+    train = given if _are_loaded(given) else load(given, model=model)
+    test = others if not others or _are_loaded(others) else load(others, model=model)
     found = session.diagnose(train, test, prior, model, advance, seed, by)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
