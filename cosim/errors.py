@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["InputError", "SimulationError", "nearest"]
+__all__ = ["InputError", "SimulationError", "most_alike", "nearest"]
 
 # Similarity (difflib's ratio, 0 to 1) above which a known name is suggested; chosen: lower ones mislead.
 SIMILAR = 0.5

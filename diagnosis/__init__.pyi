@@ -12,6 +12,7 @@ from .data import Run as Run
 from .data import Track as Track
 from .data import clean as clean
 from .data import read as read
+from .foreign import Fmu as Fmu
 from .gathering import gather as gather
 from .identification import Finding as Finding
 from .identification import Findings as Findings

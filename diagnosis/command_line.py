@@ -20,7 +20,7 @@ from .progress import Advance, progress
 from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
-INPUTS = ("train", "test", "runs", "run", "model", "effects")
+INPUTS = ("train", "test", "runs", "run", "model", "map", "effects")
 RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
 
 

@@ -6,9 +6,12 @@ if __name__ == "__main__":
     watched()  # before all other imports, which take a while
 
 import argparse
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from cosim import InputError
 from cosim.command import run_command
 
 from .command_line import Done, command_of, inputs_of, out_options, parser, run
@@ -16,6 +19,7 @@ from .progress import Advance
 from .result_folder import together
 
 FILES = ("comparison.json", "report.html")
+MAP = "map.json"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,23 +30,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
+    from .foreign import SUFFIX, Fmu, UnmatchedError
     from .gathering import gather
     from .model import Model, read_model, ship_with
     from .report import comparison_content, show_comparison, write_report
 
-    with together(options.out, FILES) as new:
+    path: Path | None = options.model
+    fmu = None if path is None or path.suffix != SUFFIX else Fmu(path, options.map)
+    if options.map is not None and fmu is None:
+        raise InputError(f"--map tells the variables of an FMU: --model NAME{SUFFIX} is missing")
+    files = FILES if fmu is None else (*FILES, MAP)
+    with together(options.out, (*FILES, MAP)) as new:
         craft = ship_with(options.effects, options.ship)
-        model = read_model(options.model, craft) if options.model else Model(ship=craft)
+        model = Model(ship=craft) if path is None or fmu else read_model(path, craft)
         runs = gather(options.runs, advance, options.anyway, model, options.horizon)
-        comparison = session.evaluate(runs, model, advance=advance)
+        try:
+            comparison = session.evaluate(runs, fmu or model, advance=advance)
+        except UnmatchedError as error:
+            raise InputError(f"{error}{_proposed(error.proposal)}") from None
         advance("where it fails")
-        content = comparison_content(comparison, options.model, FILES)
+        content = comparison_content(comparison, path, files)
         (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        if content.fmu is not None:
+            _write_map(new / MAP, content.fmu.map)
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
         write_report(
             new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
         )
     return Done(0, show_comparison(content, str(options.out)))
+
+
+def _write_map(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _proposed(content: Mapping[str, Any]) -> str:
+    """Propose a map in the working directory, unless there is one; what a message says of that."""
+    path = Path(MAP)
+    if path.exists():
+        return f"; complete '{MAP}' for --map, or remove it and another one is proposed"
+    try:
+        _write_map(path, content)
+    except OSError:
+        return "; --map FILE tells them"
+    return f"; '{MAP}' has what is known: complete it, and give it by --map {MAP}"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -51,7 +82,15 @@ def _parser() -> argparse.ArgumentParser:
         "Compare a model with measured runs: how large its error is, and where.",
         "examples:  %(prog)s run1.csv run2.csv\n"
         "           %(prog)s results/ellipse --model model.ssv --out results/after\n"
-        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
+        "           %(prog)s trial.csv --model vendor.fmu --map map.json\n"
+        "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written, but map.json where "
+        "an FMU's names do not tell enough)",
+    )
+    made.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE.json",
+        help="which variables of an FMU are which signals (as their names and units tell)",
     )
     made.add_argument(
         "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -18,6 +19,7 @@ from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
 from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
+from .foreign import Fmu, Use, evaluate_fmu, use_of
 from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Finding, Findings
 from .identification.prior import NominalPrior
@@ -45,10 +47,12 @@ class Comparison:
     Attributes:
         evaluations: one for each run.
         omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
+        use: how an FMU predicts the runs, of which no model error is known; None: it is no FMU.
     """
 
     evaluations: Sequence[Evaluation]
     omega_std: Sequence[np.ndarray]
+    use: Use | None = None
 
     @cached_property
     def before(self) -> ErrorRegions:
@@ -144,7 +148,7 @@ def nominal(runs: Sequence[Integrals]) -> Model:
 @well_posed()
 def evaluate(
     runs: Sequence[Integrals],
-    model: Model | None = None,
+    model: Model | Fmu | str | Path | None = None,
     after: Model | None = None,
     held_out: Sequence[Integrals] = (),
     advance: Advance = silent,
@@ -153,17 +157,25 @@ def evaluate(
 
     Args:
         runs: see :func:`diagnosis.gather`.
-        model: the nominal one of the runs' ship by default.
+        model: the nominal one of the runs' ship by default; an FMU, or the path of one, whose variables
+            are known by their names.
         after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
         advance: receives the name of each step when it begins.
 
     Raises:
-        InputError: the runs are so ill-conditioned that nothing can be computed of them.
+        InputError: the runs are so ill-conditioned that nothing can be computed of them; the FMU is not
+            what it is taken for, or fails.
     """
     every = [*runs, *held_out]
-    before = model or nominal(every)
     advance(f"predicting {', '.join(w.run.name for w in every)}")
+    if isinstance(model, (str, Path)):
+        model = Fmu(model)
+    if isinstance(model, Fmu):
+        use, ship_model = use_of(model, [w.run for w in every]), nominal(every)
+        predicted = [evaluate_fmu(w, use, ship_model) for w in every]
+        return Comparison(predicted, [e.before.omega for e in predicted], use)
+    before = model or nominal(every)
     known = [before, after, *every, *(w.smoothed for w in every)]
 
     def of_run(k: int) -> Evaluation:

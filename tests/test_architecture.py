@@ -48,6 +48,7 @@ DIAGNOSIS_LAYERS = (
     ("withdrawal",),
     ("gathering",),
     ("decision",),
+    ("foreign",),
     ("session",),
     ("report",),
     ("analysis",),
@@ -101,11 +102,12 @@ PUBLIC = (
     "cosim.scenario",
     "cosim.system",
 )
-# diagnosis reads logs and parameter sets, and plays a run to FMUs.
+# diagnosis reads logs and parameter sets, asks FMUs for their variables, and plays a run to FMUs.
 PUBLIC_TO_DIAGNOSIS = (
     "cosim",
     "cosim.command",
     "cosim.errors",
+    "cosim.fmu",
     "cosim.interrupts",
     "cosim.lazy",
     "cosim.process",

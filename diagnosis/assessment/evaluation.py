@@ -57,6 +57,8 @@ class Evaluation:
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
+        by_force: whether the force that the model lacks is known; else only predictions are, and
+            ``model`` tells no more than the ship.
     """
 
     model: Model
@@ -67,6 +69,7 @@ class Evaluation:
     after: PredictionError
     bands: Bands | None = None
     learned: Model | None = None
+    by_force: bool = True
 
     @property
     def smoothed(self) -> Smoothed:

@@ -6,6 +6,7 @@ sample that is no spike. Longer predictions say nothing: the nominal hull is uns
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -93,6 +94,20 @@ class Windows:
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
             group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)), five)
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
+
+    def after(self, seconds: float) -> "Windows":
+        """The same windows without the samples of their first seconds.
+
+        Raises:
+            InputError: nothing is left of one.
+        """
+        kept = copy(self)
+        late = self.since >= seconds
+        kept.sample_window, kept.since = self.sample_window[late], self.since[late]
+        kept.measured = self.measured[late]
+        if np.unique(kept.sample_window).size < self.run.size:
+            raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
+        return kept
 
     def residuals(self, model: Model | None = None) -> np.ndarray:
         """Measured minus predicted pose at each sample that is used.

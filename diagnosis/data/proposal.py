@@ -49,6 +49,17 @@ MEANT = (
 )
 
 
+def meaning(name: str, signals: Iterable[str]) -> tuple[str, bool]:
+    """Which of some signals a name means, and whether its axis points the other way.
+
+    Returns:
+        An empty name where it means none of them.
+    """
+    known = {_folded(signal): (signal, False) for signal in signals}
+    found = (MEANT | known).get(_folded(name), ("", False))
+    return found if found[0] in signals else ("", False)
+
+
 class Proposal(NamedTuple):
     """How a measurement seems to be meant.
 
@@ -146,15 +157,14 @@ def _columns(
         InputError: a unit that is none of the signal.
     """
     columns: dict[str, Column] = {}
-    meant = MEANT | {_folded(s): (s, False) for s in quantity if s not in QUANTITY}
     pairs = zip(names, units, strict=False)
     for name, below in sorted(pairs, key=lambda pair: pair[0] not in quantity):
         told = WITH_UNIT.fullmatch(name)
         bare, unit = (told[1], told[2]) if told else (name, bare_unit(below))
-        signal, flip = meant.get(_folded(bare), ("", False))
+        signal, flip = meaning(bare, quantity)
         if not signal:
             bare, _, unit = bare.rpartition("_")  # as x_mm
-            signal, flip = meant.get(_folded(bare), ("", False))
+            signal, flip = meaning(bare, quantity)
             if unit not in UNITS.get(quantity.get(signal, ""), {}):
                 continue
         if signal in columns:

@@ -22,6 +22,10 @@ from .unique_share import unique_shares
 
 T = TypeVar("T")
 Z95 = 1.96  # standard deviations, 95 % of a normal distribution
+NO_FORCE = (
+    "An FMU tells no force that it lacks: nothing is said here by speed, place or time, only how far "
+    "its predictions miss."
+)
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
 AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
@@ -39,10 +43,11 @@ def comparison_content(
     """
     return result_keys.ComparisonContent(
         data=_data(comparison.evaluations),
-        windows=_lengths(comparison.evaluations[0]),
+        fmu=_fmu(comparison),
+        windows=_lengths(comparison.evaluations),
         sensors=[s for e in comparison.evaluations for s in _sensors(e)],
         errors=[_errors(e) for e in comparison.evaluations],
-        where=result_keys.WhereResult.model_validate(comparison.before),
+        where=_where(comparison),
         **_provenance(comparison, model, files),
     )
 
@@ -88,7 +93,7 @@ def diagnosis_content(
         coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
-        windows=_lengths(comparison.evaluations[0]),
+        windows=_lengths(comparison.evaluations),
         sensors=[s for e in comparison.evaluations for s in _sensors(e)],
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
@@ -161,8 +166,32 @@ def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]
     }
 
 
-def _lengths(e: Evaluation) -> result_keys.WindowLengths:
-    return result_keys.WindowLengths(prediction=e.integrals.horizon, model_error=e.integrals.width)
+def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
+    """Of the windows, of which one may be a whole run."""
+    w = evaluations[0].integrals
+    lengths = [e.windows.length for e in evaluations if e.windows is not None]
+    return result_keys.WindowLengths(prediction=max(lengths, default=w.horizon), model_error=w.width)
+
+
+def _where(comparison: Comparison) -> result_keys.WhereResult:
+    if comparison.use is None:
+        return result_keys.WhereResult.model_validate(comparison.before)
+    return result_keys.WhereResult(sentences=[NO_FORCE], regions=[], profiles=[])
+
+
+def _fmu(comparison: Comparison) -> result_keys.FmuResult | None:
+    use = comparison.use
+    if use is None:
+        return None
+    runs = [e.smoothed for e in comparison.evaluations]
+    return result_keys.FmuResult(
+        name=use.fmu.name,
+        sha256=use.fmu.sha256,
+        map=use.given.content(),
+        whole_runs=use.whole,
+        run_in={e.name: use.run_in(e.smoothed) for e in comparison.evaluations},
+        sentences=list(use.told(runs)),
+    )
 
 
 def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
@@ -204,10 +233,10 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
                 rms_before=rms(e.integrals, e.model, name),
                 rms_after=rms(e.integrals, e.learned or e.model, name),
             )
-            for name in named(e.integrals, e.model)
+            for name in (named(e.integrals, e.model) if e.by_force else ())
         },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
-        trial=trial_errors(e.smoothed, e.model, e.learned or e.model),
+        trial=trial_errors(e.smoothed, e.model, e.learned or e.model) if e.by_force else None,
     )
 
 

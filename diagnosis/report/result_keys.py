@@ -173,6 +173,21 @@ class WhereResult(Part):
     profiles: list[ProfileResult]
 
 
+class FmuResult(Part):
+    """How an FMU was held against the runs: by which map, and from what start.
+
+    run_in: the first part [s] of each run that does not count; whole_runs: no window has a start of its
+    own.
+    """
+
+    name: str
+    sha256: str
+    map: dict[str, Any]
+    whole_runs: bool
+    run_in: dict[str, Number]
+    sentences: list[str]
+
+
 class ComparisonContent(Part):
     """The content of ``comparison.json``; at its end what it was made with."""
 
@@ -181,6 +196,7 @@ class ComparisonContent(Part):
     sensors: list[SensorResult] = []
     errors: list[RunErrors]
     where: WhereResult
+    fmu: FmuResult | None = None
     runs: list[str]
     model: str | None
     files: list[str]

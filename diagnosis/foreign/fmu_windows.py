@@ -1,0 +1,232 @@
+"""Measured runs as an FMU predicts them: by cosim, one instance for each window.
+
+Where its velocity can be set, an FMU starts in each window from the smoothed state, as the models of
+this project do. Else it runs through the whole run from its own start; of a ship that is under way when
+the run begins, the first part, the run-in, does not count. Where its pose cannot be set, the track that
+it gives is laid onto the measured pose where the comparison begins, in place and heading.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import cosim
+from cosim.process import scratch_folder
+from fmus.ops import wrap
+
+from ..assessment.evaluation import Evaluation, PredictionError
+from ..assessment.windows import RunWindows, Windows, between_steps
+from ..data import UNITS, Column, Run, to_si
+from ..model import Integrals, Model
+from ..model.prediction import at_rest
+from ..smoothing import Smoothed
+from .foreign_fmu import TAU, Fmu, commands_of
+from .variable_map import MOTION, POSE, VELOCITY, VariableMap, quantities
+
+# s, times the scale of the ship; after that a surge speed has forgotten most of its start. Chosen.
+RUN_IN = 60.0
+TOGETHER = 16  # instances in one simulation; chosen: each may have a process of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Use:
+    """How an FMU predicts some runs.
+
+    Attributes:
+        fmu: the FMU.
+        given: which of its variables is which signal, as it was told or proposed.
+        map: the same with the units that the FMU declares.
+        quantity: of each signal.
+    """
+
+    fmu: Fmu
+    given: VariableMap
+    map: VariableMap
+    quantity: dict[str, str]
+
+    @property
+    def whole(self) -> bool:
+        """Whether runs are predicted as a whole, for a velocity cannot be set."""
+        return not set(VELOCITY) <= self.map.told("start").keys()
+
+    @property
+    def placed(self) -> bool:
+        """Whether predictions are laid onto the measured pose, for that cannot be set."""
+        outputs, start = self.map.told("outputs").keys(), self.map.told("start").keys()
+        return not (set(POSE) <= outputs and set(POSE) <= start)
+
+    def run_in(self, smoothed: Smoothed) -> float:
+        """The first part of a run that does not count [s]."""
+        if not self.whole or (self.map.run_in is None and at_rest(smoothed)):
+            return 0.0
+        return RUN_IN * smoothed.scale.time if self.map.run_in is None else self.map.run_in
+
+    def in_variable(self, signal: str, column: Column, values: Any) -> Any:
+        """Values of a signal in SI as its variable has them."""
+        factor = -column.factor if column.flip else column.factor
+        unit = UNITS[self.quantity[signal]].get(column.unit or "", 1.0)
+        return (values / unit - column.offset) / factor
+
+    def told(self, smoothed: Sequence[Smoothed]) -> Iterator[str]:
+        """How it predicts, a sentence each."""
+        start = ", ".join(c.name for c in self.map.told("start").values())
+        if self.whole:
+            waits = [self.run_in(s) for s in smoothed]
+            began = "from rest" if not any(waits) else f"after a run-in of {max(waits):.3g} s"
+            yield (
+                f"Its velocity cannot be set ({', '.join(VELOCITY)} of the map's start): runs are "
+                f"predicted as a whole, {began}."
+            )
+        else:
+            yield f"Each window starts from the measured state, by {start}."
+        if self.placed:
+            yield "Its pose is laid onto the measured one where a prediction begins."
+
+
+def use_of(fmu: Fmu, runs: Sequence[Run]) -> Use:
+    """How an FMU predicts some runs.
+
+    Raises:
+        InputError: as :meth:`Fmu.variables`.
+    """
+    known = quantities(commands_of(runs))
+    return Use(fmu, fmu.given(runs), fmu.variables(runs), {**known["outputs"], **known["inputs"]})
+
+
+def evaluate_fmu(w: Integrals, use: Use, ship: Model) -> Evaluation:
+    """Hold an FMU against a run.
+
+    Args:
+        w: windows of the run.
+        use: how the FMU predicts it.
+        ship: a model of the ship, of which only the outline is drawn.
+
+    Raises:
+        InputError: the FMU fails, or the run is too short for its run-in.
+    """
+    smoothed = w.smoothed
+    windows = _windows(w, use)
+    unknown = np.full((w.middle.size, 3), np.nan)
+    if windows is None:
+        error = PredictionError(unknown, np.zeros((0, 3)), None)
+        return Evaluation(ship, w, None, False, error, error, by_force=False)
+    begins = np.searchsorted(smoothed.time, windows.start)
+    h, _ = RunWindows(smoothed, begins, begins, begins).step_and_commands
+    parts = [begins[k : k + TOGETHER] for k in range(0, begins.size, TOGETHER)]
+    steps = int(np.ceil(windows.length / h - 1e-6))
+    motion = np.concatenate([_simulated(smoothed, use, part, h, steps) for part in parts], axis=-1)
+    pose = _track(motion, h) if np.isnan(motion[0, :3]).all() else motion[:, :3]
+    if use.placed:
+        first = round(use.run_in(smoothed) / h)
+        rows = np.searchsorted(smoothed.time, windows.start + first * h - 1e-9)
+        pose = _laid(pose, first, smoothed.eta[rows].T)
+    predicted = between_steps(pose[:, :, None], windows.sample_window, windows.since / h)[0]
+    residuals = windows.measured - predicted
+    residuals[:, 2] = wrap(residuals[:, 2])
+    error = PredictionError(unknown, residuals, windows.summary(residuals))
+    return Evaluation(ship, w, windows, False, error, error, by_force=False)
+
+
+def _windows(w: Integrals, use: Use) -> Windows | None:
+    """The windows that are predicted: as of any model, or one that is the run as a whole."""
+    smoothed = w.smoothed
+    try:
+        if not use.whole:
+            return Windows([smoothed], w.horizon)
+        seconds = float(smoothed.time[-1] - smoothed.time[0]) + 0.75 * smoothed.track.period
+        return Windows([smoothed], seconds).after(use.run_in(smoothed))
+    except cosim.InputError as error:
+        if use.whole:
+            raise cosim.InputError(f"run '{w.run.name}': {error}") from None
+        return None
+
+
+def _simulated(smoothed: Smoothed, use: Use, begins: np.ndarray, h: float, steps: int) -> np.ndarray:
+    """Motion (steps + 1, 6, w) from each of some rows on; NaN where there is no such output."""
+    fmu, run, outputs = use.fmu, smoothed.track.run, use.map.told("outputs")
+    names = [f"window{k}" for k in range(begins.size)]
+    with scratch_folder() as folder:
+        recording = folder / "commands.csv"
+        # A row acts in the step that ends at its time, the first one before that, too.
+        time = np.round((np.arange(steps) + 1) * h, 12)
+        columns = {}
+        for name, row in zip(names, begins, strict=True):
+            given = _commands(run, use, smoothed.time[row] + (np.arange(steps) + 0.5) * h)
+            columns |= {f"{name}.{variable}": values for variable, values in given.items()}
+        _write(recording, time, columns)
+        scenario = {
+            "name": "prediction",
+            "step": h,
+            "stop": round(steps * h, 9),
+            "fmus": {
+                name: {
+                    "path": str(fmu.path),
+                    "parameters": _start(smoothed, use, row),
+                    "isolate": fmu.isolated,
+                }
+                for name, row in zip(names, begins, strict=True)
+            },
+            "recordings": [{"path": str(recording), "inputs": {name: name for name in columns}}],
+            "log": {"signals": [f"{name}.{c.name}" for name in names for c in outputs.values()]},
+        }
+        result = cosim.simulate(cosim.load_scenario(scenario), folder / "out", pictures=False)
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        if result.status != "done":
+            raise cosim.InputError(f"'{fmu.name}' failed on run '{run.name}': {result.message}")
+        log = cosim.read_log(result.folder)
+    motion = np.full((steps + 1, len(MOTION), begins.size), np.nan)
+    for signal, column in outputs.items():
+        for k, name in enumerate(names):
+            values = log[f"{name}.{column.name}"]
+            motion[:, MOTION.index(signal), k] = to_si(values, signal, column, use.quantity[signal])
+    return motion
+
+
+def _commands(run: Run, use: Use, time: np.ndarray) -> dict[str, np.ndarray]:
+    """Input -> its values at some times [s]; a command acts from its time to the next."""
+    row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+    given = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    inputs = use.map.told("inputs")
+    return {c.name: use.in_variable(s, c, given[s][row]) for s, c in inputs.items()}
+
+
+def _start(smoothed: Smoothed, use: Use, row: int) -> dict[str, float]:
+    """Start value -> its value for a prediction from a row of a run on."""
+    run = smoothed.track.run
+    given = dict(zip(TAU, run.tau_cmd[row], strict=True))
+    given |= {s: values[row] for s, values in run.commanded.items()}
+    given |= dict(zip(MOTION, (*smoothed.eta[row], *smoothed.nu[row]), strict=True))
+    start = use.map.told("start")
+    return {c.name: float(use.in_variable(s, c, given[s])) for s, c in start.items()}
+
+
+def _write(path: Path, time: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time", *columns])
+        writer.writerows(zip(*(c.tolist() for c in (time, *columns.values())), strict=True))
+
+
+def _track(motion: np.ndarray, h: float) -> np.ndarray:
+    """Pose (steps + 1, 3, w) from the origin on, by the velocities (steps + 1, 6, w) of the body."""
+
+    def sums(rate: np.ndarray) -> np.ndarray:
+        return np.vstack([0.0 * rate[:1], np.cumsum(0.5 * h * (rate[1:] + rate[:-1]), axis=0)])
+
+    u, v, r = motion[:, 3:].transpose(1, 0, 2)
+    psi = sums(r)
+    north, east = np.cos(psi) * u - np.sin(psi) * v, np.sin(psi) * u + np.cos(psi) * v
+    return np.stack([sums(north), sums(east), psi], axis=1)
+
+
+def _laid(pose: np.ndarray, first: int, onto: np.ndarray) -> np.ndarray:
+    """Tracks (steps + 1, 3, w), moved and turned so that at a step they are where others (3, w) are."""
+    x, y, psi = (pose - pose[first]).transpose(1, 0, 2)
+    turn = onto[2] - pose[first, 2]
+    c, s = np.cos(turn), np.sin(turn)
+    return np.stack([onto[0] + c * x - s * y, onto[1] + s * x + c * y, onto[2] + psi], axis=1)

@@ -1,0 +1,88 @@
+"""An FMU that is to be held against measured runs, and which of its variables are what."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import cosim
+from cosim.fmu import Model
+from fmus.ship import ship
+
+from ..data import OF_UNIT, QUANTITY, Run
+from .variable_map import VariableMap, completed, propose, read_map, unmatched
+
+SUFFIX = ".fmu"
+TAU = ("tau_X", "tau_Y", "tau_N")
+
+
+class Fmu:
+    """An FMI 2.0 FMU for co-simulation that moves as a ship does.
+
+    Args:
+        path: of the file.
+        map: which of its variables is which signal, a file; None: as names and units tell.
+
+    Raises:
+        InputError: no such FMU, or none for co-simulation by FMI 2.0.
+    """
+
+    def __init__(self, path: str | Path, map: str | Path | None = None) -> None:  # noqa: A002
+        self.path = Path(path).absolute()
+        self.map = None if map is None else Path(map)
+        self.told = None if self.map is None else read_map(self.map)
+        self._model = Model(self.path)
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+        return self.path.name
+
+    @property
+    def sha256(self) -> str:
+        """Of the file."""
+        return self._model.sha256
+
+    @property
+    def isolated(self) -> bool:
+        """Whether each instance needs a process of its own: where one process may hold only one."""
+        told = self._model.description.coSimulation
+        return bool(told is not None and told.canBeInstantiatedOnlyOncePerProcess)
+
+    def given(self, runs: Sequence[Run]) -> VariableMap:
+        """The map of the file, else the one that names and units tell, for some runs."""
+        return self.told or propose(self._model, commands_of(runs))
+
+    def variables(self, runs: Sequence[Run]) -> VariableMap:
+        """The map by which the FMU predicts some runs, with the units of its variables.
+
+        Raises:
+            InputError: the map does not fit the FMU.
+            UnmatchedError: pose and velocity are incomplete, or all commands are missing.
+        """
+        where = f"'{self.map or self.name}'"
+        given = self.given(runs)
+        found = completed(given, self._model, commands_of(runs), where)
+        lacking = unmatched(found, self._model)
+        if lacking:
+            raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
+        return found
+
+
+class UnmatchedError(cosim.InputError):
+    """Variables that are needed are not known by their names, or not in the map.
+
+    Attributes:
+        proposal: the content of a map with those that are known.
+    """
+
+    def __init__(self, message: str, proposal: Mapping[str, Any]) -> None:
+        super().__init__(message)
+        self.proposal = proposal
+
+
+def commands_of(runs: Sequence[Run]) -> dict[str, str]:
+    """Signal -> quantity of the forces and commands that all of some runs of a ship have."""
+    units = ship(description=runs[0].ship).commands or {}
+    every = [{*TAU, *run.commanded} for run in runs]
+    common = [s for s in dict.fromkeys([*TAU, *runs[0].commanded]) if all(s in e for e in every)]
+    return {s: QUANTITY[s] if s in QUANTITY else OF_UNIT[units[s]] for s in common}

@@ -1,0 +1,240 @@
+"""FMUs that are held against measured runs: ours as a foreign one, others by a map, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from support.foreign import needs_compiler
+from support.measured import sail
+
+import diagnosis
+from cosim import InputError
+from diagnosis import Fmu, compare
+from diagnosis.foreign import UnmatchedError
+from fmus.build import build, native_targets
+
+pytestmark = needs_compiler
+
+# The same ship with names and units of its own: heading in degrees to port, speeds in knots.
+OTHER = '''
+"""A ship with names of its own."""
+
+from typing import Annotated, NamedTuple
+
+from fmus.declare import FIXED, Component
+from fmus.signals import Force
+from fmus.vessel.vessel import COMPONENT as SHIP
+
+DEG, KNOT = 57.29577951308232, 3600.0 / 1852.0
+
+
+class Params(NamedTuple):
+    along: Annotated[float, "1", "surge at first [kn]", FIXED] = 0.0
+    across: Annotated[float, "1", "sway at first [kn]", FIXED] = 0.0
+    turning: Annotated[float, "1", "yaw rate at first [deg/s], to port", FIXED] = 0.0
+
+
+class Inputs(NamedTuple):
+    pull: Annotated[float, "1", "surge force [kN]"] = 0.0
+    push: Annotated[float, "1", "sway force [kN]"] = 0.0
+    twist: Annotated[float, "1", "yaw moment [kN m], to port"] = 0.0
+
+
+class Outputs(NamedTuple):
+    a: Annotated[float, "1", "first"] = 0.0
+    b: Annotated[float, "1", "second"] = 0.0
+    c: Annotated[float, "1", "third"] = 0.0
+
+'''
+BODY = """
+def init(i, p):
+    return SHIP.state(0.0, 0.0, 0.0, p.along / KNOT, p.across / KNOT, -p.turning / DEG, 0.0)
+
+
+def step(s, i, p, h):
+    after, o = SHIP.step(s, Force(1e3 * i.pull, 1e3 * i.push, -1e3 * i.twist), SHIP.params(), h)
+    return after, Outputs(RETURNED)
+
+
+COMPONENT = Component(
+    name="NAME", description="A ship", params=Params, state=SHIP.state, inputs=Inputs, outputs=Outputs,
+    init=init, step=step, sampled=False, max_step=0.02,
+)
+"""
+POSE = "o.pose.x, o.pose.y, -DEG * o.pose.psi"
+VELOCITY = "KNOT * o.velocity.u, KNOT * o.velocity.v, -DEG * o.velocity.r"
+INPUTS = {
+    "tau_X": {"name": "pull", "unit": "kN"},
+    "tau_Y": {"name": "push", "unit": "kN"},
+    "tau_N": {"name": "twist", "unit": "kN.m", "flip": True},
+}
+START = {
+    "u": {"name": "along", "unit": "kn"},
+    "v": {"name": "across", "unit": "kn"},
+    "r": {"name": "turning", "unit": "deg/s", "flip": True},
+}
+POSE_MAP = {
+    "x": {"name": "a", "unit": "m"},
+    "y": {"name": "b", "unit": "m"},
+    "psi": {"name": "c", "unit": "deg", "flip": True},
+}
+VELOCITY_MAP = {
+    "u": {"name": "a", "unit": "kn"},
+    "v": {"name": "b", "unit": "kn"},
+    "r": {"name": "c", "unit": "deg/s", "flip": True},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Our vessel, and two ships with names of their own: one gives its pose, one its velocity."""
+    made = tmp_path_factory.mktemp("foreign")
+    for name, returned in (("posed", POSE), ("moving", VELOCITY)):
+        (made / f"{name}.py").write_text(
+            OTHER + BODY.replace("RETURNED", returned).replace("NAME", name)
+        )
+    build(["vessel", str(made / "posed.py"), str(made / "moving.py")], made, native=native_targets())
+    return made
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return diagnosis.gather([sail(40.0)[0]])
+
+
+@pytest.fixture(scope="module")
+def nominal(runs):
+    return errors(diagnosis.evaluate(runs))
+
+
+def errors(comparison):
+    (e,) = comparison.evaluations
+    return e.before.position, e.before.heading
+
+
+def mapped(folder, fmu, tmp_path, **content):
+    path = tmp_path / "map.json"
+    path.write_text(json.dumps(content))
+    return Fmu(folder / fmu, path)
+
+
+def test_our_vessel_as_a_foreign_one_misses_by_the_same(folder, runs, nominal):
+    found = diagnosis.evaluate(runs, folder / "vessel.fmu")
+    assert errors(found) == pytest.approx(nominal, rel=1e-6)
+    assert not found.use.whole
+    assert not found.use.placed
+
+
+@pytest.mark.parametrize(("fmu", "outputs"), [("posed.fmu", POSE_MAP), ("moving.fmu", VELOCITY_MAP)])
+def test_names_and_units_of_its_own_by_a_map(folder, runs, nominal, tmp_path, fmu, outputs):
+    """Where only the velocity is told, it is integrated by the trapezoidal rule."""
+    model = mapped(folder, fmu, tmp_path, inputs=INPUTS, outputs=outputs, start=START)
+    found = diagnosis.evaluate(runs, model)
+    assert errors(found) == pytest.approx(nominal, rel=1e-3)
+    assert found.use.placed
+
+
+def test_a_wrong_sign_in_the_map_shows(folder, runs, nominal, tmp_path):
+    wrong = {**INPUTS, "tau_N": {"name": "twist", "unit": "kN.m"}}
+    model = mapped(folder, "posed.fmu", tmp_path, inputs=wrong, outputs=POSE_MAP, start=START)
+    assert errors(diagnosis.evaluate(runs, model))[1] > 10.0 * nominal[1]
+
+
+def test_without_a_start_whole_runs_from_rest_or_after_a_run_in(folder, runs, nominal, tmp_path):
+    """From rest the true model follows a whole run; a run-in leaves out what it says of the start."""
+    model = mapped(folder, "posed.fmu", tmp_path, inputs=INPUTS, outputs=POSE_MAP)
+    whole = diagnosis.evaluate(runs, model)
+    (e,) = whole.evaluations
+    assert whole.use.whole
+    assert whole.use.run_in(e.smoothed) == 0.0
+    assert e.windows.run.size == 1
+    assert e.windows.since[-1] == pytest.approx(40.0, abs=0.1)
+    assert e.before.position < 0.5
+    late = mapped(folder, "posed.fmu", tmp_path, inputs=INPUTS, outputs=POSE_MAP, run_in=10.0)
+    (e,) = diagnosis.evaluate(runs, late).evaluations
+    assert e.windows.since[0] == pytest.approx(10.0, abs=0.1)
+    assert np.hypot(*e.before.residuals[0, :2]) < 0.02
+    too_long = mapped(folder, "posed.fmu", tmp_path, inputs=INPUTS, outputs=POSE_MAP, run_in=100.0)
+    with pytest.raises(InputError, match="leaves nothing"):
+        diagnosis.evaluate(runs, too_long)
+
+
+@pytest.fixture
+def csv(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run, _ = sail(40.0)
+    table = np.column_stack([run.time, run.pose, run.tau_cmd])
+    header = "time,x,y,psi,tau_X,tau_Y,tau_N"
+    np.savetxt(tmp_path / "run.csv", table, delimiter=",", header=header, comments="")
+    return "run.csv"
+
+
+def test_the_command_writes_comparison_report_and_map(folder, csv, tmp_path, nominal):
+    out = tmp_path / "out"
+    command = [csv, "--model", str(folder / "vessel.fmu"), "--out", str(out)]
+    assert compare.main(command) == 0
+    content = json.loads((out / "comparison.json").read_text())
+    (told,) = content["errors"]
+    assert told["window_position_rmse"]["before"] == pytest.approx(nominal[0], rel=1e-3)
+    assert told["omega_rms"]["before"] == [None] * 3
+    assert content["where"]["regions"] == []
+    assert content["fmu"]["map"]["outputs"]["x"] == "x"
+    assert "FMU" in (out / "report.html").read_text()
+    again = [*command[:3], "--map", str(out / "map.json"), "--out", str(tmp_path / "again")]
+    assert compare.main(again) == 0
+    same = json.loads((tmp_path / "again" / "comparison.json").read_text())
+    assert same["errors"] == content["errors"]
+
+
+def test_a_first_call_proposes_a_map(folder, csv, tmp_path, capsys):
+    assert compare.main([csv, "--model", str(folder / "posed.fmu")]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()[-1:]
+    assert "no output is" in line
+    assert "'map.json'" in line
+    proposal = json.loads((tmp_path / "map.json").read_text())
+    assert proposal["outputs"]["x"] is None
+    for group, signals in (("inputs", INPUTS), ("outputs", POSE_MAP), ("start", START)):
+        proposal[group] |= signals
+    (tmp_path / "map.json").write_text(json.dumps(proposal))
+    assert compare.main([csv, "--model", str(folder / "posed.fmu"), "--map", "map.json"]) == 0
+
+
+WRONG = {
+    "no JSON": ("{", "cannot be read"),
+    "no such key": ('{"input": {}}', "did you mean 'inputs'"),
+    "no such signal": ('{"inputs": {"tau_Z": "tau_X"}}', "is no signal"),
+    "no such variable": ('{"inputs": {"tau_X": "tau_XX"}}', "did you mean 'tau_X'"),
+    "no such unit": ('{"inputs": {"tau_X": {"name": "tau_X", "unit": "kg"}}}', "is no unit"),
+    "other quantity": ('{"outputs": {"x": "u"}}', "which is no unit of length"),
+    "factor zero": ('{"inputs": {"tau_X": {"name": "tau_X", "factor": 0}}}', "is not zero"),
+    "list": ("[]", "'"),
+    "group is a list": ('{"inputs": ["tau_X"]}', "inputs"),
+    "incomplete": (
+        '{"inputs": {"tau_X": "tau_X"}, "outputs": {"x": "x", "y": "y"}}',
+        "no output is psi",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_bad_map_is_refused_in_one_line(folder, csv, tmp_path, capsys, name):
+    content, message = WRONG[name]
+    (tmp_path / "bad.json").write_text(content)
+    command = [csv, "--model", str(folder / "vessel.fmu"), "--map", "bad.json"]
+    assert compare.main(command) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert message in line
+
+
+def test_wrong_files_are_refused_in_one_line(csv, tmp_path, capsys):
+    (tmp_path / "broken.fmu").write_text("no archive")
+    for command in (["--model", "broken.fmu"], ["--model", "none.fmu"], ["--map", "none.json"]):
+        assert compare.main([csv, *command]) == 2
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert line.startswith("error: ")
+
+
+def test_an_fmu_without_forces_has_nothing_to_compare(runs, tmp_path):
+    build(["guidance_ellipse"], tmp_path)
+    with pytest.raises(UnmatchedError, match="no input is"):
+        diagnosis.evaluate(runs, tmp_path / "guidance_ellipse.fmu")
