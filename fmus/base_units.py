@@ -11,6 +11,7 @@ _SYMBOLS: dict[str, dict[str, int]] = {
     "s": {"s": 1},
     "rad": {"rad": 1},
     "N": {"kg": 1, "m": 1, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
 }
 _FACTOR = re.compile(r"([A-Za-z]+|1)(\d*)")
 
