@@ -1,7 +1,7 @@
 """What integrated speed, heading and yaw rate of a sea trial miss, before and after its repair.
 
-``python -m benchmarks.kinematic_closure DATA``; DATA is the folder of ``trial_1.csv`` and ``trial_2.csv`` of
-R/V Gunnerus (NTNU-MCS/MCSim_python, GPL-3.0-or-later), which is not part of this project.
+``python -m benchmarks.kinematic_closure DATA``; DATA holds ``trial_1.csv`` and ``trial_2.csv``
+of R/V Gunnerus (NTNU-MCS/MCSim_python, GPL-3.0-or-later), which is not part of this project.
 """
 
 import argparse

@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
         "--map",
         type=Path,
         metavar="FILE.json",
-        help="which variables of an FMU are which signals (as their names and units tell)",
+        help="which variables of an FMU given by --model are which signals (as names and units tell)",
     )
     made.add_argument(
         "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"

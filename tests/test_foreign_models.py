@@ -1,6 +1,7 @@
 """FMUs that are held against measured runs: ours as a foreign one, others by a map, and what is refused."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,12 @@ from support.foreign import needs_compiler
 from support.measured import sail
 
 import diagnosis
-from cosim import InputError
+from cosim import InputError, Unit
+from cosim.fmu import Variable
 from diagnosis import Fmu, compare
-from diagnosis.foreign import UnmatchedError
+from diagnosis.data import to_si
+from diagnosis.foreign import UnmatchedError, Use
+from diagnosis.foreign.variable_map import completed, propose
 from fmus.build import build, native_targets
 
 pytestmark = needs_compiler
@@ -238,3 +242,43 @@ def test_an_fmu_without_forces_has_nothing_to_compare(runs, tmp_path):
     build(["guidance_ellipse"], tmp_path)
     with pytest.raises(UnmatchedError, match="no input is"):
         diagnosis.evaluate(runs, tmp_path / "guidance_ellipse.fmu")
+
+
+def variable(name, causality, unit):
+    return Variable(name, "Real", 0, causality, "continuous", unit, "", None, None, None)
+
+
+def test_names_and_units_that_an_fmu_declares_are_matched():
+    """By whole names, last parts and marks of a start; by units' names and by what they are of SI."""
+    degree = Unit("degree", (0,) * 7, np.pi / 180.0)
+    shift = Unit("kilonewton", (1, 1, -2, 0, 0, 0, 0), 1e3, 2.0)
+    second = Unit("s", (0, 0, 1, 0, 0, 0, 0))
+    declared = [
+        variable("ship.heading", "output", degree),
+        variable("west", "output", None),
+        variable("x", "output", Unit("mm")),
+        variable("r", "output", second),
+        variable("n_0", "parameter", None),
+        variable("start_u", "parameter", Unit("kn")),
+        variable("Fx", "input", shift),
+        variable("Rudder_Delta", "input", degree),
+    ]
+    model = SimpleNamespace(variables={v.name: v for v in declared})
+    commands = {"tau_X": "force", "rudder.delta": "angle"}
+    proposed = propose(model, commands)
+    assert proposed.content()["outputs"] == {
+        "x": "x", "y": {"name": "west", "flip": True}, "psi": "ship.heading", "u": None, "v": None, "r": None,
+    }  # fmt: skip
+    found = completed(proposed, model, commands, "map")
+    assert {s: c.name for s, c in found.told("start").items()} == {"u": "start_u"}
+    use = Use(None, proposed, found, {**commands, "x": "length", "psi": "angle", "u": "speed"})
+    for group, signal, own, si in (
+        ("outputs", "psi", 90.0, np.pi / 2.0),
+        ("outputs", "x", 1500.0, 1.5),
+        ("start", "u", 3600.0, 1852.0),
+        ("inputs", "tau_X", 0.5, 502.0),
+        ("inputs", "rudder.delta", -10.0, np.radians(-10.0)),
+    ):
+        column = found.told(group)[signal]
+        assert to_si(own, signal, column, use.quantity[signal]) == pytest.approx(si)
+        assert use.in_variable(signal, column, si) == pytest.approx(own)

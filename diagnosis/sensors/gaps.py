@@ -7,7 +7,8 @@ import numpy as np
 from .evidence import Evidence
 from .sensor_finding import Z95, SensorFinding
 
-FAR = 8.0  # robust standard deviations of the time by which steps differ from the clock's (chosen)
+FAR = 8.0  # robust standard deviations of how far steps differ from what the speed says (chosen)
+SHORTEST = 0.5  # s; a shorter jump does no harm (chosen)
 FAST = 3.0  # times the log's step: what is less is a clock that runs fast (chosen)
 STAND = 0.75  # of the log's step that no motion fills, where the log jumps ahead (chosen)
 LONG = 5.0  # sampling periods that the log's step has then; chosen
@@ -58,11 +59,13 @@ def gaps(e: Evidence) -> list[Gap]:
     going = mean > 0.2 * float(np.median(speed))
     late = np.where(going, way / np.where(going, mean, 1.0) - step, 0.0)
     period = float(np.median(step))
-    spread = 1.4826 * float(np.median(np.abs(late - np.median(late))))
+    beyond = late * mean  # m; where a ship is slow, noise of the position is a long time
+    noise = 1.4826 * float(np.median(np.abs(beyond - np.median(beyond))))
     aligned = (moved * said).sum(axis=1) > ALIGNED * way * np.hypot(*said.T)
     missing = (late > FAST * step) & aligned
     ahead = (late < -STAND * step) & (step > LONG * period)
-    jumps = (np.abs(late) > max(FAR * spread, 2.0 * period)) & going & (missing | ahead)
+    jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > max(SHORTEST, 2.0 * period))
+    jumps &= going & (missing | ahead)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], jumps, [0]]).astype(int)))
     found = []
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -80,7 +83,6 @@ def gaps(e: Evidence) -> list[Gap]:
         near = (time > time[a] - reach) & (time < time[b] + reach)
         share = float(np.hypot((at[1] - at[0]) / 2.0, np.std(speed[near])) / u)
         share += 1.0 - float(np.exp(-0.5 * np.var(e.psi[rows[near]])))  # of a way that bends
-        found.append(
-            Gap(float(time[a]), float(time[b]), value, float(np.hypot(spread, value * (share + SPEED))))
-        )
+        std = float(np.hypot(noise / u, value * (share + SPEED)))
+        found.append(Gap(float(time[a]), float(time[b]), value, std))
     return found
