@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.scale import CSE1
+from fmus.scale import Scale
 
 from ..data import Run
 from .evidence import Evidence, evidence
@@ -35,7 +35,7 @@ def closure(run: Run, track: float, turn: float) -> Closure:
         track: length of the windows of the position [s].
         turn: of those of the heading [s].
     """
-    e = evidence(wraps(run, CSE1).run)  # angles that go round are no matter of closure
+    e = evidence(wraps(run, Scale()).run)  # angles that go round are no matter of closure
     position = heading = np.nan
     if e is not None and e.velocity is not None:
         first, last = _windows(e, track)
