@@ -51,8 +51,8 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         advance("where it fails")
         content = comparison_content(comparison, path, files)
         (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        if content.fmu is not None:
-            _write_map(new / MAP, content.fmu.map)
+        if fmu is not None:
+            _write_map(new / MAP, fmu.given([w.run for w in runs]).content())
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
         write_report(
             new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
