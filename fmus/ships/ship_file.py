@@ -34,8 +34,8 @@ REQUIRED = ("m", "I_z")  # of the inertia; what else is not named is zero
 class HullTable(Strict):
     """What the water does to the hull."""
 
-    terms: list[Term] = []
-    functions: dict[str, dict[str, Given]] = {}
+    terms: list[Term] = Field(default=[])
+    functions: dict[str, dict[str, Given]] = Field(default={})
 
 
 class ActuatorTable(BaseModel):
