@@ -32,6 +32,7 @@ vsp = Devices(
     "XYN",
     PROPELLERS,
     F_VSP,
+    "plant_F_vsp",
     plural=True,
     needs=frozenset({"vsp"}),
 )
@@ -47,7 +48,16 @@ vsp1, vsp2 = (
     for k, side in enumerate(("to port", "to starboard"))
 )
 bow = Devices(
-    "bow", "bow thruster", "bow", (BOW,), (2, 2), "YN", BOW_THRUSTER, F_BOW, needs=frozenset({"bow"})
+    "bow",
+    "bow thruster",
+    "bow",
+    (BOW,),
+    (2, 2),
+    "YN",
+    BOW_THRUSTER,
+    F_BOW,
+    "plant_F_bow",
+    needs=frozenset({"bow"}),
 )
 thrusters = Devices(
     "",

@@ -31,6 +31,7 @@ class Devices(NamedTuple):
         axis: axes on which their force may act.
         family: the manoeuvre that brings out what is wrong with them.
         full: the largest force of one of them at rest [N].
+        strength: name of the parameter that is this force; empty: there is none.
         plural: whether the title is of several.
         needs: thrusters that a ship must have.
         scale: of the ship.
@@ -44,6 +45,7 @@ class Devices(NamedTuple):
     axis: str
     family: Family
     full: float = 0.0
+    strength: str = ""
     plural: bool = False
     needs: frozenset[str] = frozenset()
     scale: Scale = CSE1

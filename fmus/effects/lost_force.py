@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ..declare import POSITIVE, Variable
 from ..ops import Number, clip, fmax, where
 from .devices import SHARE, Devices, added, changed, declared, parameter
-from .effect import Effect, Running, Search, Thrust
+from .effect import Effect, Running, Search, Thrust, Values
 from .text import Found, capital, lost, number, percent
 
 INTERVALS = 8  # of an outage: the parameters of the FMU are so many
@@ -15,7 +15,7 @@ INSTANT = 1e-9  # s; times that differ by less are the same
 # s/m: from an effect that is small at full speed to an actuator that is dead at 0.07 m/s.
 SPEED_LOSSES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 15.0)
 # Shares of full force.
-DEADBANDS = (0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.13, 0.17, 0.22, 0.3)
+DEADBANDS = (0.0086, 0.017, 0.026, 0.043, 0.06, 0.086, 0.11, 0.146, 0.19, 0.26)
 LIMITS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 
 
@@ -184,6 +184,11 @@ def saturation(parts: Sequence[Devices], whole: Devices, name: str = "") -> Effe
         parts = [f"{d.does('give', 'the')} at most {number(f[n])} N" for n, d in limits.items() if f[n]]
         return capital(f"{' and '.join(parts)}, whatever is commanded.")
 
+    def tries(model: Values) -> list[Values]:
+        """Shares of the full force that the model in use has."""
+        full = {n: model.get(d.strength, d.full) for n, d in limits.items()}
+        return [{n: share * force} for n, force in full.items() for share in LIMITS]
+
     @declared(
         whole,
         name or f"saturation_{whole.name}",
@@ -198,7 +203,7 @@ def saturation(parts: Sequence[Devices], whole: Devices, name: str = "") -> Effe
         sign="0: no limit",
         source="2.1.1",
         linear=False,
-        search=Search(tries=[{n: share * d.full} for n, d in limits.items() for share in LIMITS]),
+        search=Search(tries=tries),
         description=f"real limit of the {whole.title}, lower than that of the commands",
     )
     def function(f: Thrust, now: Running, *most: Number) -> Thrust:
