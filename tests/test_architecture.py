@@ -141,7 +141,6 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis.progress",
     "diagnosis.report",
     "diagnosis.sensors",
-    "diagnosis.sensors",
     "diagnosis.smoothing",
 )
 

@@ -29,14 +29,16 @@ HIDDEN = {"ship": {"V_n": 0.05, "V_e": -0.03}, "thrusters": {"lag": 0.6}}
 def grown(d, scale):
     """A description with every number at another size."""
     units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
-    place = {"x": "m", "y": "m", "lag": "s"}
+    always = {"x": "m", "y": "m", "lag": "s"}
 
     def given(values, units):
         return tuple(v._replace(value=scale.factor(units[v.name]) * v.value) for v in values)
 
     def actuator(part):
-        declared = {v.name: v.unit for v in variables(Law.known[part.law].Parameters)}
-        return part._replace(values=given(part.values, place | declared))
+        law = Law.known[part.law]
+        declared = {v.name: v.unit for v in variables(law.Parameters)}
+        rates = {f"{c.name}_rate": f"{c.unit}/s".replace("s/s", "s2") for c in law.commands}
+        return part._replace(values=given(part.values, always | rates | declared))
 
     length = scale.length
     return d._replace(

@@ -44,6 +44,8 @@ def test_page_has_every_item_of_the_thesis_and_no_other(kind):
     assert named(kind) == there
 
 
-@pytest.mark.parametrize("command", sorted(set(re.findall(r"`(?:python -m )?(studies\.\w+)", PAGE))))
+@pytest.mark.parametrize(
+    "command", sorted(set(re.findall(r"`(?:python -m )?(studies\.[\w.]+\w)", PAGE)))
+)
 def test_studies_that_the_page_names_exist(command):
     assert (Path(__file__).parents[1] / f"{command.replace('.', '/')}.py").is_file()

@@ -47,7 +47,7 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     angle, step = values[there].copy(), np.diff(values[there])
     usual = float(np.median(np.abs(step))) if step.size else 0.0
     large = np.abs(step) > max(LARGE * usual, LEAST)
-    same = large[1:] & large[:-1] & (step[1:] * step[:-1] > 0.0)
+    same = large[1:] & large[:-1] & (np.sign(step[1:]) == np.sign(step[:-1]))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same, [0]]).astype(int)))
     changed = []
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -133,7 +133,9 @@ def smooth(track: Track, driven: bool = True, agreeing: Agreeing = ALONE) -> Smo
 
 def _smooth(track: Track, rows: np.ndarray, driven: bool, agreeing: Agreeing) -> Smoothed:
     """Smooth a run by some of its rows."""
-    time, origin = track.run.time - track.run.time[0], np.nanmedian(track.pose, axis=0)
+    time = track.run.time - track.run.time[0]
+    with np.errstate(over="ignore"):  # of poses that are no place on earth
+        origin = np.nanmedian(track.pose, axis=0)
     scale = track.scale
     grid = knots(*stretches(rows, track), max(SPACING * scale.time, track.period))
     inside = within(grid, time)

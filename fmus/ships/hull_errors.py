@@ -62,8 +62,8 @@ def changed(function: str, change: Change) -> Effect:
 
 def wind_force(
     ship: Motion,
-    W_n: Annotated[float, "m/s", "velocity of the wind to the north", Range(-60.0, 60.0)] = 0.0,
-    W_e: Annotated[float, "m/s", "velocity of the wind to the east", Range(-60.0, 60.0)] = 0.0,
+    W_n: Annotated[float, "m/s", "velocity of the wind to the north"] = 0.0,
+    W_e: Annotated[float, "m/s", "velocity of the wind to the east"] = 0.0,
     frontal_area: Annotated[float, "m2", "area above the water from ahead", POSITIVE] = 1.0,
     lateral_area: Annotated[float, "m2", "area above the water from the side", POSITIVE] = 1.0,
     lateral_centre: Annotated[float, "m", "forward place of the lateral area's centre"] = 0.0,
