@@ -31,6 +31,9 @@ def grown(d, scale):
     units = {n: v.unit for n, v in ship(STANDARD, d).parameters["vessel"].items()}
     always = {"x": "m", "y": "m", "lag": "s"}
 
+    everything = ship(STANDARD, d).effects.values()
+    wind = {p.name: p.unit for e in everything if e.id == "wind" for p in e.parameters}
+
     def given(values, units):
         return tuple(v._replace(value=scale.factor(units[v.name]) * v.value) for v in values)
 
@@ -49,6 +52,7 @@ def grown(d, scale):
         terms=given(d.terms, units),
         functions=tuple(f._replace(values=given(f.values, units)) for f in d.functions),
         actuators=tuple(map(actuator, d.actuators)),
+        wind=given(d.wind, wind),
     )
 
 
