@@ -7,7 +7,6 @@ of this project. The log's own clock, scales and axes are repaired by its redund
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +23,7 @@ from diagnosis.model import ship_with
 from diagnosis.progress import silent
 from diagnosis.sensors import Examined, examine
 
-from .ship_folds import Fold, learn_folds, write_folds
-from .study_command import run_study, study_parser
+from .ship_folds import Fold, folds_command, learn_folds, write_folds
 from .study_report import Report
 
 HORIZON = 60.0  # s, of predictions: the ship goes ten lengths
@@ -210,19 +208,14 @@ def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
 
 def main() -> None:
     """Command line; leaves with an exit code."""
-    parser = study_parser(
+    folds_command(
         "research_vessel",
         "What the sea trial of R/V Gunnerus says that its model lacks.",
-        "  python -m studies.research_vessel ~/gunnerus\n"
-        "  python -m studies.research_vessel ~/gunnerus --folds 3",
-        seeds=None,
-        jobs=False,
+        "~/gunnerus",
+        "folder of the two trials",
+        "manoeuvre",
+        study,
     )
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of the two trials")
-    parser.add_argument("--folds", type=int, metavar="N", help="folds left out (one for each manoeuvre)")
-    options = parser.parse_args()
-    folds = 2 if options.quick else options.folds
-    run_study(partial(study, options.data, options.out, folds, options.quick))
 
 
 if __name__ == "__main__":

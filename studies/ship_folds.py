@@ -4,8 +4,10 @@ The runs are dealt into folds; each fold is left out in turn. With as many folds
 out alone.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from math import degrees
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +17,7 @@ from cosim import InputError
 from diagnosis import Diagnosis, DiagnosisContent, Integrals, Model, diagnosis_content
 from diagnosis.progress import Advance
 
+from .study_command import run_study, study_parser
 from .study_report import Report
 
 
@@ -29,6 +32,27 @@ class Fold(NamedTuple):
     def errors(self) -> list[Any]:
         """Of the runs left out."""
         return [e for e in self.content.errors if e.held_out]
+
+
+def folds_command(
+    name: str, description: str, example: str, data: str, one: str, study: Callable[..., Path]
+) -> None:
+    """Command line of a study of a ship's measured runs; leaves with an exit code.
+
+    Args:
+        name, description: of the study.
+        example: a folder of the data.
+        data: what that folder is.
+        one: what a fold leaves out at the least.
+        study: ``study(data, out, folds, quick)``.
+    """
+    command = f"  python -m studies.{name} {example}"
+    parser = study_parser(name, description, f"{command}\n{command} --folds 3", seeds=None, jobs=False)
+    parser.add_argument("data", type=Path, metavar="DATA", help=data)
+    parser.add_argument("--folds", type=int, metavar="N", help=f"folds left out (one for each {one})")
+    options = parser.parse_args()
+    folds = 2 if options.quick else options.folds
+    run_study(partial(study, options.data, options.out, folds, options.quick))
 
 
 def learn_folds(

@@ -5,7 +5,6 @@ repository of M. Alexandersson's thesis (2022) has them: ``z_AA_BB.csv``, with t
 It is not part of this project.
 """
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,7 @@ from diagnosis.data import Run, read_frame
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 
-from .ship_folds import learn_folds, write_folds
-from .study_command import run_study, study_parser
+from .ship_folds import folds_command, learn_folds, write_folds
 from .study_report import Report
 
 # Column of the files -> signal, factor to SI. The angle of the rudder has the opposite sign there.
@@ -68,18 +66,14 @@ def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
 
 def main() -> None:
     """Command line; leaves with an exit code."""
-    parser = study_parser(
+    folds_command(
         "tanker",
         "What the zig-zags of KVLCC2 say that its model lacks.",
-        "  python -m studies.tanker ~/kvlcc2_hsva\n  python -m studies.tanker ~/kvlcc2_hsva --folds 3",
-        seeds=None,
-        jobs=False,
+        "~/kvlcc2_hsva",
+        "folder of the files",
+        "run",
+        study,
     )
-    parser.add_argument("data", type=Path, metavar="DATA", help="folder of the files")
-    parser.add_argument("--folds", type=int, metavar="N", help="folds left out (one for each run)")
-    options = parser.parse_args()
-    folds = 2 if options.quick else options.folds
-    run_study(partial(study, options.data, options.out, folds, options.quick))
 
 
 if __name__ == "__main__":

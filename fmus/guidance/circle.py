@@ -5,12 +5,12 @@
 taken back, and the rate that remains tells whether the ship is stable (ISO 13643-3:2017).
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import POSITIVE, component
 from ..ops import Number, where
 from ..signals import Nothing
-from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, begun, first_side, given
+from .trial_order import ANGLE, HARD_OVER, START, Clock, Helm, Order, begun, first_side, given
 
 
 class Params(NamedTuple):
@@ -20,21 +20,15 @@ class Params(NamedTuple):
     helm: Helm = Helm()
 
 
-class State(NamedTuple):
-    """Time [s]."""
-
-    t: Any = 0.0
+def init(i: Nothing, p: Params) -> Clock:
+    return Clock()
 
 
-def init(i: Nothing, p: Params) -> State:
-    return State()
-
-
-def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Order]:
+def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
     t = s.t + h
     out = (p.release > 0.0) & begun(t, p.start + p.release, h)
     order = where(begun(t, p.start, h), where(out, 0.0, first_side(p.helm)), 0.0)
-    return State(t), given(order, p)
+    return Clock(t), given(order, p)
 
 
 COMPONENT = component(

@@ -5,12 +5,12 @@ to none, each held for ``hold`` seconds until the rate is steady (ISO 13643-3:20
 A ship that keeps no course shows a loop: at small orders two rates, by the side that it came from.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range, component
 from ..ops import Number, clip, floor, where
 from ..signals import Nothing
-from .trial_order import ANGLE, HARD_OVER, START, Helm, Order, begun, first_side, given
+from .trial_order import ANGLE, HARD_OVER, START, Clock, Helm, Order, begun, first_side, given
 
 
 class Params(NamedTuple):
@@ -21,21 +21,15 @@ class Params(NamedTuple):
     helm: Helm = Helm()
 
 
-class State(NamedTuple):
-    """Time [s]."""
-
-    t: Any = 0.0
+def init(i: Nothing, p: Params) -> Clock:
+    return Clock()
 
 
-def init(i: Nothing, p: Params) -> State:
-    return State()
-
-
-def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Order]:
+def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Order]:
     t = s.t + h
     plateau = clip(floor((t - p.start + 0.5 * h) / p.hold), 0.0, 4.0 * p.plateaus)
     order = first_side(p.helm) * (abs(plateau / p.plateaus - 2.0) - 1.0)
-    return State(t), given(where(begun(t, p.start, h), order, 0.0), p)
+    return Clock(t), given(where(begun(t, p.start, h), order, 0.0), p)
 
 
 COMPONENT = component(

@@ -5,12 +5,12 @@ of the approach to that of full astern, the rudder being amidships (IMO, MSC.137
 13643-4:2017).
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import POSITIVE, Range, component
 from ..ops import Number, where
 from ..signals import Nothing
-from .trial_order import START, begun
+from .trial_order import START, Clock, begun
 
 ASTERN = Range(max=0.0)
 
@@ -23,26 +23,20 @@ class Params(NamedTuple):
     X_astern: Annotated[float, "N", "force full astern", ASTERN] = -1.0
 
 
-class State(NamedTuple):
-    """Time [s]."""
-
-    t: Any = 0.0
-
-
 class Outputs(NamedTuple):
     order: Annotated[float, "1", "order under trial: -1 full astern, 0 approach"] = 0.0
     n: Annotated[float, "1/s", "shaft speed"] = 0.0
     tau_X: Annotated[float, "N", "surge force"] = 0.0
 
 
-def init(i: Nothing, p: Params) -> State:
-    return State()
+def init(i: Nothing, p: Params) -> Clock:
+    return Clock()
 
 
-def step(s: State, i: Nothing, p: Params, h: Number) -> tuple[State, Outputs]:
+def step(s: Clock, i: Nothing, p: Params, h: Number) -> tuple[Clock, Outputs]:
     t = s.t + h
     astern = begun(t, p.start, h)
-    return State(t), Outputs(
+    return Clock(t), Outputs(
         where(astern, -1.0, 0.0),
         where(astern, p.n_astern, p.n_ahead),
         where(astern, p.X_astern, p.X_ahead),

@@ -37,6 +37,12 @@ class Order(NamedTuple):
     tau_N: Annotated[float, "N.m", "the order as a moment"] = 0.0
 
 
+class Clock(NamedTuple):
+    """State of a trial that goes by time alone [s]."""
+
+    t: Any = 0.0
+
+
 def begun(t: Number, start: Number, h: Number) -> Number:
     """Whether the instant t [s] is the first execute's or later, at steps of h [s]."""
     return t > start - 0.5 * h
