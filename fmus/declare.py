@@ -384,9 +384,18 @@ def component(
         init: annotated ``init(i: Inputs, p: Params) -> State``.
         step: annotated ``step(...) -> tuple[State, Outputs]``.
         more: further attributes of the :class:`Component`.
+
+    Raises:
+        DeclarationError: a function lacks these annotations.
     """
-    inputs, params, state = get_type_hints(init).values()
-    _, outputs = get_args(get_type_hints(step)["return"])
+    hints, given = get_type_hints(init), get_args(get_type_hints(step).get("return"))
+    if len(hints) != 3 or "return" not in hints or len(given) != 2:
+        raise DeclarationError(
+            f"{name}: init and step need annotations, init(i: Inputs, p: Params) -> State and "
+            "step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]"
+        )
+    inputs, params, state = hints.values()
+    _, outputs = given
     return Component(name, description, params, state, inputs, outputs, init, step, **more)
 
 

@@ -21,6 +21,7 @@ import diagnosis.identification
 import diagnosis.model
 import diagnosis.smoothing
 import fmus
+from fmus.build.finding import load
 
 ROOT = Path(__file__).parents[1]
 SYMBOLS = (ROOT / "docs" / "symbols.md").read_text(encoding="utf-8")
@@ -101,6 +102,14 @@ def test_a_notebook_is_in_the_index_and_uses_public_names(page):
             and node.value.id in ours
         ):
             assert node.attr in ours[node.value.id].__all__, ast.unparse(node)
+
+
+def test_a_controller_that_a_notebook_writes_is_one(tmp_path):
+    """The site builds and runs it; here it is declared."""
+    page = ROOT / "docs" / "notebooks" / "own_controller.md"
+    (code,) = re.findall(r"write_text\('{3}\n(.*?)'{3}\)", page.read_text("utf-8"), re.DOTALL)
+    (tmp_path / "pull.py").write_text(code, "utf-8")
+    assert load("pull", tmp_path / "pull.py")[1].name == "controller_pull"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)

@@ -346,6 +346,11 @@ def test_two_versions_in_one_process_run_their_own_code(tmp_path, opened):
     [
         ("x = 1\n", "declares no COMPONENT"),
         ("import nowhere\n", "fails when imported"),
+        (
+            "from fmus.declare import component\n"
+            "COMPONENT = component('pull', 'Spring', lambda i, p: None, lambda s, i, p, h: None)\n",
+            "init and step need annotations",
+        ),
         ("import sys\nsys.exit(5)\n", "fails when imported"),
         (OWN.format(gain="float('nan')"), "k starts at nan"),
         (OWN.format(gain=1.0).replace('"N/m"', '"furlong"'), "unknown unit 'furlong'"),

@@ -51,6 +51,8 @@ def load(name: str, own_file: Path | None, of: Ship | None = None) -> tuple[str,
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
+    except DeclarationError as error:
+        raise BuildError(f"'{own_file}': {error}") from error
     except (Exception, SystemExit) as error:
         raise BuildError(f"'{own_file}' fails when imported: {error!r}") from error
     component = getattr(module, "COMPONENT", None)
