@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis import Model, clean, diagnose, evaluate, integrals, load, smooth
+from diagnosis import Model, clean, diagnose, evaluate, load, smooth, weak_windows
 from diagnosis.assessment import LEVELS
 from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
@@ -84,7 +84,7 @@ def _share(each: Sequence[float]) -> str:
 
 def fitted(problem: Problem) -> tuple[Fitted, NominalPrior, list]:
     """The fit to predictions of the training runs of a problem, its prior, and all runs."""
-    runs = [integrals(smooth(clean(run))) for run in problem.runs]
+    runs = [weak_windows(smooth(clean(run))) for run in problem.runs]
     train = runs[:-1]
     names = [n for d in problem.hidden if d.values for n in STANDARD[d.plain].coefficients]
     prior = NominalPrior.of(Model(), problem.prior)

@@ -4,9 +4,9 @@ An FMU that replaces another one needs the same names.
 """
 
 if __name__ == "__main__":
-    from cosim.watch.watching import watched
+    from cosim.supervision.supervising import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Iterable, Sequence

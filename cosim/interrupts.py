@@ -4,8 +4,8 @@ A signal handler of Python runs between any two steps of the program, also betwe
 folder and the statement that remembers it. So a command leaves at once while it has nothing to clean up
 (:func:`leave_on_interrupt`), and interrupts wait while it makes, moves or removes files (:class:`Held`).
 
-A second process watches a command (:mod:`cosim.watch`). A terminal sends signals to both, and the
-watching process passes on its own: what it has counted is a request of the user, what it knows nothing
+A second process watches a command (:mod:`cosim.supervision`). A terminal sends signals to both, and the
+supervisor passes on its own: what it has counted is a request of the user, what it knows nothing
 of was sent to the working process alone, and ends it.
 """
 
@@ -40,7 +40,7 @@ INTERRUPTED = 130  # exit code: 128 + SIGINT, as shells have it
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 SIGNALS = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
 
-# Longest wall time until the watching process has counted a request that reached both processes, and in
+# Longest wall time until the supervisor has counted a request that reached both processes, and in
 # which the same request may reach this one again [s]; chosen: enough on a busy machine.
 SETTLED = 1.0
 # Wall time between two looks at that count [s]; chosen: not noticeable.

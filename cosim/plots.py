@@ -1,9 +1,9 @@
 """Draw the pictures of finished runs: ``python -m cosim.plots DIR... --out DIR``."""
 
 if __name__ == "__main__":
-    from cosim.watch.watching import watched
+    from cosim.supervision.supervising import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -6,9 +6,9 @@ believes the nominal model, and with one that believes what was found.
 """
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 import time

@@ -20,11 +20,11 @@ from .identification import method as method
 from .interactive import ShownDiagnosis as ShownDiagnosis
 from .interactive import diagnose as diagnose
 from .interactive import load as load
-from .model import Integrals as Integrals
 from .model import Model as Model
-from .model import integrals as integrals
+from .model import WeakWindows as WeakWindows
 from .model import omega as omega
 from .model import read_model as read_model
+from .model import weak_windows as weak_windows
 from .model import write_model as write_model
 from .model.uncertainty import omega_std as omega_std
 from .report.content import comparison_content as comparison_content

@@ -1,9 +1,9 @@
 """``python -m diagnosis`` tells which commands there are."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 from cosim.command import run_command
 

@@ -13,7 +13,7 @@ from .assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from .assessment.remainder_text import remainder_sentence
 from .identification.findings import Finding, Findings
 from .identification.refinement import at_limit
-from .model import Integrals, Model, omega
+from .model import Model, WeakWindows, omega
 from .model.uncertainty import omega_std
 from .unseen import harm
 from .withdrawal import AT_LIMIT, Unseen, without
@@ -58,7 +58,7 @@ def verdict(learned: Findings, refitted: bool, remainder: Remainder) -> Verdict:
     return "unexplained" if remainder.significant or learned.effects else "none"
 
 
-def concluded(found: Findings, runs: Sequence[Integrals], unseen: Unseen, start: Model) -> Conclusion:
+def concluded(found: Findings, runs: Sequence[WeakWindows], unseen: Unseen, start: Model) -> Conclusion:
     """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
@@ -71,7 +71,7 @@ def concluded(found: Findings, runs: Sequence[Integrals], unseen: Unseen, start:
         unseen: the data that decide.
         start: the model at first.
     """
-    if any(believed(f) for f in found.effects) or (found.effects and found.keep is None):
+    if any(believed(f) for f in found.effects) or (found.effects and found.refit is None):
         return Conclusion(found, False, [])
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
@@ -118,7 +118,7 @@ def _any(axes: Mapping[str, AxisRemainder]) -> bool:
     return any(a.significant for a in axes.values())
 
 
-def _left(runs: Sequence[Integrals], start: Model, model: Model) -> dict[str, AxisRemainder]:
+def _left(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
     before, after = ([omega(w, m) for w in runs] for m in (start, model))
     return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start)
 
@@ -137,7 +137,7 @@ def remainder_of(
         regions: where the learned model fails.
         learned: the findings.
     """
-    data, left = [e.integrals for e in evaluations], [e.after.omega for e in evaluations]
+    data, left = [e.weak_windows for e in evaluations], [e.after.omega for e in evaluations]
     first = [e.before.omega for e in evaluations]
     axes = axis_remainders(data, first, left, std, evaluations[0].model)
     how = recurrence(data, np.concatenate(left)) if _any(axes) else None

@@ -15,7 +15,7 @@ from .assessment.plausibility import refuse_implausible
 from .assessment.trial_errors import measured_passage
 from .data import Run, Track, clean, read, thinned
 from .data.unit_check import GO_ON
-from .model import Integrals, Model, integrals
+from .model import Model, WeakWindows, weak_windows
 from .model.weak_form import WIDTH
 from .parallel import for_each
 from .progress import Advance, silent
@@ -34,7 +34,7 @@ def gather(
     anyway: bool = False,
     model: Model | None = None,
     horizon: float | None = None,
-) -> list[Integrals]:
+) -> list[WeakWindows]:
     """Read and smooth measured runs, and refuse those whose files say something else than was meant.
 
     Faults of the channels that the channels themselves repair are repaired, see :mod:`.sensors`.
@@ -124,7 +124,7 @@ def _refuse_unrepaired(examined: Examined) -> None:
             raise InputError(f"run '{examined.run.name}': {finding.sentence}; {told}; {GO_ON}")
 
 
-def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> Integrals:
+def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> WeakWindows:
     """Windows of a run, at least one.
 
     Raises:
@@ -135,7 +135,7 @@ def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> Integra
         _refuse_spikes(smoothed)
     if not np.abs(run.tau_cmd).max() > 1e-6:
         raise InputError(f"run '{run.name}': its commands are zero throughout, which tells nothing")
-    w = integrals(smoothed, horizon)
+    w = weak_windows(smoothed, horizon)
     if not w.middle.size:
         raise InputError(f"run '{run.name}': too much is missing while the thrusters are at work")
     return w

@@ -14,7 +14,7 @@ from . import session
 from .data import Run, read_frame, ship_of_logs
 from .gathering import gather
 from .identification import DEFAULT, Method, Prior, shares
-from .model import Integrals, Model, ship_with, write_model
+from .model import Model, WeakWindows, ship_with, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
 from .report.notebook import Plots, as_html
@@ -39,7 +39,7 @@ def load(
     model: Model | None = None,
     ship: str | Path | None = None,
     horizon: float | None = None,
-) -> list[Integrals]:
+) -> list[WeakWindows]:
     """Read and smooth measured runs.
 
     Args:
@@ -88,7 +88,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
         raise InputError("a model has its ship: give model or ship, not both")
     if model is not None:
         return model
-    loaded = [w for w in runs if isinstance(w, Integrals)]
+    loaded = [w for w in runs if isinstance(w, WeakWindows)]
     if loaded and name is None:
         return session.nominal(loaded)
     if name is None:
@@ -100,7 +100,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
 
 def _are_loaded(runs: Any) -> bool:
     """Whether these are runs from :func:`load`."""
-    return bool(runs) and all(isinstance(w, Integrals) for w in runs)
+    return bool(runs) and all(isinstance(w, WeakWindows) for w in runs)
 
 
 def _listed(runs: Any) -> Sequence[Any]:
@@ -133,7 +133,7 @@ class ShownDiagnosis(session.Diagnosis):
 
         parts = []
         for e, std in zip(self.comparison.evaluations, self.comparison.omega_std, strict=True):
-            columns = {"run": e.name, "held_out": e.held_out, "time": e.integrals.middle}
+            columns = {"run": e.name, "held_out": e.held_out, "time": e.weak_windows.middle}
             columns |= {axis: e.after.omega[:, k] for k, axis in enumerate(AXES)}
             columns |= {f"{axis}_std": std[:, k] for k, axis in enumerate(AXES)}
             parts.append(pandas.DataFrame(columns))
@@ -175,8 +175,8 @@ class ShownDiagnosis(session.Diagnosis):
 
 
 def diagnose(
-    runs: Sequence[Integrals] | Source | Sequence[Source],
-    held_out: Sequence[Integrals] | Source | Sequence[Source] = (),
+    runs: Sequence[WeakWindows] | Source | Sequence[Source],
+    held_out: Sequence[WeakWindows] | Source | Sequence[Source] = (),
     prior: Prior = None,
     model: Model | None = None,
     advance: Advance = silent,

@@ -1,9 +1,9 @@
 """Learn what a model lacks: ``python -m diagnosis.learn TRAIN... [--test RUN...]``."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Measures of a manoeuvring trial: ``python -m diagnosis.measure_trial RUN``."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Principal components and outliers of runs: ``python -m diagnosis.pca RUN...``, 3.1 and 7.3."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Partial least squares of the model error: ``python -m diagnosis.pls RUN...``, 3.1.3 and 7.3."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 """Propose the file beside a measurement: ``python -m diagnosis.propose_columns FILE [--write]``."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 import json

@@ -1,9 +1,9 @@
 """Repair a measurement by its own channels: ``python -m diagnosis.repair RUN --out FILE``."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 import json

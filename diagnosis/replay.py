@@ -1,9 +1,9 @@
 """A run through observer and controller FMUs open loop: ``python -m diagnosis.replay RUN``, 7.1."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

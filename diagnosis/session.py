@@ -24,7 +24,7 @@ from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Finding, Findings
 from .identification.prior import NominalPrior
 from .identification.prior import shares as prior_shares
-from .model import Integrals, Model, omega, told_apart
+from .model import Model, WeakWindows, omega, told_apart
 from .model.uncertainty import omega_std
 from .model.weak_form import BLOCK
 from .parallel import for_each
@@ -65,7 +65,7 @@ class Comparison:
         return self._regions([e.after.omega for e in self.evaluations])
 
     def _regions(self, errors: Sequence[np.ndarray]) -> ErrorRegions:
-        return find_regions([e.integrals for e in self.evaluations], errors, self.omega_std)
+        return find_regions([e.weak_windows for e in self.evaluations], errors, self.omega_std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ def well_posed() -> Iterator[None]:
         raise InputError(f"these runs do not determine what is asked of them: {error}") from None
 
 
-def nominal(runs: Sequence[Integrals]) -> Model:
+def nominal(runs: Sequence[WeakWindows]) -> Model:
     """The nominal model of the ship that runs are of.
 
     Raises:
@@ -147,10 +147,10 @@ def nominal(runs: Sequence[Integrals]) -> Model:
 
 @well_posed()
 def evaluate(
-    runs: Sequence[Integrals],
+    runs: Sequence[WeakWindows],
     model: Model | Fmu | str | Path | None = None,
     after: Model | None = None,
-    held_out: Sequence[Integrals] = (),
+    held_out: Sequence[WeakWindows] = (),
     advance: Advance = silent,
 ) -> Comparison:
     """Compare a model, or two, with measured runs.
@@ -187,8 +187,8 @@ def evaluate(
 
 @well_posed()
 def diagnose(
-    train: Sequence[Integrals],
-    held_out: Sequence[Integrals] = (),
+    train: Sequence[WeakWindows],
+    held_out: Sequence[WeakWindows] = (),
     prior: Prior = None,
     model: Model | None = None,
     advance: Advance = silent,
@@ -274,7 +274,7 @@ def diagnose(
     )
 
 
-def _shares(learned: Findings, start: Model, held_out: Sequence[Integrals]) -> list[float]:
+def _shares(learned: Findings, start: Model, held_out: Sequence[WeakWindows]) -> list[float]:
     """Share of the initial sum of squares that each finding explains; axes weighted by noise.
 
     Of runs held out; of times within a run, which no other run has, by cross-validation.

@@ -1,9 +1,9 @@
 """System identification by concurrent learning: ``python -m diagnosis.sysid RUN...``, 7.2."""
 
 if __name__ == "__main__":
-    from cosim.watch import watched
+    from cosim.supervision import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -14,7 +14,7 @@ from cosim import InputError
 
 from .assessment.windows import Windows
 from .identification.acceptance import worse
-from .model import Integrals, Model, omega
+from .model import Model, WeakWindows, omega
 from .parallel import for_each
 
 FITS = "the model fits {where} worse"
@@ -42,7 +42,7 @@ class Part:
         blocks: numbers of the blocks of the stretch; None: all.
     """
 
-    def __init__(self, w: Integrals, blocks: np.ndarray | None = None) -> None:
+    def __init__(self, w: WeakWindows, blocks: np.ndarray | None = None) -> None:
         self.data = w
         number = np.unique(w.block, return_inverse=True)[1]
         self._rows = np.ones(number.size, bool) if blocks is None else np.isin(number, blocks)

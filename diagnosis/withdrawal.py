@@ -14,7 +14,7 @@ from .identification.acceptance import worse
 from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
 from .identification.refinement import at_limit
-from .model import Integrals, Model
+from .model import Model, WeakWindows
 from .unseen import Losses, Part, gain, harm, losses
 
 ALONE = "with it {harm}"
@@ -41,7 +41,11 @@ class Unseen:
     """
 
     def __init__(
-        self, train: Sequence[Integrals], held_out: Sequence[Integrals], start: Model, sigma: np.ndarray
+        self,
+        train: Sequence[WeakWindows],
+        held_out: Sequence[WeakWindows],
+        start: Model,
+        sigma: np.ndarray,
     ) -> None:
         self._start, self._sigma, self._held_out = start, sigma, bool(held_out)
         self.where = "held-out runs" if held_out else "data left out of the fit"
@@ -170,7 +174,7 @@ def _model(found: Findings, start: Model) -> Model:
 def without(found: Findings, ids: Sequence[str], start: Model) -> Findings:
     """The findings without some effects; by subtraction where the method cannot fit the rest anew."""
     rest = [f for f in found.effects if f.id not in ids]
-    return added(found, rest, start) if found.keep is None else found.keep([f.id for f in rest])
+    return added(found, rest, start) if found.refit is None else found.refit([f.id for f in rest])
 
 
 def added(found: Findings, effects: Sequence[Finding], start: Model) -> Findings:

@@ -13,7 +13,7 @@ from rich.console import Console
 
 import cosim
 import diagnosis
-from diagnosis import Diagnosis, Integrals, Model, diagnosis_content
+from diagnosis import Diagnosis, Model, WeakWindows, diagnosis_content
 from diagnosis.identification import shares
 from diagnosis.progress import Advance, progress
 
@@ -27,7 +27,9 @@ from .study_report import Report
 LEFT_OUT = {"where", "where_after"}
 
 
-def learned(runs: Sequence[Integrals], prior: float | None, quick: bool, advance: Advance) -> list[Fold]:
+def learned(
+    runs: Sequence[WeakWindows], prior: float | None, quick: bool, advance: Advance
+) -> list[Fold]:
     """Each run left out in turn; the first alone for a first look."""
 
     def without(name: str) -> Advance:

@@ -14,7 +14,7 @@ import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Diagnosis, DiagnosisContent, Integrals, Model, diagnosis_content
+from diagnosis import Diagnosis, DiagnosisContent, Model, WeakWindows, diagnosis_content
 from diagnosis.progress import Advance
 
 from .study_command import run_study, study_parser
@@ -56,7 +56,7 @@ def folds_command(
 
 
 def learn_folds(
-    runs: Sequence[Integrals], folds: int | None, model: Model, advance: Advance
+    runs: Sequence[WeakWindows], folds: int | None, model: Model, advance: Advance
 ) -> Iterator[Fold]:
     """Learn from the runs of all folds but one, for each fold.
 

@@ -18,7 +18,7 @@ from diagnosis.analysis.sysid_report import warnings
 from diagnosis.analysis.table_7_1 import NAMES, TABLE_7_1, row
 from diagnosis.analysis.table_7_1 import plant as plant_of
 from diagnosis.assessment import least_dissipation
-from diagnosis.model import Model, integrals, omega, read_model
+from diagnosis.model import Model, omega, read_model, weak_windows
 from diagnosis.pca import main as pca
 from diagnosis.pls import main as pls
 from diagnosis.report.formatting import number
@@ -74,7 +74,7 @@ class TestLinearMap:
     def test_diagnosis_sees_the_part_of_the_force(self):
         """The model error of a measured run is the same by a loss of the thrusters and by the map."""
         run, _ = sail(32.0, h=0.05)
-        w = integrals(smoothed(run))
+        w = weak_windows(smoothed(run))
         by_map = Model(vessel={parameter("X", "tau_X"): -0.3, parameter("N", "tau_N"): -0.2})
         by_loss = Model(thrusters={"loss_surge": 0.3, "loss_yaw": 0.2})
         assert omega(w, by_map) == pytest.approx(omega(w, by_loss), abs=1e-9)

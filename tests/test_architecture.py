@@ -29,7 +29,7 @@ COSIM_LAYERS = (
     ("system",),
     ("results",),
     ("trials",),
-    ("master", "watch"),
+    ("master", "supervision"),
     ("dispatch",),
     ("export", "campaign"),
     ("simulating", "run", "metrics", "plots", "interface"),  # Python, commands
@@ -113,7 +113,7 @@ PUBLIC_TO_DIAGNOSIS = (
     "cosim.process",
     "cosim.results",
     "cosim.trials",
-    "cosim.watch",
+    "cosim.supervision",
 )
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
 # components and effects of a user's own. A module without ``__all__`` offers what it defines.

@@ -8,7 +8,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model
-from diagnosis.model import integrals, omega
+from diagnosis.model import omega, weak_windows
 from diagnosis.model.weak_form import WIDTH, places
 
 HALF = 1500
@@ -23,9 +23,9 @@ def base():
 @pytest.mark.parametrize("gap", [10.0, 100.0])
 def test_no_window_spans_a_long_gap(gap):
     time = base().time + np.where(np.arange(base().time.size) < HALF, 0.0, gap)
-    windows = integrals(smoothed(replace(base(), time=time)))
+    windows = weak_windows(smoothed(replace(base(), time=time)))
     before, after = time[HALF - 1], time[HALF]
-    assert windows.middle.size > 0.9 * integrals(smoothed(base())).middle.size - 6
+    assert windows.middle.size > 0.9 * weak_windows(smoothed(base())).middle.size - 6
     assert (
         (windows.middle + WIDTH / 2 <= before + 0.5) | (windows.middle - WIDTH / 2 >= after - 0.5)
     ).all()

@@ -8,7 +8,7 @@ import pytest
 from support.cases import in_part
 from support.measured import commands, jumps, sail, slow_swings, smoothed
 
-from diagnosis import Model, Windows, clean, integrals
+from diagnosis import Model, Windows, clean, weak_windows
 from diagnosis.model import omega
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
@@ -128,7 +128,7 @@ def unheard(run):
 def test_hole_in_the_commands_spoils_no_window(change):
     run, _ = sail(SECONDS, H, given=jumps)
     run = thinned(run, 2)
-    whole, other = (integrals(smoothed(r)) for r in (run, change(run)))
+    whole, other = (weak_windows(smoothed(r)) for r in (run, change(run)))
     assert whole.middle.size - 28 <= other.middle.size < whole.middle.size - 12
     rms = [np.sqrt(np.mean(omega(w, Model()) ** 2, axis=0)) for w in (whole, other)]
     assert (rms[1] <= 1.5 * rms[0]).all()

@@ -31,7 +31,7 @@ HIDDEN = {
 
 def windows(noise, seed=1, **hidden):
     run, _ = sail(160.0, h=0.05, noise=noise, seed=seed, **hidden)
-    return diagnosis.integrals(smoothed(run))
+    return diagnosis.weak_windows(smoothed(run))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from diagnosis import Model, Windows, omega
 from diagnosis.identification.candidates import additions, candidate, covered, model_error
 from diagnosis.identification.multistart import Landscape, best_values
 from diagnosis.identification.segmentation import programmed
-from diagnosis.model import integrals, read_model, write_model
+from diagnosis.model import read_model, weak_windows, write_model
 from fmus.declare import Range, Variable
 from fmus.effects import STANDARD, effect
 
@@ -27,7 +27,7 @@ def times(device, spans, run=""):
 @pytest.mark.parametrize("device", ["bow", pytest.param("vsp", marks=pytest.mark.slow)])
 def test_intervals_of_an_outage_are_found_and_survive_a_parameter_set(device, tmp_path):
     hidden = times(device, SPANS)
-    w = integrals(smoothed(sail(64.0, thrusters=hidden)[0]))
+    w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))
     model = Model()
     base = model_error([w], model)
     (shape,) = candidate([w], model, base, STANDARD[f"{device}_outage"]).shapes
@@ -53,7 +53,7 @@ def test_what_is_tried_of_a_coefficient_is_an_addition_and_of_a_shape_the_value_
 
 def test_without_an_outage_there_are_no_intervals_and_one_for_good_is_a_failure():
     for hidden in ({}, {"bow_failure_time": 30.0}):
-        w = integrals(smoothed(sail(64.0, thrusters=hidden)[0]))
+        w = weak_windows(smoothed(sail(64.0, thrusters=hidden)[0]))
         model = Model()
         base = model_error([w], model)
         assert not candidate([w], model, base, STANDARD["bow_outage"]).shapes
@@ -67,7 +67,7 @@ def in_runs(thrusters):
     made = {
         name: sail(64.0, thrusters=own, seed=k)[0] for k, (name, own) in enumerate(thrusters.items())
     }
-    return [integrals(smoothed(replace(run, name=name))) for name, run in made.items()]
+    return [weak_windows(smoothed(replace(run, name=name))) for name, run in made.items()]
 
 
 def test_outages_at_other_times_in_each_run_are_found_where_they_are():
@@ -111,10 +111,10 @@ def test_times_of_one_run_are_left_out_of_the_predictions_of_others():
 
 
 def test_what_is_dead_most_of_the_time_is_no_outage():
-    w = integrals(smoothed(sail(64.0, thrusters=times("vsp", [(8.0, 45.0)]))[0]))
+    w = weak_windows(smoothed(sail(64.0, thrusters=times("vsp", [(8.0, 45.0)]))[0]))
     model = Model()
     assert not candidate([w], model, model_error([w], model), STANDARD["vsp_outage"]).shapes
-    rest = [integrals(smoothed(replace(sail(64.0)[0], name=name))) for name in "bc"]
+    rest = [weak_windows(smoothed(replace(sail(64.0)[0], name=name))) for name in "bc"]
     assert not candidate(
         [w, *rest], model, model_error([w, *rest], model), STANDARD["vsp_outage"]
     ).shapes

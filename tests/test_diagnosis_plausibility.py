@@ -11,7 +11,7 @@ from support.cases import in_part
 from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
-from diagnosis import InputError, Model, Run, compare, integrals, read
+from diagnosis import InputError, Model, Run, compare, read, weak_windows
 from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -68,7 +68,7 @@ MISTAKES = [
     ("mistake", "line", "edits"), in_part(MISTAKES, keep=[MISTAKES[0], MISTAKES[4]])
 )
 def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_path):
-    w = integrals(smoothed(replace(edited(**edits), file=tmp_path / "a.csv")))
+    w = weak_windows(smoothed(replace(edited(**edits), file=tmp_path / "a.csv")))
     with pytest.raises(InputError) as error:
         refuse_implausible([w], Model())
     text = str(error.value)
@@ -97,13 +97,15 @@ HARMLESS = [
 def test_no_effect_is_a_mistake(ship, thrusters):
     run = sail(60.0, 0.05, ship=ship, thrusters=thrusters)[0]
     assert same_columns(run) is None
-    assert likeliest_mistake(integrals(smoothed(run)), Model()) is None
+    assert likeliest_mistake(weak_windows(smoothed(run)), Model()) is None
 
 
 def test_late_clock_is_no_mistake():
     late = replace(base(), pose=np.vstack([np.repeat(base().pose[:1], 10, axis=0), base().pose[:-10]]))
     noise = 1e-4 * np.random.default_rng(0).standard_normal(late.pose.shape)
-    assert likeliest_mistake(integrals(smoothed(replace(late, pose=late.pose + noise))), Model()) is None
+    assert (
+        likeliest_mistake(weak_windows(smoothed(replace(late, pose=late.pose + noise))), Model()) is None
+    )
 
 
 def test_ship_of_another_size_is_no_mistake():
@@ -115,7 +117,7 @@ def test_ship_of_another_size_is_no_mistake():
         pose=run.pose * [scale, scale, 1.0],
         tau_cmd=run.tau_cmd * [scale**3, scale**3, scale**4],
     )
-    assert likeliest_mistake(integrals(smoothed(large)), Model()) is None
+    assert likeliest_mistake(weak_windows(smoothed(large)), Model()) is None
 
 
 @pytest.mark.parametrize(
@@ -152,7 +154,7 @@ def test_command_refuses_goes_on_anyway_and_takes_the_line(tmp_path):
 def test_real_run_is_no_mistake(name):
     run = read(DATA / "cse1" / f"{name}.mat")
     assert same_columns(run) is None
-    assert likeliest_mistake(integrals(smoothed(run)), Model()) is None
+    assert likeliest_mistake(weak_windows(smoothed(run)), Model()) is None
 
 
 @pytest.mark.slow
@@ -163,5 +165,5 @@ def test_tanker_with_a_rudder_is_no_mistake():
     pose = np.column_stack([data.x, data.y, np.radians(data.psi_deg)])
     for sign in (1.0, -1.0):
         rudder = np.column_stack([0.0 * data.t, 0.0 * data.t, sign * data.rudder_deg])
-        w = integrals(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
+        w = weak_windows(smoothed(Run("z", data.t.to_numpy(), pose, rudder)))
         assert likeliest_mistake(w, Model()) is None

@@ -13,7 +13,7 @@ from diagnosis.assessment.windows import Windows
 from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
-from diagnosis.model import Model, integrals
+from diagnosis.model import Model, weak_windows
 from diagnosis.model.weak_form import EVERY, HORIZON
 from diagnosis.prediction_error import push as pushes
 from diagnosis.prediction_error import shooting
@@ -69,12 +69,12 @@ def windows():
 @cache
 def hidden():
     """A run of a ship with more drag than the model has."""
-    return integrals(smoothed(sail(ship={"delta_X_u": DRAG})[0]))
+    return weak_windows(smoothed(sail(ship={"delta_X_u": DRAG})[0]))
 
 
 @cache
 def as_modelled():
-    return integrals(smoothed(sail()[0]))
+    return weak_windows(smoothed(sail()[0]))
 
 
 @cache
@@ -204,7 +204,7 @@ def test_moment_that_lasts_a_second_does_not_pass_for_less_damping():
     data = []
     for seed in (1, 2, 3):
         run = sail(300.0, 0.05, {"N_r": LIGHTLY_DAMPED}, seed=seed, given=partial(jolted, seed=seed))[0]
-        data.append(integrals(smoothed(replace(run, tau_cmd=straight_on(run.time)))))
+        data.append(weak_windows(smoothed(replace(run, tau_cmd=straight_on(run.time)))))
     prior = NominalPrior.of(Model(), 0.0)
     at = Estimate(Model(), np.zeros(prior.size), {"delta_N_r": 0.0}, np.zeros((1, 1)))
     for _ in range(2):  # the second time with what the first leaves as noise
@@ -269,7 +269,7 @@ def test_fits_that_differ_are_told():
 @pytest.mark.parametrize(("axis", "size"), [(2, 0.3), (0, -1.0)])
 def test_push_at_a_time_is_told_with_time_axis_and_size(axis, size):
     run = sail(given=partial(pushed, axis=axis, size=size))[0]
-    w = integrals(smoothed(replace(run, tau_cmd=commands(run.time))))
+    w = weak_windows(smoothed(replace(run, tau_cmd=commands(run.time))))
     (found,) = unrecorded([w], Model(), NO_PUSH, {}).stretches
     assert (found.run, found.axis) == (w.run.name, "XYN"[axis])
     assert (found.start, found.end) == pytest.approx((30.0, 32.0), abs=0.5)
@@ -278,7 +278,7 @@ def test_push_at_a_time_is_told_with_time_axis_and_size(axis, size):
 
 def test_blow_that_may_be_a_jump_of_the_pose_is_not_told():
     run = sail(given=partial(pushed, axis=2, size=2.0, seconds=0.3))[0]
-    w = integrals(smoothed(replace(run, tau_cmd=commands(run.time))))
+    w = weak_windows(smoothed(replace(run, tau_cmd=commands(run.time))))
     assert not unrecorded([w], Model(), NO_PUSH, {}).stretches
 
 

@@ -5,7 +5,7 @@ import pytest
 from support.measured import NOISE, smoothed
 from test_diagnosis_selection import learn
 
-from diagnosis import Model, Run, integrals
+from diagnosis import Model, Run, weak_windows
 from diagnosis.data.reading import ASIDE, force, propellers
 from fmus.actuators.response import total
 from fmus.effects import STANDARD, Running, Thrust
@@ -44,7 +44,7 @@ def voyage(seconds=90.0, **values):
             total += chain.act(tuple(one), chain.running(now, *s[3:6], one, drive), drive)
         s, _ = model.ship.vessel.advance(s, Force(*total.tolist()), ready, H)
     pose = np.array(poses) + NOISE * np.random.default_rng(4).standard_normal((t.size, 3))
-    return integrals(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))
+    return weak_windows(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))
 
 
 AT = (-0.4575, -0.4575, 0.3875)

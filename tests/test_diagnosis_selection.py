@@ -9,7 +9,7 @@ from diagnosis.identification import forward_selection, method
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate, TrainingSet
 from diagnosis.identification.shortlist import NEW, novelty, rank
-from diagnosis.model import Model, integrals, omega
+from diagnosis.model import Model, omega, weak_windows
 from diagnosis.model.weak_form import kernel, kernel_integral, kernel_rate
 from fmus.effects import STANDARD
 
@@ -22,7 +22,7 @@ def learn(data, prior, model=None):
 def data(seconds=96.0, **hidden):
     """Windows of a run of the ship with something hidden in it, and the true velocity."""
     run, nu = sail(seconds, **hidden)
-    return integrals(smoothed(run)), nu
+    return weak_windows(smoothed(run)), nu
 
 
 def rms(x):

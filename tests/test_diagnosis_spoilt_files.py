@@ -13,7 +13,7 @@ from support.planted import voyages
 import diagnosis
 from benchmarks.spoilt_files.outcomes import Outcome, outcome
 from benchmarks.spoilt_files.ways import POSE, TAU, WAYS, struck
-from diagnosis import InputError, Model, compare, integrals, learn
+from diagnosis import InputError, Model, compare, learn, weak_windows
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import refuse_implausible
 from diagnosis.assessment.readings import Reading, of_commands, of_pose, reread
@@ -26,7 +26,7 @@ RATE = 20  # Hz
 
 @cache
 def windows():
-    return integrals(smoothed(sail(60.0, 1.0 / RATE)[0]))
+    return weak_windows(smoothed(sail(60.0, 1.0 / RATE)[0]))
 
 
 def good(given=commands):
@@ -147,7 +147,7 @@ SHIPS = [
 @pytest.mark.parametrize(("ship", "thrusters"), in_part(SHIPS, keep=[SHIPS[k] for k in (4, 9)]))
 def test_no_hidden_effect_is_refused(ship, thrusters, given):
     run = sail(60.0, 1.0 / RATE, ship=ship, thrusters=thrusters, given=given)[0]
-    refuse_implausible([integrals(smoothed(run))], Model())
+    refuse_implausible([weak_windows(smoothed(run))], Model())
 
 
 @pytest.mark.slow
@@ -172,7 +172,7 @@ def test_gains_are_one_and_follow_units_and_clock():
 
 def test_gain_of_drag_and_surroundings_is_one():
     ship = {"delta_X_u": -8.0, "delta_Y_v": -20.0, "F_n": 0.5, "body_bias_X": 0.3}
-    w = integrals(smoothed(sail(60.0, 1.0 / RATE, ship=ship)[0]))
+    w = weak_windows(smoothed(sail(60.0, 1.0 / RATE, ship=ship)[0]))
     assert gains(w, Model()).value == pytest.approx([1.0, 1.0, 1.0], abs=0.1)
 
 

@@ -9,7 +9,7 @@ from support.measured import NOISE, commands, smoothed
 from support.planted import bank, dead_bow, gusts, voyages
 
 import diagnosis
-from diagnosis import Model, Run, integrals, omega
+from diagnosis import Model, Run, omega, weak_windows
 from diagnosis.assessment.evaluation import evaluate_run
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
@@ -72,7 +72,7 @@ def lap():
     ahead = np.unwrap(np.arctan2(2.0 * np.cos(along), -3.0 * np.sin(along)))
     pose = np.column_stack([3.0 * np.cos(along), 2.0 * np.sin(along), ahead])
     pose += NOISE * np.random.default_rng(0).standard_normal(pose.shape)
-    return [integrals(smoothed(Run("lap", t, pose, commands(t))))]
+    return [weak_windows(smoothed(Run("lap", t, pose, commands(t))))]
 
 
 @pytest.mark.parametrize("space", ["place", "motion", "command", None])
@@ -186,7 +186,7 @@ def test_thruster_that_fails_at_times_is_found_with_its_intervals():
     *trained, held_out = found.comparison.evaluations
     for e in trained:
         assert e.after.position < 0.5 * e.before.position
-    timeless = evaluate_run(held_out.integrals, replace(found.learned.model, runs={})).before
+    timeless = evaluate_run(held_out.weak_windows, replace(found.learned.model, runs={})).before
     assert np.array_equal(held_out.after.residuals, timeless.residuals), "it has none of their times"
     assert found.shares[0] > 0.5, "of its own runs"
     assert found.withdrawn == []
@@ -333,7 +333,7 @@ def test_coefficients_moved_beyond_belief_do_not_take_the_place_of_an_effect(mov
     nominal = start.value("X_u")
     rest = Findings(refitted=Model(vessel={"X_u": nominal - 3.0}), moved={"X_u": moved})
     almost = finding(start, delta_X_u=-2.5)
-    found = Findings([almost], model=almost.model, sigma=np.full(3, 0.01), keep=lambda ids: rest)
+    found = Findings([almost], model=almost.model, sigma=np.full(3, 0.01), refit=lambda ids: rest)
     unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
     full, other, first = unseen.losses(found, rest, start)
     assert harm(full, other)

@@ -12,11 +12,11 @@ from diagnosis import Model, omega_std
 from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME
 from diagnosis.assessment.regions import _Design, find_regions
-from diagnosis.model import integrals, omega
+from diagnosis.model import omega, weak_windows
 
 
 def windows(run):
-    return integrals(smoothed(run))
+    return weak_windows(smoothed(run))
 
 
 def found(seconds=240.0, **hidden):

@@ -24,7 +24,7 @@ from cosim.campaign.run_table import JOURNAL, TABLE
 from cosim.export.__main__ import main as export_main
 from fmus.build.__main__ import main as build_main
 
-linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no watching process here")
+linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no supervisor here")
 
 OUTPUT = "self.y = 0.0\nself.register_variable(Real('y', causality=Fmi2Causality.output))\n"
 FACTOR = (

@@ -12,7 +12,7 @@ from cosim import InputError
 from diagnosis import Model, diagnose
 from diagnosis.identification import Method, method
 from diagnosis.identification.candidates import candidates, model_error
-from diagnosis.model import integrals
+from diagnosis.model import weak_windows
 from diagnosis.model.thrust import Response, thrust
 from diagnosis.report.finding_text import sentence
 from fmus.build import build
@@ -77,7 +77,7 @@ def craft(tmp_path):
 
 def windows(seconds=96.0, **hidden):
     run, _ = sail(seconds, **hidden)
-    return integrals(smoothed(run))
+    return weak_windows(smoothed(run))
 
 
 def learn(w, craft=None):

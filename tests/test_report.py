@@ -19,7 +19,7 @@ from support.measured import sail, smoothed
 
 from diagnosis import Model, PredictionError, evaluate_run
 from diagnosis.assessment.windows import free_runs
-from diagnosis.model import integrals
+from diagnosis.model import weak_windows
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.report import (
     ComparisonContent,
@@ -45,7 +45,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 @pytest.fixture(scope="module")
 def data():
     runs = [sail(40.0, thrusters=HIDDEN, seed=k)[0] for k in range(2)]
-    return [integrals(smoothed(replace(r, name=n))) for r, n in zip(runs, (EVIL, "b"), strict=True)]
+    return [weak_windows(smoothed(replace(r, name=n))) for r, n in zip(runs, (EVIL, "b"), strict=True)]
 
 
 @pytest.fixture(scope="module")
@@ -324,7 +324,7 @@ def test_model_that_runs_away_is_drawn(evaluations, tmp_path):
 def test_binned_errors_add_up(evaluations):
     """The mean square of all bins, weighted by their windows, is that of the windows in them."""
     for quantity in QUANTITIES:
-        values = np.concatenate([quantity.values(e.integrals) for e in evaluations])
+        values = np.concatenate([quantity.values(e.weak_windows) for e in evaluations])
         columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
         omega = np.concatenate([e.before.omega for e in evaluations])
         for axis, error in enumerate(binned_errors(quantity, evaluations, None)):
@@ -498,7 +498,7 @@ def test_arrows_point_where_the_missing_force_does(data):
     """A force to the north and to the east by the heading of the ship, from its own axes."""
     e = evaluate_run(data[1], Model())
     north, east = 0.3, -0.2
-    c, s = np.cos(psi := np.radians(heading(e.integrals))), np.sin(psi)
+    c, s = np.cos(psi := np.radians(heading(e.weak_windows))), np.sin(psi)
     omega = np.column_stack([c * north + s * east, c * east - s * north, 0.0 * c])
     known = replace(e, before=replace(e.before, omega=omega))
     (arrows,) = (a for a in tracks.place(known, False).axes[0].collections if hasattr(a, "U"))

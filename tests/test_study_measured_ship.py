@@ -16,7 +16,7 @@ from support.project import ROOT
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, integrals, omega, session
+from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, omega, session, weak_windows
 from diagnosis.identification import Suspect
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import allocate
@@ -39,7 +39,7 @@ def five(run):
 def windows(commands=None, power=None, seconds=64.0):
     run, _ = sail(seconds, h=0.05)
     run = replace(run, five=five(run) if commands is None else commands(run), power=power)
-    return integrals(diagnosis.smooth(diagnosis.clean(run)))
+    return weak_windows(diagnosis.smooth(diagnosis.clean(run)))
 
 
 # What the propellers give

@@ -656,7 +656,7 @@ def test_fall_of_the_heading_is_told_beside_that_with_the_run_learned_from(tmp_p
 def test_falls_are_told_beside_their_targets(tmp_path, monkeypatch):
     def fold(name, kind, *falls):
         rms = SimpleNamespace(omega_rms=np.array([0.4, 0.3, 0.2]))
-        evaluation = SimpleNamespace(integrals=None, before=rms, after=rms)
+        evaluation = SimpleNamespace(weak_windows=None, before=rms, after=rms)
         return SimpleNamespace(name=name, evaluation=evaluation, kind=kind, falls=falls)
 
     high, low = Fall(8.0, 9.0, 99.0, 0.1, 0.1), Fall(0.5, float("nan"), 99.0, 0.1, 0.1)

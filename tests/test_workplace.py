@@ -341,9 +341,9 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
 
     found = SimpleNamespace(
         effects=[SimpleNamespace(id="a", of_runs=[]), SimpleNamespace(id="b", of_runs=[])],
-        model=model(0.1), sigma=np.ones(3), keep=keep,
+        model=model(0.1), sigma=np.ones(3), refit=keep,
     )  # fmt: skip
-    runs = [SimpleNamespace(held_out=False, integrals=None)]
+    runs = [SimpleNamespace(held_out=False, weak_windows=None)]
     assert unique_share.unique_shares(found, model(1.0), runs) == pytest.approx([0.8, 0.0])
 
 

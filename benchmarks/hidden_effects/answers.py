@@ -11,15 +11,15 @@ import numpy as np
 from cosim import InputError, atomic_write
 from diagnosis import (
     Comparison,
-    Integrals,
     Model,
+    WeakWindows,
     clean,
     diagnose,
     diagnosis_content,
     evaluate_run,
-    integrals,
     method,
     smooth,
+    weak_windows,
 )
 from diagnosis.assessment import LEVELS, Bands
 from diagnosis.progress import silent
@@ -48,7 +48,7 @@ def answer(problem: Problem, peers: bool) -> Answer:
     if problem.note:
         return {"note": problem.note}
     begun = time.process_time()
-    *train, last = (integrals(smooth(clean(run))) for run in problem.runs)
+    *train, last = (weak_windows(smooth(clean(run))) for run in problem.runs)
     try:
         diagnosis = diagnose(train, [last], problem.prior)
         content = diagnosis_content(diagnosis, None, []).model_dump(mode="json")
@@ -97,7 +97,7 @@ def predictions(comparison: Comparison) -> dict[str, bool]:
     return {n: bool(d.sum() > 2.0 * np.sqrt(d.size) * d.std()) for n, d in changes.items()}
 
 
-def truth(problem: Problem, held_out: Integrals) -> float | None:
+def truth(problem: Problem, held_out: WeakWindows) -> float | None:
     """Window position error [mm] of the true model; None where the diagnosis has none of its form."""
     if problem.vessel is None or problem.thrusters is None:
         return None
@@ -105,7 +105,7 @@ def truth(problem: Problem, held_out: Integrals) -> float | None:
     return 1e3 * evaluate_run(held_out, model).before.position
 
 
-def first_effect(peer: str, data: Sequence[Integrals]) -> str:
+def first_effect(peer: str, data: Sequence[WeakWindows]) -> str:
     """Id of the first effect that another method finds."""
     chosen = method(peer)
     try:

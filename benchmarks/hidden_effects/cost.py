@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from cosim import SimulationError
-from diagnosis import Model, Run, clean, integrals, method, read, smooth
+from diagnosis import Model, Run, clean, method, read, smooth, weak_windows
 from diagnosis.progress import silent
 
 from .manoeuvres import manoeuvres
@@ -75,7 +75,7 @@ def _learned(files: Sequence[Path]) -> tuple[float, float]:
 
 def main() -> None:
     begun = time.perf_counter()
-    data = [integrals(smooth(clean(read(path)))) for path in sys.argv[1:]]
+    data = [weak_windows(smooth(clean(read(path)))) for path in sys.argv[1:]]
     method().fit(data, Model(), 0.1, silent, 0)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     print(time.perf_counter() - begun, peak)

@@ -94,7 +94,7 @@ def kind(work: Path, rng: random.Random) -> tuple[Path, dict[str, str]]:
 
 
 def kills(count: int, seed: int, work: Path, advance: Callable[[], None]) -> list[str]:
-    """Kill the simulating process, and every second time the watching one, at random times."""
+    """Kill the simulating process, and every second time the supervising one, at random times."""
     rng, wrong = random.Random(seed), []
     for k in range(count):
         out, (path, loop) = work / f"kill{k}", kind(work, rng)

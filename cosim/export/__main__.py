@@ -1,9 +1,9 @@
 """Export a scenario to other tools: ``python -m cosim.export SCENARIO --ssp FILE.ssp``."""
 
 if __name__ == "__main__":
-    from cosim.watch.watching import watched
+    from cosim.supervision.supervising import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """What another process must know of a command whose process has died: its files, and the last call.
 
 The state lies in one block of memory. A command shares it with the process that watches it
-(:mod:`cosim.watch`); from Python it is written all the same, which costs less than a test whether
+(:mod:`cosim.supervision`); from Python it is written all the same, which costs less than a test whether
 anybody reads it.
 """
 
@@ -36,7 +36,7 @@ class RunState:
     Attributes:
         numbers: whole numbers, by place: INSTANCE is the position in ``names`` of the FMU that the step
             loop is calling, NAMED if the call is the text CALL, or NOTHING; REQUESTS counts the
-            interrupts that the watching process has received; ENDED is 1 once the command has ended in
+            interrupts that the supervisor has received; ENDED is 1 once the command has ended in
             order, with exit code CODE; LOGGING is 1 once the log is the run's own; TAKEN is the number
             of rows that wait in ROWS, and STEPS that of the rows before them, both at every base step;
             HELD is 1 while interrupts wait.

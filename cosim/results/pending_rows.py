@@ -1,6 +1,6 @@
 """The rows of a run that are not in its log yet.
 
-They lie where a watching process finds them (:mod:`cosim.process.run_state`), which writes them if the
+They lie where a supervisor finds them (:mod:`cosim.process.run_state`), which writes them if the
 simulating one dies: nothing that was computed is lost.
 """
 

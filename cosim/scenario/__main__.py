@@ -1,9 +1,9 @@
 """Print the JSON Schema of scenario files: ``python -m cosim.scenario``."""
 
 if __name__ == "__main__":
-    from cosim.watch.watching import watched
+    from cosim.supervision.supervising import supervised
 
-    watched()  # before all other imports, which take a while
+    supervised()  # before all other imports, which take a while
 
 import argparse
 import json

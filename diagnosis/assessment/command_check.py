@@ -6,7 +6,7 @@ import numpy as np
 
 from ..data import Run
 from ..data.columns import TAU
-from ..model import Integrals, Model, integrals
+from ..model import Model, WeakWindows, weak_windows
 from ..model.thrust import full_thrust
 from .readings import inertial, needed
 
@@ -49,7 +49,7 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     return f"{seen}: leave the cells of false commands empty, and log commands after they are clipped"
 
 
-def contradicted_commands(w: Integrals, model: Model) -> str | None:
+def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted.
 
     Args:
@@ -81,13 +81,13 @@ def contradicted_commands(w: Integrals, model: Model) -> str | None:
     return _moves_on(w, model, size)
 
 
-def _moves_on(w: Integrals, model: Model, size: np.ndarray) -> str | None:
+def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     """A clause about a ship that goes on as before while all of its commands are zero."""
     s, tau = w.smoothed, w.run.tau_cmd
     if not (np.abs(tau).max(axis=1) == 0.0).any():
         return None
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None, five=None)
-    every = integrals(replace(s, track=replace(s.track, run=always)))
+    every = weak_windows(replace(s, track=replace(s.track, run=always)))
     idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
     if idle.sum() < LONG:
         return None

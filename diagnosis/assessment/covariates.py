@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..model import Integrals
+from ..model import WeakWindows
 
 AXES = "XYN"
 QUANTILE_BINS = 8  # bins of equal numbers of windows; chosen
@@ -125,7 +125,7 @@ class CovariateValues:
         return self.covariate.bin_edges(self.values)
 
 
-def covariates_by_axis(data: Sequence[Integrals]) -> list[list[CovariateValues]]:
+def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues]]:
     """The covariates for X, Y and N: those of all runs together, then the time of each run.
 
     Args:
@@ -154,7 +154,7 @@ def covariates_by_axis(data: Sequence[Integrals]) -> list[list[CovariateValues]]
     return [[*shared, CovariateValues(THRUST, every, level[:, k] / most[k]), *times] for k in range(3)]
 
 
-def _of_run(w: Integrals) -> tuple[np.ndarray, ...]:
+def _of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:
     """Means over the windows of a run.
 
     Returns:

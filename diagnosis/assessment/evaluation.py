@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim import InputError
 
-from ..model import Integrals, Model, omega
+from ..model import Model, WeakWindows, omega
 from ..smoothing import Smoothed
 from .bands import Bands
 from .windows import WindowErrors, Windows
@@ -50,7 +50,7 @@ class Evaluation:
 
     Attributes:
         model: the initial model.
-        integrals: the run, in windows of the weak form.
+        weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
         held_out: whether nothing was learned from it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
@@ -62,7 +62,7 @@ class Evaluation:
     """
 
     model: Model
-    integrals: Integrals
+    weak_windows: WeakWindows
     windows: Windows | None
     held_out: bool
     before: PredictionError
@@ -73,15 +73,15 @@ class Evaluation:
 
     @property
     def smoothed(self) -> Smoothed:
-        return self.integrals.smoothed
+        return self.weak_windows.smoothed
 
     @property
     def name(self) -> str:
-        return self.integrals.run.name
+        return self.weak_windows.run.name
 
 
 def evaluate_run(
-    w: Integrals, before: Model, after: Model | None = None, held_out: bool = False
+    w: WeakWindows, before: Model, after: Model | None = None, held_out: bool = False
 ) -> Evaluation:
     """Evaluate one model, or two, on a run.
 
@@ -105,7 +105,7 @@ def _windows(runs: Sequence[Smoothed], length: float) -> Windows | None:
 
 
 def _prediction_errors(
-    w: Integrals, windows: Windows | None, models: Sequence[Model]
+    w: WeakWindows, windows: Windows | None, models: Sequence[Model]
 ) -> list[PredictionError]:
     if windows is None:
         return [PredictionError(omega(w, model), np.zeros((0, 3)), None) for model in models]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.correlation import correlated_windows
 from ..model.weak_form import OVERLAP, commanded_force
 from .readings import inertial, needed
@@ -74,7 +74,7 @@ class Gains:
         return bool(self.told.any() and near[self.told].all())
 
 
-def gains(w: Integrals, model: Model) -> Gains:
+def gains(w: WeakWindows, model: Model) -> Gains:
     """The acceleration that the commands of a run give, as shares of what they should give.
 
     Args:

@@ -10,19 +10,19 @@ import numpy as np
 
 from fmus.actuators.actuation import actuators, measurable, output
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.weak_form import arriving
 
 STEADY = 0.02  # of the mean shaft speed: a spread below which thrust hardly changes by it; chosen
 
 
-def named(w: Integrals, model: Model) -> list[str]:
+def named(w: WeakWindows, model: Model) -> list[str]:
     """The measured outputs of a run that the ship's laws give, ``ACTUATOR.OUTPUT``."""
     known = {} if model.ship.description is None else measurable(model.ship.description)
     return [name for name in w.run.measured if name in known]
 
 
-def residual(w: Integrals, model: Model, name: str) -> np.ndarray:
+def residual(w: WeakWindows, model: Model, name: str) -> np.ndarray:
     """Measured less modelled output (n,) of a run; NaN where either is not known."""
     description = model.ship.description
     assert description is not None
@@ -32,12 +32,12 @@ def residual(w: Integrals, model: Model, name: str) -> np.ndarray:
     return w.run.measured[name] - output(description, name, commands, tuple(nu.T), plant)
 
 
-def rms(w: Integrals, model: Model, name: str) -> float:
+def rms(w: WeakWindows, model: Model, name: str) -> float:
     """Root mean square of :func:`residual`."""
     return float(np.sqrt(np.nanmean(residual(w, model, name) ** 2)))
 
 
-def inseparable(runs: Sequence[Integrals], model: Model) -> list[str]:
+def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
     """What the commands of some runs leave open between thrust and resistance, a sentence each."""
     description = model.ship.description
     if description is None:

@@ -30,7 +30,7 @@ from ..data import Run, line_beside
 from ..data.beside import Change
 from ..data.columns import POSE, TAU
 from ..data.unit_check import GO_ON
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.weak_form import commanded_force
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import Gains, gains
@@ -57,7 +57,7 @@ LEAST_SHARE = 1e-4  # of the commands, below which nothing is told apart (chosen
 SILENT = 1e-6  # of the largest sum of squares; commands of an axis that are less are none
 
 
-def refuse_implausible(runs: Sequence[Integrals], model: Model) -> None:
+def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
     """Refuse runs whose files were read otherwise than meant.
 
     Args:
@@ -76,7 +76,7 @@ def refuse_implausible(runs: Sequence[Integrals], model: Model) -> None:
             raise InputError(f"run '{w.run.name}': {seen}{told}; {GO_ON}")
 
 
-def _refusal(w: Integrals, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
+def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
     twice = same_columns(w.run)
     if twice:
@@ -114,7 +114,7 @@ def _of_gains(given: Gains) -> str:
     return f"its accelerations follow {', '.join(shown)}"
 
 
-def likeliest_unit(w: Integrals, model: Model, given: Gains) -> Reading | None:
+def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:
     """The reading in which the commands give the accelerations that they should, if there is any.
 
     Args:
@@ -129,7 +129,7 @@ def likeliest_unit(w: Integrals, model: Model, given: Gains) -> Reading | None:
 
 
 def _of_least_error(
-    w: Integrals, model: Model, given: Gains, readings: Iterable[Reading]
+    w: WeakWindows, model: Model, given: Gains, readings: Iterable[Reading]
 ) -> Reading | None:
     """Of the readings with plausible commands that in which the model's error is the least part of them.
 
@@ -183,7 +183,7 @@ class Mistake(NamedTuple):
     after: float
 
 
-def likeliest_mistake(w: Integrals, model: Model) -> Mistake | None:
+def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     """The mistake without which the commands of a run are explained far better, if there is any.
 
     Args:
@@ -224,7 +224,7 @@ def likeliest_mistake(w: Integrals, model: Model) -> Mistake | None:
     return Mistake(reading, 1.0 - float(now.mean()), 1.0 - float(then.mean()))
 
 
-def _varying(w: Integrals, model: Model, reading: Reading) -> np.ndarray:
+def _varying(w: WeakWindows, model: Model, reading: Reading) -> np.ndarray:
     """Force (K, 3) that the motion of a run needs by a reading [N, N, N m], less its mean."""
     z = needed(reread(w, reading), model)
     return z - z.mean(axis=0)

@@ -10,7 +10,7 @@ from fmus.declare import variables
 from ..data import Run
 from ..data.beside import Change
 from ..data.columns import FIVE, POSE, TAU, UNITS
-from ..model import Integrals, Model, omega
+from ..model import Model, WeakWindows, omega
 from ..model.thrust import full_thrust
 
 
@@ -128,7 +128,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
 
 
-def reread(w: Integrals, reading: Reading) -> Integrals:
+def reread(w: WeakWindows, reading: Reading) -> WeakWindows:
     """The windows of a run by another reading, its commands as forces."""
     s, run = w.smoothed, w.run
     given = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T, commands=None, five=None, power=None)
@@ -141,7 +141,7 @@ def reread(w: Integrals, reading: Reading) -> Integrals:
     return replace(w, smoothed=meant, slope=w.slope / reading.pace, memory={})
 
 
-def needed(w: Integrals, model: Model) -> np.ndarray:
+def needed(w: WeakWindows, model: Model) -> np.ndarray:
     """Force (K, 3) that the motion of a run needs [N, N, N m].
 
     Args:
@@ -154,7 +154,7 @@ def needed(w: Integrals, model: Model) -> np.ndarray:
         return np.nan_to_num(omega(replace(w, smoothed=s, memory={}), model), posinf=0.0, neginf=0.0)
 
 
-def inertial(w: Integrals, model: Model) -> np.ndarray:
+def inertial(w: WeakWindows, model: Model) -> np.ndarray:
     """The part (K, 3) of it that is not damping: M nu_dot + C nu [N, N, N m]."""
     none = {v.name: 0.0 for v in variables(type(model.hull.params.damping))}
     return needed(w, replace(model, vessel=dict(model.vessel) | none))

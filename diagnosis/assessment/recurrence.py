@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..model import Integrals
+from ..model import WeakWindows
 from ..model.correlation import correlated_windows
 
 NEIGHBOURS = 5  # windows of a prediction; chosen
@@ -45,7 +45,7 @@ class Recurrence(NamedTuple):
         return name if self.shares[name] >= REPEATS else None
 
 
-def recurrence(data: Sequence[Integrals], left: np.ndarray, seed: int = 0) -> list[Recurrence]:
+def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> list[Recurrence]:
     """How the model error of each axis comes again.
 
     Args:
@@ -75,7 +75,7 @@ def recurrence(data: Sequence[Integrals], left: np.ndarray, seed: int = 0) -> li
     return found
 
 
-def _of_run(w: Integrals) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _of_run(w: WeakWindows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Means over the windows of a run: place (K, 2), motion (K, 3), command (K, 3)."""
     eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.eta, w.smoothed.nu))
     return w.smooth @ eta[:, :2], w.smooth @ nu, w.held @ w.run.tau_cmd

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Integrals
+from ..model import WeakWindows
 from .clusters import ClusterMean, cluster_mean, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 
@@ -120,7 +120,7 @@ class ErrorRegions:
 
 
 def find_regions(
-    data: Sequence[Integrals], omega: Sequence[np.ndarray], std: Sequence[np.ndarray]
+    data: Sequence[WeakWindows], omega: Sequence[np.ndarray], std: Sequence[np.ndarray]
 ) -> ErrorRegions:
     """Regions in which the model error of some runs is significantly larger than elsewhere.
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
 from ..model.weak_form import OVERLAP, commanded
 from .covariates import AXES
@@ -59,7 +59,7 @@ class AxisRemainder:
 
 
 def axis_remainders(
-    data: Sequence[Integrals],
+    data: Sequence[WeakWindows],
     before: Sequence[np.ndarray],
     after: Sequence[np.ndarray],
     std: Sequence[np.ndarray],
@@ -93,7 +93,7 @@ def axis_remainders(
     return found
 
 
-def spans(data: Sequence[Integrals]) -> np.ndarray:
+def spans(data: Sequence[WeakWindows]) -> np.ndarray:
     """(K,), number of the span that each window of some runs lies in, over all runs."""
     numbers, first = [], 0
     for w in data:

@@ -21,7 +21,7 @@ from fmus.ops import wrap
 from ..assessment.evaluation import Evaluation, PredictionError
 from ..assessment.windows import RunWindows, Windows, between_steps
 from ..data import UNITS, Column, Run, to_si
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.prediction import at_rest
 from ..smoothing import Smoothed
 from .foreign_fmu import TAU, Fmu, commands_of
@@ -97,7 +97,7 @@ def use_of(fmu: Fmu, runs: Sequence[Run]) -> Use:
     return Use(fmu, fmu.given(runs), fmu.variables(runs), {**known["outputs"], **known["inputs"]})
 
 
-def evaluate_fmu(w: Integrals, use: Use, ship: Model) -> Evaluation:
+def evaluate_fmu(w: WeakWindows, use: Use, ship: Model) -> Evaluation:
     """Hold an FMU against a run.
 
     Args:
@@ -131,7 +131,7 @@ def evaluate_fmu(w: Integrals, use: Use, ship: Model) -> Evaluation:
     return Evaluation(ship, w, windows, False, error, error, by_force=False)
 
 
-def _windows(w: Integrals, use: Use) -> Windows | None:
+def _windows(w: WeakWindows, use: Use) -> Windows | None:
     """The windows that are predicted: as of any model, or one that is the run as a whole."""
     smoothed = w.smoothed
     try:

@@ -14,7 +14,7 @@ from fmus.effects import Effect
 from fmus.effects.effect import EACH_VSP
 from fmus.scale import Scale
 
-from ..model import Integrals, Model, omega
+from ..model import Model, WeakWindows, omega
 from ..model.weak_form import remember_responses
 from ..parallel import for_each
 from .multistart import Landscape, best_values
@@ -65,13 +65,13 @@ class Candidate:
     shapes: Sequence[Shape] = field(default_factory=list)
 
 
-def model_error(data: Sequence[Integrals], model: Model) -> np.ndarray:
+def model_error(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Model error (K, 3) [N, N, N m] of all runs one after the other."""
     return np.concatenate([omega(w, model) for w in data])
 
 
 def shape(
-    data: Sequence[Integrals],
+    data: Sequence[WeakWindows],
     model: Model,
     base: np.ndarray,
     given: Mapping[str, float],
@@ -135,7 +135,7 @@ def curve(base: np.ndarray, plain: Shape, scale: Scale) -> list[Shape]:
 
 
 def values_to_try(
-    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect
 ) -> list[Mapping[str, float]]:
     """The values at which a nonlinear effect is tried."""
     declared = e.search.values(model.values)
@@ -157,7 +157,7 @@ def spread(e: Effect) -> bool:
 
 
 def by_starts(
-    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, step: float
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, step: float
 ) -> list[Shape]:
     """The shapes of an effect at the best values of what it is not linear in."""
     sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR * model.ship.scale.forces
@@ -180,7 +180,7 @@ def by_starts(
 
 
 def with_intervals(
-    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect
 ) -> list[Mapping[str, float]]:
     """The intervals in which an effect seems to act, as additions to a model; none: no values.
 
@@ -201,7 +201,7 @@ def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str,
 
 
 def scaled(
-    data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect, name: str
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, name: str
 ) -> Iterator[dict[str, float]]:
     """Multiples of a coefficient's value at which its force is as large as the model error.
 
@@ -229,7 +229,7 @@ def scaled(
             yield from ({**others, name: value} for value in values if low <= value <= high)
 
 
-def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effect) -> Candidate:
+def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect) -> Candidate:
     """An effect's shapes on these data."""
     shapes: list[Shape] = []
     # By inertia, current and measurement the model error changes smoothly, but not linearly.
@@ -246,7 +246,7 @@ def candidate(data: Sequence[Integrals], model: Model, base: np.ndarray, e: Effe
 
 
 def candidates(
-    data: Sequence[Integrals], model: Model, base: np.ndarray, known: Set[str] = frozenset()
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, known: Set[str] = frozenset()
 ) -> list[Candidate]:
     """All effects that the ship can have and that a regression can find, but those that are known.
 

@@ -14,14 +14,14 @@ from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, ridge, score
 from .prior import NominalPrior
-from .refinement import Estimate, TrainingSet, nuisance, refit
+from .refinement import Estimate, TrainingSet, nuisance_of, refit
 
 SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
 NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
-class Place:
+class AcceptedEffect:
     """An effect that was found, as long as its values still change.
 
     Attributes:
@@ -38,20 +38,20 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """What a search came to.
+class Selection:
+    """What the selection of effects came to.
 
     Attributes:
         t: what it was fitted to.
         at: the most likely model.
-        places: the effects found, in the order of acceptance.
+        accepted: the effects found, in the order of acceptance.
         ranked: candidates of the first step.
         lacking: (K, 3), the first model error.
     """
 
     t: TrainingSet
     at: Estimate
-    places: Sequence[Place]
+    accepted: Sequence[AcceptedEffect]
     ranked: Sequence[Ranked]
     lacking: np.ndarray
 
@@ -61,21 +61,21 @@ class Search:
         return self.at.model(self.t.prior)
 
     @cached_property
-    def _along(self) -> Nuisance:
-        return nuisance(self.t, self.at, self.t.error(self.at))
+    def _nuisance(self) -> Nuisance:
+        return nuisance_of(self.t, self.at, self.t.error(self.at))
 
     def findings(self, ids: Sequence[str] | None = None) -> Findings:
         """What was found, or the findings with some of the effects only, the rest fitted anew."""
-        kept = [p for p in self.places if ids is None or p.id in ids]
-        if len(kept) < len(self.places):
-            gone = {n for p in self.places if p not in kept for n in p.names}
+        kept = [p for p in self.accepted if ids is None or p.id in ids]
+        if len(kept) < len(self.accepted):
+            gone = {n for p in self.accepted if p not in kept for n in p.names}
             at = self.at.without(gone)
             at = refit(self.t, at, self._of(at)).estimate
-            return replace(self, at=at, places=kept).findings()
-        names, std = self.at.fitted, laplace_std(self.t, self._along)
+            return replace(self, at=at, accepted=kept).findings()
+        names, std = self.at.fitted, laplace_std(self.t, self._nuisance)
         nested, shares = self._nested()
         effects = []
-        for k, p in enumerate(self.places):
+        for k, p in enumerate(self.accepted):
             values = {n: self.at.values[n] for n in p.names}
             own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
             seen, alike = self._evidence(p), credible(p.id, p.weights)
@@ -114,7 +114,7 @@ class Search:
     def _fold_models(self) -> list[Model]:
         """The model fitted without each fold of the data, by one step about the fit to all."""
         t, fitted = self.t, self.at.fitted
-        table = gram_table(t.error(self.at), t.blocks, [], self._along, np.asarray(t.sigma))
+        table = gram_table(t.error(self.at), t.blocks, [], self._nuisance, np.asarray(t.sigma))
         all_of_it = regression(table, -1, 0)
         models = []
         for held in block_folds(t.data):
@@ -127,7 +127,7 @@ class Search:
         """Nuisance parameters of a part of the effects, by slopes beside all of them."""
         names = [*self.at.fitted, *self.t.prior.mean]
         kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
-        a = self._along
+        a = self._nuisance
         return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept], a.unit[kept])
 
     def _nested(self) -> tuple[list[Model], list[float]]:
@@ -138,28 +138,28 @@ class Search:
         """
         t, models, shares = self.t, [], []
         total = before = float(np.sum((self.lacking * t.weight) ** 2))
-        for k in range(len(self.places)):
-            at, along = self.at, self._along
-            later = {n for p in self.places[k + 1 :] for n in p.names}
+        for k in range(len(self.accepted)):
+            at, nuisance = self.at, self._nuisance
+            later = {n for p in self.accepted[k + 1 :] for n in p.names}
             if later:
                 at = at.without(later)
-                along = self._of(at)
-                at = refit(t, at, along).estimate
+                nuisance = self._of(at)
+                at = refit(t, at, nuisance).estimate
                 theta = [*[at.values[n] for n in at.fitted], *at.offset]
-                along = replace(along, offset=np.array(theta))
-            left = float(self._scored(at, along).blocks.sum())
+                nuisance = replace(nuisance, offset=np.array(theta))
+            left = float(self._scored(at, nuisance).blocks.sum())
             models.append(at.model(t.prior))
             shares.append((before - left) / total)
             before = left
         return models, shares
 
-    def _scored(self, at: Estimate, along: Nuisance) -> Scored:
+    def _scored(self, at: Estimate, nuisance: Nuisance) -> Scored:
         """A model as it is, by fits to a part of the data, linear about it."""
         t = self.t
-        table = gram_table(t.error(at), t.blocks, [], along, np.asarray(t.sigma))
+        table = gram_table(t.error(at), t.blocks, [], nuisance, np.asarray(t.sigma))
         return score(table, -1, 1)
 
-    def _evidence(self, p: Place) -> Evidence:
+    def _evidence(self, p: AcceptedEffect) -> Evidence:
         data, model = self.t.data, self.model
         left = model_error(data, model)
         without = model_error(data, self.at.without(p.names).model(self.t.prior))
@@ -167,11 +167,11 @@ class Search:
         return evidence(p.weights[p.id], without - left, left, std, self.t.blocks)
 
 
-def laplace_std(t: TrainingSet, along: Nuisance) -> np.ndarray:
+def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:
     """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
-    A = np.moveaxis(along.columns * t.weight[:, None], 2, 0).reshape(along.offset.size, -1).T
-    H = A.T @ A + along.precision
-    H += ridge(H, along.unit)
+    A = np.moveaxis(nuisance.columns * t.weight[:, None], 2, 0).reshape(nuisance.offset.size, -1).T
+    H = A.T @ A + nuisance.precision
+    H += ridge(H, nuisance.unit)
     return np.sqrt(np.diag(np.linalg.inv(H)))
 
 

@@ -109,7 +109,7 @@ class Findings:
         moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
         fold_models: the model fitted without each fold of the training runs, see
             :func:`.gram.block_folds`; empty where a method has none.
-        keep: the findings with some of the effects only, everything else fitted anew; None where a
+        refit: the findings with some of the effects only, everything else fitted anew; None where a
             method cannot.
         estimate: the most likely parameters, from which a fit to predictions begins; None where a method
             has no such.
@@ -124,7 +124,7 @@ class Findings:
     refitted: Model | None = None
     moved: Mapping[str, float] = field(default_factory=dict)
     fold_models: Sequence[Model] = ()
-    keep: "Callable[[Sequence[str]], Findings] | None" = None
+    refit: "Callable[[Sequence[str]], Findings] | None" = None
     estimate: "Estimate | None" = None
     searched: NominalPrior | None = None
 

@@ -3,7 +3,7 @@
 Each step scores every effect by block-cross-validated MAP regression, refines the best by Gauss-Newton,
 and accepts the first if it is beyond chance and does no harm in runs that it was not fitted to. The
 model then takes the effect in, so that the next step starts from a model that is right so far; what was
-found is refined along with each candidate. With a second effect in, each place is searched again.
+found is refined along with each candidate. With a second effect in, each effect is searched again.
 
 One of two causes, alone, may well do harm where the other acts most: an effect that explains much and
 harms is kept on trial for one step, and stays if it and the next do no harm together.
@@ -16,22 +16,22 @@ import numpy as np
 
 from fmus.effects import Effect
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.weak_form import commanded
 from .acceptance import better, beyond_chance, harmful, matters
-from .conclusion import Place, Search
+from .conclusion import AcceptedEffect, Selection
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
 from .map_regression import Scored, first_share
 from .prior import MEASURED, NominalPrior, Prior
 from .profile import profiled
-from .refinement import Estimate, TrainingSet, nuisance, refit
+from .refinement import Estimate, TrainingSet, nuisance_of, refit
 from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
 from .waves import Waves, find_waves
 
 MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
 REPLICATES = 200  # of the bootstrap: the standard error of a share is 3.5 % at the most
-ROUNDS = 2  # of searching all places again, at the most; chosen
+ROUNDS = 2  # of searching all effects again, at the most; chosen
 
 
 class ForwardSelection:
@@ -41,7 +41,7 @@ class ForwardSelection:
 
     def fit(
         self,
-        runs: Sequence[Integrals],
+        runs: Sequence[WeakWindows],
         model: Model,
         prior: Prior,
         advance: Callable[[str], None],
@@ -62,24 +62,26 @@ class ForwardSelection:
             return found
         waves, ranked = of_waves(spectral[0], peak, model), Ranked(spectral[0].id, 0.0, peak.share)
 
-        def along(with_them: Findings) -> Findings:
+        def with_waves(with_them: Findings) -> Findings:
             return replace(
                 with_them,
                 effects=[waves, *with_them.effects],
                 ranking=[ranked, *with_them.ranking],
-                keep=lambda ids: along(done.findings(ids)) if waves.id in ids else done.findings(ids),
+                refit=lambda ids: (
+                    with_waves(done.findings(ids)) if waves.id in ids else done.findings(ids)
+                ),
             )
 
-        return along(found)
+        return with_waves(found)
 
 
 def search(
-    data: Sequence[Integrals],
+    data: Sequence[WeakWindows],
     prior: Prior,
     start: Model,
     advance: Callable[[str], None],
     rng: np.random.Generator,
-) -> Search:
+) -> Selection:
     """All effects that a regression finds.
 
     Args:
@@ -96,10 +98,10 @@ def search(
     ranking = rank(t, at, set())
     lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
-    places: list[Place] = []
+    accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
-    while len(places) < MOST_EFFECTS:
-        advance(f"effect {len(places) + 1}: the best candidates refined")
+    while len(accepted) < MOST_EFFECTS:
+        advance(f"effect {len(accepted) + 1}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
             t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
@@ -120,38 +122,38 @@ def search(
         if harms and before is not None:
             break
         before = (t, alone) if harms else None
-        places.append(place(best, rng))
+        accepted.append(accepted_effect(best, rng))
         at = best.winner
         del ranking, best  # of a long run there is no room for two
-        if len(places) > 1 and before is None:
-            at, places = searched_again(t, at, places, advance, rng)
-        advance(f"effect {len(places) + 1}: every effect as a candidate")
-        ranking = rank(t, at, {p.id for p in places})
+        if len(accepted) > 1 and before is None:
+            at, accepted = searched_again(t, at, accepted, advance, rng)
+        advance(f"effect {len(accepted) + 1}: every effect as a candidate")
+        ranking = rank(t, at, {p.id for p in accepted})
     if before is not None:
         t, at = before
-        del places[-1]
-    at = refit(t, at, nuisance(t, at, t.error(at))).estimate
-    for k, p in enumerate(places):
+        del accepted[-1]
+    at = refit(t, at, nuisance_of(t, at, t.error(at))).estimate
+    for k, p in enumerate(accepted):
         at, intervals = profiled(t, at, p)
-        places[k] = replace(p, intervals={**p.intervals, **intervals})
-    return Search(t, at, places, ranked, lacking)
+        accepted[k] = replace(p, intervals={**p.intervals, **intervals})
+    return Selection(t, at, accepted, ranked, lacking)
 
 
 def searched_again(
     t: TrainingSet,
     at: Estimate,
-    places: Sequence[Place],
+    accepted: Sequence[AcceptedEffect],
     advance: Callable[[str], None],
     rng: np.random.Generator,
-) -> tuple[Estimate, list[Place]]:
+) -> tuple[Estimate, list[AcceptedEffect]]:
     """Each effect but the last found is taken out, and its place searched again beside the others.
 
     What came first had to stand for all that was missing: a wrong one, or a free curve where a simple
     law does, gives way to what is better beside the others.
     """
-    found = list(places)
+    found = list(accepted)
     count = len(found) - 1
-    due = [*range(count)]  # places of which something beside them has changed
+    due = [*range(count)]  # effects of which something beside them has changed
     for _ in range(ROUNDS * count):
         if not due:
             break
@@ -159,19 +161,19 @@ def searched_again(
         advance(f"effect {k + 1}: its place searched again")
         others = [p for p in found if p is not found[k]]
         beside = at.without(found[k].names)
-        beside = refit(t, beside, nuisance(t, beside, t.error(beside))).estimate
+        beside = refit(t, beside, nuisance_of(t, beside, t.error(beside))).estimate
         ranking = rank(t, beside, {p.id for p in others})
         weighed = reweighted(t, beside, ranking)
         chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
         if weighed is not None and chosen is not None:
             t, _, best = weighed
-            found[k] = place(best, rng, chosen)
+            found[k] = accepted_effect(best, rng, chosen)
             at = best.of(chosen)
             due = [(k + j) % count for j in range(1, count)]
     return at, found
 
 
-def place(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> Place:
+def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> AcceptedEffect:
     """A candidate of a shortlist as an effect that was found.
 
     Args:
@@ -181,7 +183,7 @@ def place(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> Place:
     """
     first = best.scored[chosen].candidate
     shares = first_share(best.scored, REPLICATES, rng).tolist()
-    return Place(
+    return AcceptedEffect(
         best.ids[first],
         tuple(best.starts[first].values),
         best.refined[first].intervals,

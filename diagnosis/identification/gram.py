@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import Integrals
+from ..model import WeakWindows
 from ..model.weak_form import OVERLAP
 from ..parallel import for_each
 from .candidates import Candidate
@@ -195,7 +195,7 @@ def gram_table(
     return GramTable(grams, rows, runs, entries, indices, nuisance.precision, unit, sigma)
 
 
-def block_folds(data: Sequence[Integrals]) -> list[np.ndarray]:
+def block_folds(data: Sequence[WeakWindows]) -> list[np.ndarray]:
     """Numbers of the blocks of each run, counted through all; of a single run those of its stretches."""
     counts = [np.unique(w.block).size for w in data]
     if len(data) == 1:

@@ -10,7 +10,7 @@ from cosim import InputError
 from cosim.errors import nearest
 
 if TYPE_CHECKING:
-    from ..model import Integrals, Model
+    from ..model import Model, WeakWindows
     from .findings import Findings
     from .prior import Prior
 
@@ -22,7 +22,7 @@ class Method(Protocol):
     A method is called once for a set of runs. It may take any time, and tells ``advance`` what it is
     doing; an interrupt passes through it. It guarantees that
 
-    - it changes nothing that it was given but ``Integrals.memory``, a store of intermediate results;
+    - it changes nothing that it was given but ``WeakWindows.memory``, a store of intermediate results;
     - the same arguments give the same findings, to the bit on one machine;
     - ids are those of effects in ``model.ship``, each once; values are additions to ``model``;
     - ``findings.model`` is ``model`` with all effects found, and ``model`` itself without any;
@@ -37,7 +37,7 @@ class Method(Protocol):
 
     def fit(
         self,
-        runs: "Sequence[Integrals]",
+        runs: "Sequence[WeakWindows]",
         model: "Model",
         prior: "Prior",
         advance: Callable[[str], None],

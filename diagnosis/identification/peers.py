@@ -18,7 +18,7 @@ from sklearn.model_selection import GroupKFold
 
 from cosim import InputError
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from .candidates import Candidate, Shape, candidates, model_error
 from .findings import Finding, Findings, Ranked
 from .gram import RUN
@@ -57,7 +57,7 @@ class Features(NamedTuple):
     sigma: np.ndarray
 
 
-def features(data: Sequence[Integrals], model: Model) -> Features:
+def features(data: Sequence[WeakWindows], model: Model) -> Features:
     """The regressors of all candidates on some runs."""
     base = model_error(data, model)
     # The acceleration of pose noise, as a force.
@@ -116,7 +116,7 @@ class Peer(ABC):
 
     def fit(
         self,
-        runs: Sequence[Integrals],
+        runs: Sequence[WeakWindows],
         model: Model,
         prior: Prior,
         advance: Callable[[str], None],

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
 from ..model.ship_model import parameter_and_run
-from .conclusion import Place
+from .conclusion import AcceptedEffect
 from .refinement import (
     SMALLEST_SCALE,
     Estimate,
@@ -24,7 +24,7 @@ from .refinement import (
     Start,
     TrainingSet,
     bounded,
-    nuisance,
+    nuisance_of,
     refine,
     slope,
 )
@@ -40,7 +40,7 @@ BISECTIONS = 6  # of the step at which the cost passes the limit
 Interval = tuple[float, float]
 
 
-def profiled(t: TrainingSet, at: Estimate, p: Place) -> tuple[Estimate, dict[str, Interval]]:
+def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate, dict[str, Interval]]:
     """The most likely model by profiles of an effect's rough parameters, and their intervals.
 
     Args:
@@ -86,16 +86,16 @@ def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
     return float(np.linalg.norm(fine - coarse)) > ROUGH * float(np.linalg.norm(coarse))
 
 
-def _profile(t: TrainingSet, at: Estimate, p: Place, name: str) -> Callable[[float], Refined]:
+def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Callable[[float], Refined]:
     """The model with a parameter held at a value, all else fitted anew."""
     beside = at.without(p.names)
-    along = nuisance(t, beside, t.error(beside))
+    nuisance = nuisance_of(t, beside, t.error(beside))
     others = [n for n in p.names if n != name]
 
     def trial(value: float) -> Refined:
         held = bounded(at.start, name, value - at.start.value(name))
         values: Mapping[str, float] = {**{n: at.values[n] for n in p.names}, name: held}
-        return refine(t, beside, along, Start(values, others, np.zeros((len(others), len(others)))))
+        return refine(t, beside, nuisance, Start(values, others, np.zeros((len(others), len(others)))))
 
     return trial
 

@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from fmus.effects import Effect
 from fmus.ship import Ship
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.ship_model import parameter_and_run
 from ..model.weak_form import OVERLAP
 from .candidates import SMALL, Shape, model_error
@@ -47,7 +47,7 @@ class TrainingSet:
         prior: of the nominal coefficients.
     """
 
-    data: Sequence[Integrals]
+    data: Sequence[WeakWindows]
     blocks: np.ndarray
     sigma: np.ndarray | None
     prior: NominalPrior
@@ -149,8 +149,8 @@ def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: floa
     return (left - model_error(t.data, model.plus({name: small}))) / small
 
 
-def nuisance(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
-    """What is fitted along with every candidate: effects found before, and nominal coefficients.
+def nuisance_of(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
+    """What is fitted nuisance with every candidate: effects found before, and nominal coefficients.
 
     Args:
         t: what is fitted to.
@@ -207,28 +207,30 @@ class Refined:
         return {n: v for n, v in self.estimate.values.items() if n not in at.values}
 
 
-def refine(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
     """A candidate, the effects found before and the nominal coefficients at their most likely values.
 
     Args:
         t: what is fitted to.
         at: the model so far.
-        along: nuisance parameters, from :func:`nuisance`.
+        nuisance: nuisance parameters, from :func:`nuisance`.
         start: of the new effect.
     """
     e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
-    return _gauss_newton(t, at, along, start) if e is None else _with_intervals(t, at, along, start, e)
+    if e is None:
+        return _gauss_newton(t, at, nuisance, start)
+    return _with_intervals(t, at, nuisance, start, e)
 
 
-def refit(t: TrainingSet, at: Estimate, along: Nuisance) -> Refined:
+def refit(t: TrainingSet, at: Estimate, nuisance: Nuisance) -> Refined:
     """The effects found and the nominal coefficients at their most likely values, without a new one."""
-    return _gauss_newton(t, at, along, Start({}, (), np.zeros((0, 0))))
+    return _gauss_newton(t, at, nuisance, Start({}, (), np.zeros((0, 0))))
 
 
-def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -> Refined:
+def _gauss_newton(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
     fitted = [*start.fitted, *at.fitted]
-    precision = np.asarray(block_diag(start.precision, along.precision))
-    unit = np.array([*[at.start.unit(n) for n in start.fitted], *along.unit])
+    precision = np.asarray(block_diag(start.precision, nuisance.precision))
+    unit = np.array([*[at.start.unit(n) for n in start.fitted], *nuisance.unit])
     weight = t.weight
 
     def evaluate(estimate: Estimate) -> Refined:
@@ -246,7 +248,7 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
 
     best = with_slopes(evaluate(at.plus(start.values, np.zeros(t.prior.size))))
     for _ in range(STEPS):
-        columns = np.concatenate([best.columns, along.columns], axis=2)
+        columns = np.concatenate([best.columns, nuisance.columns], axis=2)
         A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
         H = A.T @ A + precision
         H += ridge(H, unit)
@@ -265,16 +267,18 @@ def _gauss_newton(t: TrainingSet, at: Estimate, along: Nuisance, start: Start) -
     return best
 
 
-def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start, e: Effect) -> Refined:
+def _with_intervals(
+    t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start, e: Effect
+) -> Refined:
     """The same with the intervals of an effect found anew at each fit of all else, until they stay."""
-    found = _gauss_newton(t, at, along, start)
+    found = _gauss_newton(t, at, nuisance, start)
     present, p = dict(start.values), None
     for _ in range(STEPS):
         estimate = found.estimate
         without = {n: v for n, v in estimate.values.items() if n not in present}
         model = replace(estimate, values=without).model(t.prior)
         theta = np.array([*[estimate.values[n] for n in at.fitted], *estimate.offset])
-        parts = along.columns, along.precision, theta, along.unit
+        parts = nuisance.columns, nuisance.precision, theta, nuisance.unit
         whole = problem(t.data, model, model_error(t.data, model), e, parts)
         if whole is None:
             break
@@ -284,7 +288,7 @@ def _with_intervals(t: TrainingSet, at: Estimate, along: Nuisance, start: Start,
         if not better or not p.passing(better) or p.cost(better) > p.cost(spans) - ENOUGH:
             break
         present = p.values(better)
-        found = _gauss_newton(t, at, along, replace(start, values=present))
+        found = _gauss_newton(t, at, nuisance, replace(start, values=present))
     return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
 
 

@@ -29,7 +29,7 @@ from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, vstack
 from fmus.effects import Effect
 from fmus.scale import Scale
 
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.ship_model import of_run
 from ..model.weak_form import EVERY, OVERLAP, thrust_along
 
@@ -49,7 +49,7 @@ EXCEPTION = 0.5
 RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
 Interval = tuple[float, float]
-Along = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
 
 
@@ -81,7 +81,7 @@ class Problem:
         y: (3 K,), model error.
         columns: (3 K, m), what each cell of a dead thruster adds to it.
         middles: (K,), cell, and part of it, in which the middle of each window lies.
-        along: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
+        nuisance: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
         precision, offset, unit: (q, q), (q,) and (q,), of the nuisance parameters.
         work: (m,), share of the run's time in which the thruster is commanded, in each cell.
         scale: of the ship.
@@ -93,7 +93,7 @@ class Problem:
     y: np.ndarray
     columns: csc_matrix
     middles: np.ndarray
-    along: np.ndarray
+    nuisance: np.ndarray
     precision: np.ndarray
     offset: np.ndarray
     unit: np.ndarray
@@ -125,7 +125,8 @@ class Problem:
         """The same in units of the noise sigma (3,)."""
         weight = np.tile(1.0 / sigma / np.sqrt(OVERLAP), self.y.size // 3)
         columns = csc_matrix(diags(weight) @ self.columns)
-        return replace(self, y=weight * self.y, columns=columns, along=weight[:, None] * self.along)
+        nuisance = weight[:, None] * self.nuisance
+        return replace(self, y=weight * self.y, columns=columns, nuisance=nuisance)
 
     def keys(self, spans: Spans) -> list[tuple[str, str]]:
         """Names of the values that are start and end of each interval; of an end that is none: empty."""
@@ -174,15 +175,15 @@ class Problem:
         """What the nuisance parameters leave over (3 K,), and the cost with their prior penalty."""
         if not self.offset.size:
             return left, float(left @ left)
-        right = self.along.T @ left - self.precision @ self.offset
+        right = self.nuisance.T @ left - self.precision @ self.offset
         b = cho_solve(self._information, right)
-        over = left - self.along @ b
+        over = left - self.nuisance @ b
         last = self.offset + b
         return over, float(over @ over + last @ self.precision @ last)
 
     @cached_property
     def _information(self) -> tuple[np.ndarray, bool]:
-        H = self.along.T @ self.along + self.precision
+        H = self.nuisance.T @ self.nuisance + self.precision
         return cho_factor(H + RIDGE * np.diag(np.diag(H) + self.unit**-2.0))
 
     def cost(self, spans: Spans) -> float:
@@ -324,11 +325,11 @@ def likely(p: Problem, spans: Spans) -> dict[str, Interval]:
 
 
 def problem(
-    data: Sequence[Integrals],
+    data: Sequence[WeakWindows],
     model: Model,
     base: np.ndarray,
     e: Effect,
-    along: Along | None = None,
+    nuisance: NuisanceParts | None = None,
 ) -> Problem | None:
     """The problem of an effect with intervals, in units of force; None: its thruster is never at work.
 
@@ -337,7 +338,7 @@ def problem(
         model: without the effect.
         base: (K, 3), its model error.
         e: the effect.
-        along: columns (K, 3, q), prior precision, offset and unit of nuisance parameters; None: none.
+        nuisance: columns (K, 3, q), prior precision, offset and unit of nuisance parameters; None: none.
     """
     ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + w.width) for w in data]
     scale = model.ship.scale
@@ -368,7 +369,7 @@ def problem(
     if not columns.count_nonzero():
         return None
     none = np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
-    Z, precision, offset, unit = along or none
+    Z, precision, offset, unit = nuisance or none
     return Problem(
         sections,
         not e.search.intervals[0][1],
@@ -385,6 +386,6 @@ def problem(
     )
 
 
-def _set(model: Model, name: str, w: Integrals) -> bool:
+def _set(model: Model, name: str, w: WeakWindows) -> bool:
     """Whether a model has a value of a parameter in a run."""
     return bool(name) and model.value(of_run(name, w.run.name)) != model.declared(name).start

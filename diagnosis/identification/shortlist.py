@@ -21,7 +21,7 @@ from .refinement import (
     Start,
     TrainingSet,
     as_shape,
-    nuisance,
+    nuisance_of,
     refine,
     timed,
 )
@@ -65,34 +65,34 @@ def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
     model = at.model(t.prior)
     base = model_error(t.data, model)
     found = candidates(t.data, model, base, known)
-    along = nuisance(t, at, base)
+    nuisance = nuisance_of(t, at, base)
     linear = [s.columns for c in found for s in c.shapes[:1]]
     floor = FLOOR * model.ship.scale.forces
-    sigma = noise(base, np.concatenate([*linear, along.columns], axis=2), floor)
-    return weighted(t, sigma, base, along, found)
+    sigma = noise(base, np.concatenate([*linear, nuisance.columns], axis=2), floor)
+    return weighted(t, sigma, base, nuisance, found)
 
 
 def weighted(
     t: TrainingSet,
     sigma: np.ndarray,
     base: np.ndarray,
-    along: Nuisance,
+    nuisance: Nuisance,
     found: Sequence[Candidate],
 ) -> Ranking:
     """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
-    table = gram_table(base, t.blocks, found, along, sigma)
-    free = len(along.offset) - t.prior.size
+    table = gram_table(base, t.blocks, found, nuisance, sigma)
+    free = len(nuisance.offset) - t.prior.size
     size = float(table.total[0, 0])
     new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
     order = in_order(for_each(lambda k: score(table, k, len(found[k].shapes)), new))
-    return Ranking(base, along, table, found, order)
+    return Ranking(base, nuisance, table, found, order)
 
 
 def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
     """The score of a model without any candidate."""
     base = t.error(at)
-    along = nuisance(t, at, base)
-    return score(gram_table(base, t.blocks, [], along, np.asarray(t.sigma)), -1, 1)
+    nuisance = nuisance_of(t, at, base)
+    return score(gram_table(base, t.blocks, [], nuisance, np.asarray(t.sigma)), -1, 1)
 
 
 def novelty(t: GramTable, candidate: int, free: int) -> float:

@@ -5,7 +5,7 @@ from .ship_model import Model as Model
 from .ship_model import of_one_run as of_one_run
 from .ship_model import of_run as of_run
 from .thrust import Response as Response
-from .weak_form import Integrals as Integrals
-from .weak_form import integrals as integrals
+from .weak_form import WeakWindows as WeakWindows
 from .weak_form import omega as omega
 from .weak_form import told_apart as told_apart
+from .weak_form import weak_windows as weak_windows

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .weak_form import OVERLAP, Integrals
+from .weak_form import OVERLAP, WeakWindows
 
 LONGEST = 60  # lags: as long as what counts as independent elsewhere (two blocks)
 
 
-def independent(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
+def independent(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
     """Factor (3,) by which the windows that count as one are more than those that overlap, at least 1.
 
     Args:
@@ -25,7 +25,7 @@ def independent(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
     return np.maximum(1.0, correlated_windows(data, error) / OVERLAP)
 
 
-def correlated_windows(data: Sequence[Integrals], error: np.ndarray) -> np.ndarray:
+def correlated_windows(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
     """tau (3,) of a model error; arguments as of :func:`independent`."""
     mean = autocovariance(data, error, LONGEST)
     rho = mean / np.maximum(mean[0], np.finfo(float).tiny)
@@ -33,7 +33,7 @@ def correlated_windows(data: Sequence[Integrals], error: np.ndarray) -> np.ndarr
     return 1.0 + 2.0 * np.sum(rho[1:] * positive, axis=0)
 
 
-def autocovariance(data: Sequence[Integrals], error: np.ndarray, longest: int) -> np.ndarray:
+def autocovariance(data: Sequence[WeakWindows], error: np.ndarray, longest: int) -> np.ndarray:
     """(longest + 1, 3), mean product of a model error with itself some windows later.
 
     Args:

@@ -10,7 +10,7 @@ corner frequency w0 follows from the variance of the smoothed pose, R w0 / 3, kn
 import numpy as np
 
 from .ship_model import Model
-from .weak_form import WIDTH, Integrals, kernel
+from .weak_form import WIDTH, WeakWindows, kernel
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
@@ -43,7 +43,7 @@ def _noise_gain() -> np.ndarray:
 NOISE_GAIN = _noise_gain()
 
 
-def omega_std(w: Integrals, model: Model | None = None) -> np.ndarray:
+def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     """Standard deviation of the model error of each window.
 
     Args:

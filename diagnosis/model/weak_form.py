@@ -55,7 +55,7 @@ def kernel_integral(s: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Integrals:
+class WeakWindows:
     """The windows of one run that can be used, and the integrals over them.
 
     Attributes:
@@ -132,7 +132,7 @@ def places(t: np.ndarray, scale: Scale = CSE1) -> np.ndarray:
     return found[(found >= 0.0) & (found <= last)]
 
 
-def integrals(smoothed: Smoothed, horizon: float | None = None) -> Integrals:
+def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindows:
     """The windows of a run with half of the samples or more, all commands, and thrusters at work.
 
     Args:
@@ -173,7 +173,7 @@ def integrals(smoothed: Smoothed, horizon: float | None = None) -> Integrals:
     def matrix(values: np.ndarray) -> csr_matrix:
         return csr_matrix((values, columns, starts), shape=shape)
 
-    return Integrals(
+    return WeakWindows(
         smoothed,
         middles,
         np.floor((middles - t[0]) / block).astype(int),
@@ -184,7 +184,7 @@ def integrals(smoothed: Smoothed, horizon: float | None = None) -> Integrals:
     )
 
 
-def told_apart(data: Sequence[Integrals]) -> list[Integrals]:
+def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
     """Runs of which no two have the same name: those that had it are numbered."""
     found, seen = [], Counter[str]()
     for w in data:
@@ -197,7 +197,7 @@ def told_apart(data: Sequence[Integrals]) -> list[Integrals]:
     return found
 
 
-def omega(w: Integrals, model: Model) -> np.ndarray:
+def omega(w: WeakWindows, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
 
     An acceleration counts as a force by the inertia of the model that this one was made from.
@@ -216,7 +216,7 @@ def omega(w: Integrals, model: Model) -> np.ndarray:
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 
-def commanded(data: Sequence[Integrals], model: Model) -> np.ndarray:
+def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
 
     That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
@@ -235,7 +235,7 @@ def commanded(data: Sequence[Integrals], model: Model) -> np.ndarray:
     return force
 
 
-def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
+def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
     """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
 
     Args:
@@ -249,29 +249,29 @@ def thrust_along(w: Integrals, model: Model, nu: np.ndarray | None = None) -> np
     return thrust(w.run, model, _response(w, model), nu)
 
 
-def arriving(w: Integrals, model: Model) -> np.ndarray:
+def arriving(w: WeakWindows, model: Model) -> np.ndarray:
     """Commands (sets, k, n) that reach the model's thrusters, mean from each sample to the next."""
     return _response(w, model)[0]
 
 
-def _response(w: Integrals, model: Model) -> np.ndarray:
+def _response(w: WeakWindows, model: Model) -> np.ndarray:
     return w.recall("response", Response.key(model), lambda: _between(w, model), MEMORIES)
 
 
-def commanded_force(w: Integrals, model: Model) -> np.ndarray:
+def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
     """tau (n, 3) [N, N, N m] of a run's commands at rest, as late as the model's thrusters follow."""
     if not Response(w.run, model).slow:
         return w.run.tau_cmd
     return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
 
 
-def _between(w: Integrals, model: Model) -> np.ndarray:
+def _between(w: WeakWindows, model: Model) -> np.ndarray:
     return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 
 
-def remember_responses(data: Sequence[Integrals], models: Sequence[Model]) -> None:
+def remember_responses(data: Sequence[WeakWindows], models: Sequence[Model]) -> None:
     """Compute what the thrusters of some models make of the commands of all runs, and keep it."""
-    missing: dict[Any, tuple[Integrals, Model]] = {}
+    missing: dict[Any, tuple[WeakWindows, Model]] = {}
     for w in data:
         for model in (m.during(w.run.name) for m in models):
             key = Response.key(model)
@@ -303,7 +303,7 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
     return np.column_stack([i11 * X, i22 * Y + i23 * N, i32 * Y + i33 * N])
 
 
-def _motion(w: Integrals, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _motion(w: WeakWindows, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
     motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
     # Columns in one piece each: all that is computed of them goes along time.

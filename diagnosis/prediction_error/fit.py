@@ -30,7 +30,7 @@ from ..identification.candidates import SMALL, model_error
 from ..identification.map_regression import ridge
 from ..identification.prior import NominalPrior
 from ..identification.refinement import HALVINGS, SMALLEST_SCALE, Estimate
-from ..model import Integrals
+from ..model import WeakWindows
 from ..model.uncertainty import omega_std
 from ..parallel import for_each
 from .push import NO_PUSH, Push, covariance, estimate
@@ -60,7 +60,7 @@ class Fitted:
     push: Push
 
 
-def shootings(runs: Sequence[Integrals]) -> list[Shooting]:
+def shootings(runs: Sequence[WeakWindows]) -> list[Shooting]:
     """The windows of all lengths, those of runs with one kind of commands together."""
     found = []
     for five in (False, True):
@@ -70,7 +70,7 @@ def shootings(runs: Sequence[Integrals]) -> list[Shooting]:
     return [s for s in found if s.run.size]
 
 
-def push_of(runs: Sequence[Integrals], error: np.ndarray, std: np.ndarray) -> tuple[Push, list[Push]]:
+def push_of(runs: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray) -> tuple[Push, list[Push]]:
     """The push of all runs, and of each with the same correlation times, see :func:`.push.estimate`."""
     edges = np.cumsum([w.middle.size for w in runs])[:-1]
     parts = zip(runs, np.split(error, edges), np.split(std, edges), strict=True)
@@ -120,7 +120,7 @@ class PredictionFit:
 
     def __init__(
         self,
-        runs: Sequence[Integrals],
+        runs: Sequence[WeakWindows],
         windows: Sequence[Shooting],
         at: Estimate,
         prior: NominalPrior,
@@ -232,7 +232,7 @@ def whitened(W: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def fit_predictions(
-    runs: Sequence[Integrals], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
+    runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
 ) -> Fitted:
     """The most likely model by its predictions, and how sure it is.
 

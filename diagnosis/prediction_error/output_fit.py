@@ -9,14 +9,14 @@ from cosim.errors import nearest
 
 from ..assessment.measured_outputs import named, residual
 from ..identification.prior import NominalPrior, Prior
-from ..model import Integrals, Model
+from ..model import Model, WeakWindows
 from ..model.weak_form import OVERLAP
 
 STEP = 0.01  # of a prior standard deviation; thrust is smooth in its coefficients
 STEPS = 4  # of Gauss-Newton; thrust is nearly linear in its coefficients
 
 
-def fitted(runs: Sequence[Integrals], model: Model, prior: Prior, names: Iterable[str]) -> Model:
+def fitted(runs: Sequence[WeakWindows], model: Model, prior: Prior, names: Iterable[str]) -> Model:
     """The model with the coefficients of actuators fitted to what is measured of them.
 
     Averages over the windows of the weak form, of which :data:`OVERLAP` count as one, by Gauss-Newton
@@ -40,7 +40,7 @@ def fitted(runs: Sequence[Integrals], model: Model, prior: Prior, names: Iterabl
     return model
 
 
-def _fitted(having: Sequence[Integrals], start: Model, belief: NominalPrior, name: str) -> Model:
+def _fitted(having: Sequence[WeakWindows], start: Model, belief: NominalPrior, name: str) -> Model:
     """The model with one actuator's coefficients fitted to one measured output of it."""
     stem = f"plant_{name.partition('.')[0]}_"
     of = [n for n, std in belief.std.items() if n.startswith(stem) and std > 0.0]

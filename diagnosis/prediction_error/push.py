@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Integrals
+from ..model import WeakWindows
 from ..model.correlation import autocovariance
 from ..model.weak_form import EVERY, WIDTH, kernel
 from .shooting import Linear
@@ -53,7 +53,7 @@ OF_FORCE, OF_NOISE = _kernels()
 
 
 def estimate(
-    data: Sequence[Integrals], error: np.ndarray, std: np.ndarray, time: np.ndarray | None = None
+    data: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray, time: np.ndarray | None = None
 ) -> Push:
     """The push that a model error shows.
 

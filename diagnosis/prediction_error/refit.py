@@ -10,8 +10,8 @@ from ..identification.conclusion import interval, laplace_std, suspected
 from ..identification.findings import Findings
 from ..identification.gram import RUN
 from ..identification.prior import NominalPrior
-from ..identification.refinement import Estimate, TrainingSet, nuisance, refit
-from ..model import Integrals
+from ..identification.refinement import Estimate, TrainingSet, nuisance_of, refit
+from ..model import WeakWindows
 from ..model.uncertainty import omega_std
 from .fit import fit_predictions, shootings
 from .joint_posterior import Posterior
@@ -40,7 +40,7 @@ class Outcome:
 
 
 def to_predictions(
-    found: Findings, runs: Sequence[Integrals], prior: NominalPrior, fits: bool
+    found: Findings, runs: Sequence[WeakWindows], prior: NominalPrior, fits: bool
 ) -> Outcome:
     """Fit what was found to predictions.
 
@@ -93,13 +93,13 @@ def rescaled(offset: np.ndarray, old: NominalPrior, new: NominalPrior) -> np.nda
 
 
 def fit_model_error(
-    at: Estimate, sigma: np.ndarray, runs: Sequence[Integrals], prior: NominalPrior
+    at: Estimate, sigma: np.ndarray, runs: Sequence[WeakWindows], prior: NominalPrior
 ) -> tuple[Estimate, dict[str, float]]:
     """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
     blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(runs)])
     t = TrainingSet(runs, blocks, sigma, prior)
-    along = nuisance(t, at, t.error(at))
-    last = refit(t, at, along).estimate
+    nuisance = nuisance_of(t, at, t.error(at))
+    last = refit(t, at, nuisance).estimate
     unit = np.array([*[1.0] * len(at.fitted), *prior.std.values()])
-    std = laplace_std(t, along) * unit
+    std = laplace_std(t, nuisance) * unit
     return last, dict(zip([*at.fitted, *prior.std], std.tolist(), strict=True))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from ..model import Integrals, Model, omega
+from ..model import Model, WeakWindows, omega
 from ..model.uncertainty import NOISE_TOLERANCE, omega_std
 from ..model.weak_form import kernel_integral
 from .push import Push
@@ -86,7 +86,7 @@ class Unrecorded:
 
 
 def unrecorded(
-    runs: Sequence[Integrals],
+    runs: Sequence[WeakWindows],
     model: Model,
     push: Push,
     differing: Mapping[str, tuple[float, float]],
@@ -113,7 +113,7 @@ def unrecorded(
 
 
 def _pushes(
-    w: Integrals, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
+    w: WeakWindows, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
 ) -> Iterator[tuple[float, Stretch]]:
     """Pushes of a run on an axis, each with how many standard deviations are left at its clearest."""
     z, time = error / std, w.scale.time
@@ -126,7 +126,7 @@ def _pushes(
                 yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
 
 
-def box(w: Integrals, near: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
+def box(w: WeakWindows, near: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
     """Start, end [s] and size of the constant force whose means over windows are next to an error.
 
     Args:

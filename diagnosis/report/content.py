@@ -88,7 +88,7 @@ def diagnosis_content(
             matrix=diagnosis.posterior.correlation.tolist(),
             together=diagnosis.posterior.together,
         ),
-        inseparable=inseparable([e.integrals for e in comparison.evaluations], diagnosis.start),
+        inseparable=inseparable([e.weak_windows for e in comparison.evaluations], diagnosis.start),
         suspect_coefficients=suspects,
         coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
@@ -168,7 +168,7 @@ def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]
 
 def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
     """Of the windows, of which one may be a whole run."""
-    w = evaluations[0].integrals
+    w = evaluations[0].weak_windows
     lengths = [e.windows.length for e in evaluations if e.windows is not None]
     return result_keys.WindowLengths(prediction=max(lengths, default=w.horizon), model_error=w.width)
 
@@ -230,10 +230,10 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
         omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
         measured={
             name: result_keys.MeasuredError(
-                rms_before=rms(e.integrals, e.model, name),
-                rms_after=rms(e.integrals, e.learned or e.model, name),
+                rms_before=rms(e.weak_windows, e.model, name),
+                rms_after=rms(e.weak_windows, e.learned or e.model, name),
             )
-            for name in (named(e.integrals, e.model) if e.by_force else ())
+            for name in (named(e.weak_windows, e.model) if e.by_force else ())
         },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
         trial=trial_errors(e.smoothed, e.model, e.learned or e.model) if e.by_force else None,

@@ -27,8 +27,8 @@ GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; 
 def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> "Figure":
     """Model error over time of X, Y and N, with its uncertainty, and the part that is explained."""
     figure, panels = stack(4.6)
-    time = e.integrals.middle
-    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * e.integrals.every)])
+    time = e.weak_windows.middle
+    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * e.weak_windows.every)])
     for axis, panel in enumerate(panels):
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]

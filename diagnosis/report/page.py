@@ -187,7 +187,7 @@ def _places(
             if s.axis != "N":
                 pushes.setdefault(s.run, []).append((s.start or 0.0, s.end or 0.0))
     for k, e in enumerate(evaluations):
-        if not (e.by_force and e.integrals.middle.size):
+        if not (e.by_force and e.weak_windows.middle.size):
             continue
         name = _label(e, learned)
         if placed:
@@ -203,7 +203,7 @@ def _omega(
     evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
     for k, e in enumerate(evaluations):
-        if not (e.by_force and e.integrals.middle.size):
+        if not (e.by_force and e.weak_windows.middle.size):
             continue
         figure = figures.model_error(e, None if std is None else std[k], learned)
         yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_label(e, learned)}.")
@@ -212,7 +212,7 @@ def _omega(
 def _profiles(
     evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
-    if not any(e.by_force and e.integrals.middle.size for e in evaluations):
+    if not any(e.by_force and e.weak_windows.middle.size for e in evaluations):
         return
     for k, quantity in enumerate(QUANTITIES):
         figure = figures.profile(quantity, binned_errors(quantity, evaluations, std), learned)

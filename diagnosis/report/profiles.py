@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..assessment.evaluation import Evaluation
-from ..model import Integrals
+from ..model import WeakWindows
 
 BINS = 9  # chosen
 MIN_WINDOWS = 5  # in a bin, below which it is left empty; chosen
@@ -28,26 +28,26 @@ class Quantity(NamedTuple):
 
     name: str
     labels: tuple[str, str, str]
-    values: Callable[[Integrals], np.ndarray]
+    values: Callable[[WeakWindows], np.ndarray]
     edges: np.ndarray | None = None
 
 
-def window_mean(w: Integrals, values: np.ndarray) -> np.ndarray:
+def window_mean(w: WeakWindows, values: np.ndarray) -> np.ndarray:
     """Weighted mean (K, ...) of a smooth signal (n, ...) over each window."""
     return w.smooth @ np.where(np.isfinite(values), values, 0.0)
 
 
-def surge_speed(w: Integrals) -> np.ndarray:
+def surge_speed(w: WeakWindows) -> np.ndarray:
     """(K,) [m/s]."""
     return window_mean(w, w.smoothed.nu[:, 0])
 
 
-def yaw_rate(w: Integrals) -> np.ndarray:
+def yaw_rate(w: WeakWindows) -> np.ndarray:
     """(K,) [deg/s]."""
     return window_mean(w, np.degrees(w.smoothed.nu[:, 2]))
 
 
-def heading(w: Integrals) -> np.ndarray:
+def heading(w: WeakWindows) -> np.ndarray:
     """(K,) [deg], 0 to 360."""
     psi = w.smoothed.eta[:, 2]
     return np.degrees(np.arctan2(window_mean(w, np.sin(psi)), window_mean(w, np.cos(psi)))) % 360.0
@@ -100,7 +100,7 @@ def binned_errors(
         evaluations: one for each run.
         omega_std: standard deviation (K, 3) [N, N, N m] of each run's model error; None if not known.
     """
-    values = np.concatenate([quantity.values(e.integrals) for e in evaluations])
+    values = np.concatenate([quantity.values(e.weak_windows) for e in evaluations])
     columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
     before = np.concatenate([e.before.omega for e in evaluations])
     after = np.concatenate([e.after.omega for e in evaluations])

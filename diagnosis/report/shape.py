@@ -81,7 +81,7 @@ def commands(p: Picture, m: Model) -> Callable[[Evaluation], np.ndarray]:
     """The commands in a run of the actuators that a picture shows."""
 
     def of(e: Evaluation) -> np.ndarray:
-        run = e.integrals.run
+        run = e.weak_windows.run
         sets = zip(places(run), np.moveaxis(commanded_shares(run, m)[..., p.command], 1, 0), strict=True)
         layout = m.drive.effects.layout
         shown = []

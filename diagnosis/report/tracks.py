@@ -80,9 +80,9 @@ def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]]
     """
     eta, time = e.smoothed.eta, e.smoothed.time
     rows = np.arange(0, len(eta), max(1, len(eta) // MAX_POINTS))
-    shown = np.linspace(0, e.integrals.middle.size - 1, ARROWS).astype(int)
-    at = window_mean(e.integrals, eta[:, :2])[shown]
-    psi = np.radians(heading(e.integrals))[shown]
+    shown = np.linspace(0, e.weak_windows.middle.size - 1, ARROWS).astype(int)
+    at = window_mean(e.weak_windows, eta[:, :2])[shown]
+    psi = np.radians(heading(e.weak_windows))[shown]
     c, s = np.cos(psi), np.sin(psi)
     models = _models(e, learned)[-1 if stretches else 0 :]
     forces = [p.omega[shown] for p, _, _ in models]

@@ -7,7 +7,7 @@ from scipy.linalg import LinAlgError
 
 from ..assessment.evaluation import Evaluation
 from ..identification.findings import Findings
-from ..model import Integrals, Model, omega
+from ..model import Model, WeakWindows, omega
 
 
 def unique_shares(
@@ -29,19 +29,19 @@ def unique_shares(
         For each finding, in their order, a share [1], axes weighted by noise; None where the method
         cannot fit without it.
     """
-    held_out = [e.integrals for e in evaluations if e.held_out]
-    trained = [e.integrals for e in evaluations if not e.held_out]
-    if learned.keep is None or not learned.effects:
+    held_out = [e.weak_windows for e in evaluations if e.held_out]
+    trained = [e.weak_windows for e in evaluations if not e.held_out]
+    if learned.refit is None or not learned.effects:
         return [None] * len(learned.effects)
     found: list[float | None] = []
     for finding in learned.effects:
         runs = trained if finding.of_runs else held_out or trained
 
-        def squares(model: Model, runs: Sequence[Integrals] = runs) -> float:
+        def squares(model: Model, runs: Sequence[WeakWindows] = runs) -> float:
             return sum(float(np.sum((omega(w, model) / learned.sigma) ** 2)) for w in runs)
 
         try:
-            others = learned.keep([f.id for f in learned.effects if f.id != finding.id])
+            others = learned.refit([f.id for f in learned.effects if f.id != finding.id])
         except LinAlgError:  # these data do not determine the others alone
             found.append(None)
             continue

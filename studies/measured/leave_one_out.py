@@ -10,7 +10,15 @@ import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Diagnosis, DiagnosisContent, Evaluation, Integrals, Model, diagnosis_content, omega
+from diagnosis import (
+    Diagnosis,
+    DiagnosisContent,
+    Evaluation,
+    Model,
+    WeakWindows,
+    diagnosis_content,
+    omega,
+)
 from diagnosis.identification import Prior
 from diagnosis.model import Response
 from diagnosis.progress import Advance
@@ -65,7 +73,7 @@ def fall(e: Evaluation) -> np.ndarray:
     return e.before.omega_rms / e.after.omega_rms
 
 
-def leave_out(runs: Sequence[Integrals], k: int, prior: Prior, advance: Advance) -> Fold:
+def leave_out(runs: Sequence[WeakWindows], k: int, prior: Prior, advance: Advance) -> Fold:
     """Learn from all runs but one.
 
     Args:
@@ -78,7 +86,7 @@ def leave_out(runs: Sequence[Integrals], k: int, prior: Prior, advance: Advance)
     return Fold(diagnosis.diagnose(others, [runs[k]], prior, advance=advance))
 
 
-def gather(files: Sequence[Path], advance: Advance) -> list[Integrals]:
+def gather(files: Sequence[Path], advance: Advance) -> list[WeakWindows]:
     """Measured runs, enough to leave one out.
 
     Raises:
@@ -89,13 +97,13 @@ def gather(files: Sequence[Path], advance: Advance) -> list[Integrals]:
     return diagnosis.gather(files, advance)
 
 
-def steered(w: Integrals) -> bool:
+def steered(w: WeakWindows) -> bool:
     """Whether a controller steered for most of the time: both VSP then have one sway command."""
     five = w.run.five
     return five is not None and bool(np.mean(np.abs(five[:, 1] - five[:, 3]) < SAME) > 0.5)
 
 
-def at_full_power(w: Integrals) -> np.ndarray:
+def at_full_power(w: WeakWindows) -> np.ndarray:
     """RMS (3,) of the nominal model error without the power settings of the run."""
     track = w.smoothed.track
     run = replace(track.run, power=None)
@@ -125,7 +133,7 @@ def commanded(e: Evaluation, model: Model) -> Commanded:
         e: the run.
         model: the learned one.
     """
-    w = e.integrals
+    w = e.weak_windows
     if w.run.five is None:
         return Commanded(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
@@ -135,7 +143,7 @@ def commanded(e: Evaluation, model: Model) -> Commanded:
     return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
 
 
-def _explained(w: Integrals, left: np.ndarray, commands: np.ndarray) -> np.ndarray:
+def _explained(w: WeakWindows, left: np.ndarray, commands: np.ndarray) -> np.ndarray:
     """Cross-validated share (3,) of the squares of ``left`` (K, 3)."""
     columns = w.held @ np.hstack([commands, np.abs(commands)])
     fold = np.unique(w.block // TOGETHER, return_inverse=True)[1]

@@ -19,7 +19,7 @@ HEADING = 2.0  # target: fall of the heading error over 8 s, geometric mean of t
 
 
 def kind(fold: Fold) -> str:
-    return STEERED if steered(fold.evaluation.integrals) else BY_HAND
+    return STEERED if steered(fold.evaluation.weak_windows) else BY_HAND
 
 
 def falls(fold: Fold) -> list[Fall]:
@@ -43,7 +43,7 @@ def write_falls(report: Report, folds: Sequence[Fold]) -> None:
     rows, results = [], {}
     every = [(f, falls(f)) for f in folds]
     for f, of in every:
-        unpowered, e = at_full_power(f.evaluation.integrals), f.evaluation
+        unpowered, e = at_full_power(f.evaluation.weak_windows), f.evaluation
         results[f.name] = {"kind": kind(f), "axes": {}}
         for k, (axis, x) in enumerate(zip(AXES, of, strict=True)):
             before, after = float(e.before.omega_rms[k]), float(e.after.omega_rms[k])
@@ -213,8 +213,8 @@ def model_error_picture(e: Evaluation) -> Figure:
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True)
     # A gap in time is a gap in the line.
-    gaps = np.flatnonzero(np.diff(e.integrals.middle) > 3.0) + 1
-    time = np.insert(e.integrals.middle, gaps, np.nan)
+    gaps = np.flatnonzero(np.diff(e.weak_windows.middle) > 3.0) + 1
+    time = np.insert(e.weak_windows.middle, gaps, np.nan)
     for k, panel in enumerate(panels):
         for error, label, color in ((e.before, "before", "0.6"), (e.after, "after", "tab:blue")):
             panel.plot(

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from diagnosis import Integrals, Run, clean, integrals, smooth
+from diagnosis import Run, WeakWindows, clean, smooth, weak_windows
 from diagnosis.model.ship_model import parameters
 from fmus.hull import Triple
 from fmus.signals import Force, Velocity
@@ -45,7 +45,7 @@ def voyages(
     push: Push | None = None,
     dead: Callable[[float], bool] | None = None,
     noise: float = 1.0,
-) -> list[Integrals]:
+) -> list[WeakWindows]:
     """Windows of some runs under different commands, made once in a session.
 
     Args:
@@ -59,7 +59,7 @@ def voyages(
     return [kept(_windows, k, *given) for k in range(count)]
 
 
-def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> Integrals:
+def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> WeakWindows:
     t = np.arange(round(seconds / STEP)) * STEP
     tau_cmd = commands(t + APART * k)
     hull = vessel.COMPONENT
@@ -83,4 +83,4 @@ def _windows(k: int, seconds, ship, thrusters, push, dead, noise) -> Integrals:
     rng = np.random.default_rng(k + 1)
     pose = np.array(poses) + noise * NOISE * rng.standard_normal((t.size, 3))
     pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
-    return integrals(smooth(clean(Run(f"run{k}", t, pose, tau_cmd))))
+    return weak_windows(smooth(clean(Run(f"run{k}", t, pose, tau_cmd))))

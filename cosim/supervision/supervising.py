@@ -1,7 +1,7 @@
 """A process that watches the working one: however that ends, the command says so.
 
 An FMU in the working process can end it without a word: by a crash, or by exit(0), which looks like
-success. The watching process is the one that was started; it forks before the imports, does nothing but
+success. The supervisor is the one that was started; it forks before the imports, does nothing but
 wait, passes interrupts on, ends a process that does not follow them, and returns the exit code. It reads
 what was being called from :mod:`cosim.process.run_state`. On systems without fork() there is none.
 """
@@ -30,11 +30,11 @@ ONE_REQUEST = 0.1
 GRACE = 1.5
 # Wall time between two looks at a process that is to be ended, while interrupts wait in it [s].
 LOOK = 0.1
-# Signals that would end the watching process and mean nothing to it: an FMU may send them to its parent.
+# Signals that would end the supervisor and mean nothing to it: an FMU may send them to its parent.
 INDIFFERENT = ("SIGUSR1", "SIGUSR2", "SIGPIPE", "SIGQUIT", "SIGVTALRM", "SIGPROF", "SIGXCPU")
 
 
-def watched() -> None:
+def supervised() -> None:
     """Go on in a process that this one watches; this one never returns."""
     if not hasattr(os, "fork"):
         leave_on_interrupt()
@@ -49,7 +49,7 @@ def watched() -> None:
     watching = os.getpid()
     child = os.fork()
     if child:
-        _Watch(child).run(waited)
+        _Supervisor(child).run(waited)
     for number in waited:
         signal.signal(number, signal.SIG_DFL)
     leave_on_interrupt()
@@ -62,8 +62,8 @@ def _no_action(number: int, frame: FrameType | None) -> None:
     """Handler that does nothing."""
 
 
-class _Watch:
-    """The watching process.
+class _Supervisor:
+    """The supervisor.
 
     Args:
         child: the working process.

@@ -1,4 +1,4 @@
-"""The process that watches a command: however that ends, the command says so."""
+"""The supervisor of a command: however that ends, the command says so."""
 
 from ..lazy import lazy_names
 

@@ -1,0 +1,1 @@
+from .supervising import supervised as supervised

@@ -1,1 +1,0 @@
-from .watching import watched as watched
