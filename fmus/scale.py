@@ -68,7 +68,7 @@ class Scale:
         return self.force, self.force, self.moment
 
 
-CSE1 = Scale()
+REFERENCE = Scale()
 
 
 @cache

@@ -12,10 +12,11 @@ from .actuators.response import Layout, Prepared
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device
-from .scale import CSE1, Scale
+from .scale import REFERENCE, Scale
 from .ship_description import Description
 from .ships.expansion import effects_of_ship
 from .ships.sizing import sized
+from .thrusters.chain import FIVE, THREE
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
 
@@ -36,7 +37,7 @@ class Ship:
     vessel: Component
     thrusters: Component
     devices: frozenset[str] = frozenset(get_args(Device))
-    scale: Scale = CSE1
+    scale: Scale = REFERENCE
     description: Description | None = None
 
     @cached_property
@@ -64,6 +65,17 @@ class Ship:
         return self.nominal_drive.effects.layout
 
     @property
+    def layouts(self) -> tuple[Layout, ...]:
+        """How runs may have its commands: as the FMU does, and each actuator by its own."""
+        return (self.layout,) if self.description is not None else (THREE, FIVE)
+
+    def layout_of(self, commands: Any) -> Layout:
+        """The layout of a run's commands (n, k); that of the FMU for None."""
+        if commands is None:
+            return self.layout
+        return next(one for one in self.layouts if len(one.commands) == commands.shape[1])
+
+    @property
     def commands(self) -> Mapping[str, str] | None:
         """``ACTUATOR.COMMAND`` and unit of each command of a described ship."""
         return None if self.description is None else command_units(self.description)
@@ -74,11 +86,20 @@ class Ship:
         d = self.description
         return d is None or (d.allocates and len(axes(d)) == 3)
 
-    def commanded_force(self, commands: Any) -> Any:
-        """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands (n, k) at rest."""
+    def commanded_force(self, commands: Any, settings: Any = None) -> Any:
+        """tau [N, N, N m], shape (n, 3), that the nominal thrusters give by commands at rest.
+
+        Args:
+            commands: (n, k), in one of the layouts.
+            settings: (n, m), of the thrusters' power; None: full.
+        """
         import numpy as np
 
-        force = self.layout.believed(tuple(commands.T), self.nominal_drive.params)
+        layout = next(one for one in self.layouts if len(one.commands) == commands.shape[1])
+        drive = (
+            self.nominal_drive if settings is None else layout.powered(self.nominal_drive, settings.T)
+        )
+        force = layout.believed(tuple(commands.T), drive.params)
         return np.column_stack(np.broadcast_arrays(*force, commands[:, 0]))[:, :3]
 
     @cached_property

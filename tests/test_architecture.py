@@ -400,28 +400,12 @@ PARTS = re.compile(
     r"(?<![a-z])(vsp\d?|bow(?! to)|tunnel)(?![a-z])|^((matlab_)?five|otter|cse1|kvlcc2|gunnerus)$",
     re.IGNORECASE,
 )
-# What knows CyberShip Enterprise 1: readers of its columns and files, its two propellers with commands of
-# their own, pictures of its effects, and the pages of the thesis' analysis.
+# What knows CyberShip Enterprise 1: readers of its columns and files, and a page of the thesis' analysis.
 OF_ONE_SHIP = {
-    "diagnosis.assessment.command_check",
-    "diagnosis.assessment.plausibility",
-    "diagnosis.assessment.readings",
-    "diagnosis.assessment.remainder_text",
-    "diagnosis.assessment.stability",
-    "diagnosis.assessment.windows",
-    "diagnosis.data.cleaning",
     "diagnosis.data.columns",
     "diagnosis.data.matlab_files",
     "diagnosis.data.reading",
-    "diagnosis.data.thinning",
-    "diagnosis.data.unit_check",
-    "diagnosis.identification.candidates",
-    "diagnosis.model.prediction",
-    "diagnosis.model.thrust",
-    "diagnosis.model.weak_form",
     "diagnosis.open_loop.thruster_report",
-    "diagnosis.prediction_error.fit",
-    "diagnosis.prediction_error.shooting",
 }
 
 

@@ -18,7 +18,7 @@ from diagnosis import propose_columns
 from diagnosis.data import propose
 from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Column, Layout
 from diagnosis.data.csv_tables import csv_table
-from diagnosis.data.reading import force
+from fmus.ship import ship
 from fmus.thrusters.allocation import Allocation, thrust
 
 N = 400
@@ -55,7 +55,6 @@ def test_what_was_written_is_read(tmp_path, kind):
     np.testing.assert_allclose(run.pose, POSE, rtol=1e-15)
     np.testing.assert_allclose(run.tau_cmd, TAU_CMD, rtol=1e-15)
     assert run.commands is None
-    assert run.five is None
 
 
 def test_commands_become_the_force_that_they_mean(tmp_path):
@@ -68,20 +67,24 @@ def test_commands_become_the_force_that_they_mean(tmp_path):
 def test_five_commands_stay_five(tmp_path):
     table(**dict(zip(FIVE, SHARES.T, strict=True))).to_csv(tmp_path / "a.csv", index=False)
     run = diagnosis.read(tmp_path / "a.csv")
-    np.testing.assert_allclose(run.five, SHARES, rtol=1e-15)
-    np.testing.assert_allclose(run.tau_cmd, force(SHARES), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(run.commands, SHARES, rtol=1e-15)
+    np.testing.assert_allclose(run.tau_cmd, ship().commanded_force(SHARES), rtol=1e-12, atol=1e-15)
 
 
 def test_force_of_five_commands():
-    assert force(np.array([[1.0, 0.0, 1.0, 0.0, 0.0]]))[0] == pytest.approx([2.33, 0.0, 0.0])
-    port_only = force(np.array([[1.0, 0.0, 0.0, 0.0, 0.0]]))[0]
+    assert ship().commanded_force(np.array([[1.0, 0.0, 1.0, 0.0, 0.0]]))[0] == pytest.approx(
+        [2.33, 0.0, 0.0]
+    )
+    port_only = ship().commanded_force(np.array([[1.0, 0.0, 0.0, 0.0, 0.0]]))[0]
     assert port_only[2] == pytest.approx(0.055 * 1.165), (
         "the propeller to port turns the bow to starboard"
     )
-    bow = force(np.array([[0.0, 0.0, 0.0, 0.0, 1.0]]))[0]
+    bow = ship().commanded_force(np.array([[0.0, 0.0, 0.0, 0.0, 1.0]]))[0]
     assert bow == pytest.approx([0.0, 2.629, 2.629 * 0.3875])
     both = np.array([[0.3, -0.2, 0.3, -0.2, 0.0]])
-    assert force(both)[0] == pytest.approx(2.0 * np.array(thrust(0.3, -0.2, 0.0, Allocation())))
+    assert ship().commanded_force(both)[0] == pytest.approx(
+        2.0 * np.array(thrust(0.3, -0.2, 0.0, Allocation()))
+    )
 
 
 def test_names_units_and_axes_are_told_in_a_file_beside(tmp_path):
@@ -332,8 +335,10 @@ def test_power_settings_change_places_when_a_controller_steers(tmp_path):
     run = matlab(tmp_path / "a.mat", by_hand=(1.0, 0.2), steered=(0.4, 0.5))
     np.testing.assert_allclose(run.power[: N // 2], np.tile([0.25, 2.0], (N // 2, 1)), rtol=1e-12)
     np.testing.assert_allclose(run.power[N // 2 :], np.ones((N // 2, 2)), rtol=1e-12)
-    vsp_only, bow_only = run.five * [1, 1, 1, 1, 0], run.five * [0, 0, 0, 0, 1]
-    expected = run.power[:, :1] * force(vsp_only) + run.power[:, 1:] * force(bow_only)
+    vsp_only, bow_only = run.commands * [1, 1, 1, 1, 0], run.commands * [0, 0, 0, 0, 1]
+    expected = run.power[:, :1] * ship().commanded_force(vsp_only) + run.power[
+        :, 1:
+    ] * ship().commanded_force(bow_only)
     np.testing.assert_allclose(run.tau_cmd, expected, atol=1e-12)
 
 
@@ -348,7 +353,7 @@ def test_power_may_be_told_beside_the_five_commands(tmp_path):
     told = {name: {"name": name, "unit": "%"} for name in POWER}
     (tmp_path / "a.csv.json").write_text(json.dumps({"columns": told}))
     run = diagnosis.read(tmp_path / "a.csv")
-    np.testing.assert_allclose(run.tau_cmd[:, 0], 0.5 * force(SHARES)[:, 0], atol=1e-12)
+    np.testing.assert_allclose(run.tau_cmd[:, 0], 0.5 * ship().commanded_force(SHARES)[:, 0], atol=1e-12)
 
 
 def refused(path, message):
@@ -363,7 +368,7 @@ def test_measured_runs_are_read():
     for path in sorted((DATA / "cse1").glob("*.mat")):
         run = diagnosis.read(path)
         assert run.name == path.stem
-        assert run.five.shape == (run.time.size, 5)
+        assert run.commands.shape == (run.time.size, 5)
         assert np.median(np.diff(run.time)) == pytest.approx(0.05)
         most = np.abs(run.tau_cmd[:, 0]).max()
         assert most == pytest.approx(2.33 * run.power[:, 0].max(), rel=0.01), "full ahead, once"

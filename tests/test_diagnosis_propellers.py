@@ -6,9 +6,10 @@ from support.measured import NOISE, smoothed
 from test_diagnosis_selection import learn
 
 from diagnosis import Model, Run, weak_windows
-from diagnosis.data.reading import ASIDE, force, propellers
+from diagnosis.data.columns import FIVE
 from fmus.actuators.response import total
 from fmus.effects import STANDARD, Running, Thrust
+from fmus.effects.cse1 import ASIDE
 from fmus.signals import Force
 from fmus.thrusters import chain
 from fmus.vessel.vessel import State
@@ -36,15 +37,16 @@ def voyage(seconds=90.0, **values):
     t, five, setting = given(seconds)
     model = Model(thrusters=values)
     ready, s, poses = model.hull, State(psi=3.0), []
-    for now, shares, power in zip(t.tolist(), propellers(five).tolist(), setting.tolist(), strict=True):
+    for now, shares, power in zip(t.tolist(), five.tolist(), setting.tolist(), strict=True):
         poses.append(s[:3])
-        total = np.zeros(3)
-        for one, aside in zip(shares, ASIDE, strict=True):
-            drive = chain.placed(model.drive, aside, power)
-            total += chain.act(tuple(one), chain.running(now, *s[3:6], one, drive), drive)
-        s, _ = model.ship.vessel.advance(s, Force(*total.tolist()), ready, H)
+        drive = chain.FIVE.powered(model.drive, power)
+        running = chain.FIVE.running(now, *s[3:6], tuple(shares), drive)
+        force = chain.FIVE.act(tuple(shares), running, drive)
+        s, _ = model.ship.vessel.advance(s, Force(*force), ready, H)
     pose = np.array(poses) + NOISE * np.random.default_rng(4).standard_normal((t.size, 3))
-    return weak_windows(smoothed(Run("made", t, pose, force(five, setting), five=five, power=setting)))
+    force = model.ship.commanded_force(five, setting)
+    run = Run("made", t, pose, force, commands=five, power=setting, signals=FIVE)
+    return weak_windows(smoothed(run))
 
 
 AT = (-0.4575, -0.4575, 0.3875)
@@ -67,12 +69,12 @@ def test_cross_forces_are_mirrored_and_cancel_but_for_a_turn():
 
 
 def test_inflow_takes_force_from_where_the_water_comes():
-    turning = Running(u=0.2, v=0.0, r=0.1, part=(-0.5, 0.5, 0.0))
+    turning = Running(u=0.2, v=0.0, r=0.1, part=(-0.5, 0.5, -0.5, 0.5, 0.0))
     found = act("inflow_vsp", turning, inflow_vsp_x=1.0, inflow_vsp_y=1.0)
     assert found.X[0] == pytest.approx(0.5 - 0.5 * (0.2 + 0.0055))
     assert found.X[1] == pytest.approx(0.5 - 0.5 * (0.2 - 0.0055))
     np.testing.assert_allclose(found.Y, (0.2 + 0.5 * 0.04575, 0.2 + 0.5 * 0.04575, 0.1))
-    still = act("inflow_vsp", turning._replace(part=(0.0, 0.0, 0.0)), inflow_vsp_x=1.0)
+    still = act("inflow_vsp", turning._replace(part=(0.0,) * 5), inflow_vsp_x=1.0)
     assert (still.X, still.Y) == ((0.5, 0.5, 0.0), (0.2, 0.2, 0.1))
 
 

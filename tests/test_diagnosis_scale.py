@@ -18,7 +18,7 @@ from diagnosis.model.uncertainty import omega_std
 from fmus.actuators.law import Law
 from fmus.declare import variables
 from fmus.effects import STANDARD
-from fmus.scale import CSE1, REFERENCE_LENGTH, Scale
+from fmus.scale import REFERENCE, REFERENCE_LENGTH, Scale
 from fmus.ship import ship
 from fmus.ships.ship_file import read_ship, shipped_ships
 
@@ -97,7 +97,7 @@ def test_motion_model_error_and_predictions_are_the_same_in_own_units(scale):
         yield "position", errors.position / scale.length
         yield "heading", errors.heading
 
-    for (name, same), (_, other) in zip(in_own_units(CSE1), in_own_units(scale), strict=True):
+    for (name, same), (_, other) in zip(in_own_units(REFERENCE), in_own_units(scale), strict=True):
         assert np.array_equal(np.isnan(same), np.isnan(other)), name
         np.testing.assert_allclose(other, same, rtol=1e-6, atol=1e-6 * np.nanmax(same), err_msg=name)
 
@@ -105,7 +105,7 @@ def test_motion_model_error_and_predictions_are_the_same_in_own_units(scale):
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
 def test_the_same_is_found_in_own_units(scale):
-    same, other = learned(CSE1), learned(scale)
+    same, other = learned(REFERENCE), learned(scale)
     assert other.verdict == same.verdict == "found"
     assert [f.id for f in other.learned.effects] == [f.id for f in same.learned.effects]
     assert {f.id for f in same.learned.effects} == {"lag", "current"}
@@ -166,7 +166,7 @@ def test_effects_begin_end_and_are_tried_at_the_size_of_the_ship(scale, name):
 @pytest.mark.parametrize("scale", SIZES, ids=["7 m", "320 m"])
 def test_closed_loops_are_similar(scale):
     reference = REFERENCES[0]._replace(seconds=60.0)
-    same, other = (largest_distance(reference, of_size(each)) for each in (CSE1, scale))
+    same, other = (largest_distance(reference, of_size(each)) for each in (REFERENCE, scale))
     assert other / scale.length == pytest.approx(same, rel=1e-6)
 
 
@@ -178,7 +178,7 @@ def test_the_least_region_is_that_of_the_size():
 def test_profiles_over_time_have_bins_of_the_size():
     from diagnosis.assessment.covariates import covariates_by_axis
 
-    for scale in (CSE1, SIZES[0]):
+    for scale in (REFERENCE, SIZES[0]):
         time = covariates_by_axis(loaded(scale))[0][-2]
         assert np.diff(time.edges).min() >= MIN_TIME_BIN * scale.time
 

@@ -8,6 +8,7 @@ import pytest
 from support.measured import sail
 
 from diagnosis import Model, Run
+from diagnosis.data.columns import FIVE
 from diagnosis.model.thrust import Integral, Response, thrust
 from fmus.declare import variables
 from fmus.effects import STANDARD
@@ -111,7 +112,7 @@ def test_two_propellers_with_the_same_commands_are_twice_the_one_that_stands_for
     u = np.column_stack(allocate(*run.tau_cmd.T, Model().drive.params.allocation))
     u[:, 2] = 0.0
     one = replace(run, commands=u)
-    two = replace(run, five=np.column_stack([u[:, :2], u[:, :2], u[:, 2]]))
+    two = replace(run, commands=np.column_stack([u[:, :2], u[:, :2], u[:, 2]]), signals=FIVE)
     if len(values) == 21:
         values = {n: 0.01 * k for k, n in enumerate(values)}
     model = Model(thrusters=values)
@@ -124,17 +125,17 @@ def test_a_propeller_to_port_that_pushes_ahead_turns_the_ship_to_starboard():
     still = Model()
     for k, name in enumerate(("vsp1", "vsp2")):
         model = Model(thrusters={f"curve_{name}_x_c_{node}": 0.2 for node in range(1, 22)})
-        for five in (None, np.zeros((base().time.size, 5))):
-            run = replace(base(), five=five)
+        idle = replace(base(), commands=np.zeros((base().time.size, 5)), signals=FIVE)
+        for run in (base(), idle):
             push, none = (acting(run, m, true_nu()) for m in (model, still))
             X, Y, N = (push - none).T
-            np.testing.assert_allclose(X, 0.2 if five is not None else 0.1)
+            np.testing.assert_allclose(X, 0.2 if run is idle else 0.1)
             np.testing.assert_allclose(Y, 0.0, atol=1e-12)
             np.testing.assert_allclose(N, (0.055, -0.055)[k] * X)
 
 
 def along_time(response):
-    """Commands that arrive and shares that act (n, sets, 3), or the one that is both."""
+    """Commands that arrive and shares that act (n, 3), or the one that is both."""
     return np.moveaxis(response.between_samples, -1, 1)
 
 

@@ -11,9 +11,10 @@ from support.cases import in_part
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, clean, read, smooth
-from diagnosis.data.reading import ASIDE
+from diagnosis.data.columns import FIVE
 from diagnosis.model.ship_model import parameters
 from diagnosis.model.weak_form import HORIZON
+from fmus.effects.cse1 import ASIDE
 from fmus.thrusters.allocation import Allocation, allocate
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS
 
@@ -188,7 +189,7 @@ def test_time_may_start_anywhere():
 def test_five_commands_of_two_equal_propellers_are_three_commands_of_one_of_twice_the_force():
     shares = np.column_stack(allocate(*base().tau_cmd.T, Allocation(F_vsp=2.33)))
     five = np.column_stack([shares[:, :2], shares[:, :2], shares[:, 2]])
-    run = replace(base(), five=five)
+    run = replace(base(), commands=five, signals=FIVE)
     for thrusters in ({}, {"lag": 0.3}, {"loss_bow": 0.4}, {"delay": 0.2}):
         three = rms(windows_of(base()), thrusters=thrusters)
         assert rms(windows_of(run), thrusters=thrusters) == pytest.approx(three, rel=1e-6)
@@ -199,7 +200,7 @@ def test_propellers_that_differ_turn_the_ship():
     five[:, 0], five[:, 2] = 0.2, -0.2
     pure = np.zeros_like(base().tau_cmd)
     pure[:, 2] = 0.4 * 1.165 * ASIDE[1]
-    turning = windows_of(replace(base(), tau_cmd=pure, five=five))
+    turning = windows_of(replace(base(), tau_cmd=pure, commands=five, signals=FIVE))
     moment = windows_of(replace(base(), tau_cmd=pure))
     np.testing.assert_allclose(turning.residuals(), moment.residuals(), atol=1e-9)
 
@@ -215,7 +216,7 @@ def test_half_the_power_is_half_the_force():
     """Five commands at a power that is told, and at full power of thrusters that are weaker."""
     shares = np.column_stack(np.clip(allocate(*base().tau_cmd.T, Allocation()), -1.0, 1.0))
     five = np.column_stack([shares[:, :2], shares])
-    full = replace(base(), five=five)
+    full = replace(base(), commands=five, signals=FIVE)
     weaker = replace(full, power=np.tile([0.5, 0.25], (base().time.size, 1)))
     thrusters = {"plant_F_vsp": 0.5 * 1.165, "plant_F_bow": 0.25 * 2.629}
     assert rms(windows_of(weaker)) == pytest.approx(rms(windows_of(full), thrusters=thrusters), rel=1e-9)

@@ -456,7 +456,7 @@ def test_same_source_in_c_with_every_effect_on(component, tmp_path):
 
 def test_actuator_effects_leave_what_they_do_not_concern():
     commands = (0.3, 0.2, 0.1)
-    now = Running(0.0, 0.1, 0.0, 0.0, commands, commands, (1.0, 1.0, 1.0))
+    now = Running(0.0, 0.1, 0.0, 0.0, commands, (0.3, 0.2, 0.3, 0.2, 0.1), (1.0, 1.0, 1.0))
     f = Thrust((0.3, 0.3, 0.0), (0.2, 0.2, 0.1), (-0.4, -0.4, 0.4), (-0.1, 0.1, 0.0), (0.5, 0.5, 1.0))
     for e in STANDARD.of_kind("actuator"):
         if e.memory is None:

@@ -15,7 +15,7 @@ from diagnosis import repair as command
 from diagnosis.data.telegrams import filled
 from diagnosis.sensors import closure, examine
 from diagnosis.sensors.wraps import unwrapped
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 
 H, SECONDS = 0.1, 160.0
 NOISE = (1e-3, 1e-3, 1e-3)
@@ -46,13 +46,13 @@ def beside(run, **channels):
     return replace(run, measured=dict(run.measured) | channels)
 
 
-def told(run, scale=CSE1):
+def told(run, scale=REFERENCE):
     return {(f.channel, f.kind): f for f in examine(run, scale).findings}
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_nothing_is_told_of_a_clean_run(seed):
-    found = examine(made(seed), CSE1)
+    found = examine(made(seed), REFERENCE)
     assert found.findings == ()
     assert found.run.time.size == made(seed).time.size
     assert set(found.agreeing) == {"u", "v", "r"}
@@ -73,7 +73,7 @@ CONSTANT = {
 def test_a_constant_fault_is_named_with_its_size_and_repaired(name):
     key, value, put = CONSTANT[name]
     broken = put(made())
-    found = examine(broken, CSE1)
+    found = examine(broken, REFERENCE)
     assert [(f.channel, f.kind) for f in found.findings] == [key]
     assert found.findings[0].value == pytest.approx(value, rel=0.1)
     assert not told(found.run)
@@ -98,7 +98,7 @@ def test_findings_do_not_depend_on_where_and_how_the_earth_lies():
 def test_a_clock_that_wanders_is_told_by_its_stretches_and_repaired():
     run = made()
     log = run.time + 0.1 * 60.0 / (2.0 * np.pi) * np.sin(2.0 * np.pi * run.time / 60.0)
-    found = examine(replace(run, time=log), CSE1)
+    found = examine(replace(run, time=log), REFERENCE)
     rates = [f for f in found.findings if f.kind == "clock_rate"]
     assert len(rates) >= 3
     assert min(f.value for f in rates) < 0.96
@@ -116,7 +116,7 @@ def test_seconds_that_the_log_lacks_are_told():
     run = made()
     keep = (run.time < 80.0) | (run.time > 90.0)
     cut = run.rows(keep)
-    found = examine(replace(cut, time=np.where(cut.time < 80.0, cut.time, cut.time - 10.0)), CSE1)
+    found = examine(replace(cut, time=np.where(cut.time < 80.0, cut.time, cut.time - 10.0)), REFERENCE)
     (gap,) = found.findings
     assert gap.kind == "clock_gap"
     assert gap.ci95[0] < 10.0 < gap.ci95[1]
@@ -170,7 +170,7 @@ def test_a_second_antenna_has_its_place():
 def test_the_smoother_is_sharper_with_channels_that_agree():
     run = made()
     rough = replace(run, pose=run.pose + 0.02 * np.random.default_rng(3).standard_normal(run.pose.shape))
-    agreeing = examine(rough, CSE1).agreeing
+    agreeing = examine(rough, REFERENCE).agreeing
     alone = diagnosis.smooth(diagnosis.clean(rough))
     both = diagnosis.smooth(diagnosis.clean(rough), agreeing=agreeing)
     assert (np.nanmean(both.nu_std, axis=0) < 0.5 * np.nanmean(alone.nu_std, axis=0)).all()
@@ -208,7 +208,7 @@ def test_of_a_pose_alone_nothing_can_be_said(tmp_path, capsys):
 def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
     path = DATA / "gunnerus" / f"{trial}.csv"
     if not path.is_file():
-        pytest.skip("no sea trial: CYBERSHIP_DATA names no folder that has it")
+        pytest.skip("no measured runs: CYBERSHIP_DATA names no folder that has the sea trial")
     d = pd.read_csv(path)
     zero = np.zeros((len(d), 3))
     measured = {"u": d.u.to_numpy(), "v": d.v.to_numpy(), "r": np.radians(d.r.to_numpy())}

@@ -17,6 +17,7 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, omega, session, weak_windows
+from diagnosis.data.columns import FIVE
 from diagnosis.identification import Suspect
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import allocate
@@ -38,7 +39,8 @@ def five(run):
 
 def windows(commands=None, power=None, seconds=64.0):
     run, _ = sail(seconds, h=0.05)
-    run = replace(run, five=five(run) if commands is None else commands(run), power=power)
+    given = five(run) if commands is None else commands(run)
+    run = replace(run, commands=given, signals=FIVE, power=power)
     return weak_windows(diagnosis.smooth(diagnosis.clean(run)))
 
 
@@ -129,7 +131,7 @@ def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
 
     w = windows(crossed, seconds=160.0)
     model = Model().plus({"delay": 0.2})
-    arriving = delayed(w.run.time, w.run.five[:, [0, 2]], 0.2)
+    arriving = delayed(w.run.time, w.run.commands[:, [0, 2]], 0.2)
     omega_left = np.random.default_rng(0).normal(size=(w.middle.size, 3))
     omega_left[:, 1] = w.held @ (arriving[:, 0] - arriving[:, 1])
     e = Evaluation(Model(), w, None, True, *[PredictionError(omega_left, np.zeros((0, 3)), None)] * 2)

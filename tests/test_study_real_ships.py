@@ -18,8 +18,12 @@ from studies.research_vessel import MANOEUVRES, closure, cut, steady
 from studies.study_report import Report
 
 TANKER, VESSEL = DATA / "kvlcc2_hsva", DATA / "gunnerus"
-needs_tanker = pytest.mark.skipif(not TANKER.is_dir(), reason=f"no zig-zags of KVLCC2 in {TANKER}")
-needs_vessel = pytest.mark.skipif(not VESSEL.is_dir(), reason=f"no sea trial of Gunnerus in {VESSEL}")
+needs_tanker = pytest.mark.skipif(
+    not TANKER.is_dir(), reason=f"no measured runs: no zig-zags of KVLCC2 in {TANKER}"
+)
+needs_vessel = pytest.mark.skipif(
+    not VESSEL.is_dir(), reason=f"no measured runs: no sea trial of Gunnerus in {VESSEL}"
+)
 
 
 @needs_tanker

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.model import of_one_run, of_run
-from fmus.effects import EACH_VSP, STANDARD
+from fmus.effects import APART, STANDARD
 
 from .effect_forms import form
 from .fleet import ProcessNoise
@@ -27,7 +27,7 @@ FOREIGN: dict[str, tuple[str, ...]] = {
     "delay off the grid": ("delay",),
 }
 # The runs have one set of commands: what acts on one of the two propellers is no candidate there.
-LOOKED_FOR = [e for e in STANDARD.values() if EACH_VSP not in e.needs and e.search.by != "given"]
+LOOKED_FOR = [e for e in STANDARD.values() if APART not in e.needs and e.search.by != "given"]
 SINGLE = [*(e.id for e in LOOKED_FOR), *FOREIGN]
 OUT, SHORTEST = 0.2, 2.0  # share of the time that an outage takes, and its shortest interval [s]
 # Physics of which the diagnosis has nothing: no id is a right answer.

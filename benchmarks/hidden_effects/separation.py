@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from fmus.effects import EACH_VSP, STANDARD
+from fmus.effects import APART, STANDARD
 from fmus.ship import ship
 
 from .truth import WEIGHTS, Motion, Values, over
@@ -104,7 +104,7 @@ class Rivals:
         target = flat(hidden)
         contained = [e for e, held in CONTAINS.items() if held & set(right)]
         looked_for = (e for e in STANDARD.values() if e.search.by != "given")
-        possible = [e.id for e in looked_for if EACH_VSP not in e.needs]
+        possible = [e.id for e in looked_for if APART not in e.needs]
         found = {e: self.left(target, e) for e in possible if e not in {*right, *contained, "waves"}}
         if self.nuisance:
             found[NOTHING] = self._share(target, target, [])

@@ -31,7 +31,7 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
         run: with its commands.
         model: its thrusters.
     """
-    if run.commands is not None or run.five is not None:
+    if run.commands is not None:
         return None  # shares of the full thrust, see :func:`diagnosis.read`
     full, size = full_thrust(model), np.abs(run.tau_cmd)
     beyond = size > MOST_THRUST * full
@@ -86,7 +86,7 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     s, tau = w.smoothed, w.run.tau_cmd
     if not (np.abs(tau).max(axis=1) == 0.0).any():
         return None
-    always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None, five=None)
+    always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
     idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
     if idle.sum() < LONG:

@@ -152,7 +152,7 @@ def same_columns(run: Run) -> tuple[str, str] | None:
     """Two signals of a run that are the same numbers, if there are any."""
     signals = {"time": run.time, **dict(zip(POSE, run.pose.T, strict=True))}
     pairs = list(combinations(signals, 2))
-    if run.commands is None and run.five is None:
+    if run.commands is None:
         signals |= dict(zip(TAU, run.tau_cmd.T, strict=True))
         pairs += combinations(TAU, 2)
     for a, b in pairs:

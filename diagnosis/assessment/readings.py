@@ -9,7 +9,7 @@ from fmus.declare import variables
 
 from ..data import Run
 from ..data.beside import Change
-from ..data.columns import FIVE, POSE, TAU, UNITS
+from ..data.columns import POSE, TAU, UNITS
 from ..model import Model, WeakWindows, omega
 from ..model.thrust import full_thrust
 
@@ -76,14 +76,13 @@ def directions(run: Run) -> Iterator[Reading]:
     yield swapped(POSE, 0, 1)
     yield of_pose("its heading is in degrees", (1.0, 1.0, np.pi / 180.0))
     wrong = "its commands have the wrong sign"
-    if run.commands is None and run.five is None:
+    if run.commands is None:
         yield of_commands(wrong, (-1.0, -1.0, -1.0))
         for k, name in enumerate(TAU):
             yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
         yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
     else:
-        signals = FIVE if run.five is not None else run.signals
-        yield Reading(wrong, {s: Change(s, -1.0) for s in signals}, commands=-np.eye(3))
+        yield Reading(wrong, {s: Change(s, -1.0) for s in run.signals}, commands=-np.eye(3))
 
 
 def units(run: Run, model: Model) -> Iterator[Reading]:
@@ -99,7 +98,7 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
         yield of_pose(f"y is in {unit}", (1.0, size, 1.0))
     half = Change("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
-    if run.commands is not None or run.five is not None:
+    if run.commands is not None:
         return
     forces, moments = UNITS["force"], UNITS["moment"]
     yield of_commands(
@@ -122,7 +121,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
         k: how many times what the commands should give the ship accelerates.
     """
     yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
-    if run.commands is None and run.five is None:
+    if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
     clock = {"time": Change("time", factor=k**0.5)}
     yield Reading(f"{k**0.5:.3g} s passed in each second of its time", clock, pace=k**0.5)
@@ -131,7 +130,7 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
 def reread(w: WeakWindows, reading: Reading) -> WeakWindows:
     """The windows of a run by another reading, its commands as forces."""
     s, run = w.smoothed, w.run
-    given = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T, commands=None, five=None, power=None)
+    given = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T, commands=None, power=None)
     meant = replace(
         s,
         track=replace(s.track, run=given),
@@ -148,7 +147,7 @@ def needed(w: WeakWindows, model: Model) -> np.ndarray:
         w: windows of the run.
         model: its inertia and hull.
     """
-    idle = replace(w.run, tau_cmd=0.0 * w.run.tau_cmd, commands=None, five=None, power=None)
+    idle = replace(w.run, tau_cmd=0.0 * w.run.tau_cmd, commands=None, power=None)
     s = replace(w.smoothed, track=replace(w.smoothed.track, run=idle))
     with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
         return np.nan_to_num(omega(replace(w, smoothed=s, memory={}), model), posinf=0.0, neginf=0.0)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 
 from .recurrence import Recurrence
 from .regions import NAMES, UNITS, Region
@@ -54,7 +54,7 @@ def remainder_sentence(
     how: Sequence[Recurrence] | None,
     regions: Sequence[Region],
     waves: bool,
-    scale: Scale = CSE1,
+    scale: Scale = REFERENCE,
 ) -> str:
     """The remainder of all axes in words.
 

@@ -14,7 +14,7 @@ import numpy as np
 from cosim import InputError
 from fmus.effects import Loaded
 from fmus.hull import damping_force
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 from fmus.signals import Force
 from fmus.vessel import vessel
 from fmus.vessel.vessel_effects import NONE
@@ -50,7 +50,7 @@ class OperatingRegion(NamedTuple):
         return cls(*(x * f for x, f in zip(cls(), scale.speeds, strict=True)))
 
     @classmethod
-    def of(cls, nu: np.ndarray, scale: Scale = CSE1) -> "OperatingRegion":
+    def of(cls, nu: np.ndarray, scale: Scale = REFERENCE) -> "OperatingRegion":
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         known = np.abs(nu[np.isfinite(nu).all(axis=1)])
         most = np.quantile(known, COVERAGE, axis=0) if len(known) else np.zeros(3)

@@ -89,10 +89,10 @@ class Windows:
         self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
         self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
         self._groups: list[tuple[Starts, np.ndarray]] = []
-        for h, five in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
-            members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, five)]
+        for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
+            members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)), five)
+            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -179,11 +179,11 @@ class RunWindows(NamedTuple):
         return self.smoothed.time
 
     @property
-    def step_and_commands(self) -> tuple[float, bool]:
-        """Step of integration [s], which divides the sample period; whether commands are five."""
+    def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
+        """Step of integration [s], which divides the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
         parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
-        return row / parts, self.smoothed.track.run.five is not None
+        return row / parts, self.smoothed.track.run.signals
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
@@ -220,11 +220,11 @@ def free_runs(
     usable = np.flatnonzero(smoothed.used)
     before = usable[smoothed.time[usable] <= begin]
     first = before[-1:] if before.size else usable[:1]
-    step, five = RunWindows(smoothed, first, first, first).step_and_commands
+    step, _ = RunWindows(smoothed, first, first, first).step_and_commands
     h = max(step, FREE_STEP * smoothed.scale.time)
     longest = LONGEST_FREE * smoothed.scale.time
     seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
-    starts = Starts(((smoothed, first),), h, int(seconds / h), five)
+    starts = Starts(((smoothed, first),), h, int(seconds / h))
     found: dict[int, np.ndarray] = {}
     for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
         poses = predict(starts, together)

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim import InputError
 from fmus.ops import wrap
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 
 from .reading import Run
 from .telegrams import filled
@@ -63,7 +63,7 @@ class Track:
     period: float
     out: int
     notes: tuple[str, ...]
-    scale: Scale = CSE1
+    scale: Scale = REFERENCE
 
     @cached_property
     def valid(self) -> np.ndarray:
@@ -89,7 +89,7 @@ class Track:
         return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
 
 
-def clean(run: Run, anyway: bool = False, scale: Scale = CSE1) -> Track:
+def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     """Judge the samples of a run.
 
     Args:

@@ -16,10 +16,8 @@ import pandas as pd
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
-from fmus.effects.cse1 import ASIDE
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
-from fmus.thrusters.allocation import Allocation, thrust
 
 from .beside import refuse_preamble, refuse_separator, refuse_units
 from .channels import BESIDE, outputs
@@ -63,16 +61,14 @@ class Run:
         time: (n,) [s].
         pose: (n, 3), measured north, east, heading [m, m, rad]; lost samples are NaN or zeros.
         tau_cmd: (n, 3), commanded force [N, N, N m] after clipping.
-        commands: (n, k), in the order of the ship's; of CyberShip Enterprise 1 those of the VSP in surge
-            and sway and of the bow thruster [1]; None if not known.
-        five: (n, 5), commands of VSP 1 surge, sway, VSP 2 surge, sway, bow [1]; None if not known.
-        power: (n, 2), force of VSP and bow as shares of that at full power, beside five; None if full.
+        commands: (n, k), in one of :attr:`fmus.ship.Ship.layouts`; None if not known.
+        power: (n, m), force of thrusters as shares of that at full power; None if full.
         notes: what was found that is not as it should be, a line each.
         held: (n,), rows whose commands are missing in the file, and held; None if none is.
         called: signal -> its column in the file, of those with another name; None if there is none.
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
-        signals: names of ``commands``.
+        signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
         measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
         noise: signal -> standard deviation that the file beside tells [SI].
         ship: that was measured; None: CyberShip Enterprise 1.
@@ -84,7 +80,6 @@ class Run:
     pose: np.ndarray
     tau_cmd: np.ndarray
     commands: np.ndarray | None = None
-    five: np.ndarray | None = None
     power: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     held: np.ndarray | None = None
@@ -100,7 +95,7 @@ class Run:
     @property
     def commanded(self) -> dict[str, np.ndarray]:
         """Signal -> (n,), the commands in the form in which they were given."""
-        forms = [(self.signals, self.commands), (FIVE, self.five), (POWER, self.power)]
+        forms = [(self.signals, self.commands), (POWER, self.power)]
         given = [form for form in forms if form[1] is not None] or [(TAU, self.tau_cmd)]
         return {s: c for names, table in given for s, c in zip(names, table.T, strict=True)}
 
@@ -109,20 +104,6 @@ class Run:
         columns = {f.name: getattr(self, f.name) for f in fields(self)}
         kept = {n: c[keep] for n, c in columns.items() if isinstance(c, np.ndarray)}
         return replace(self, **kept, measured={s: c[keep] for s, c in self.measured.items()})
-
-
-def propellers(five: np.ndarray) -> np.ndarray:
-    """Shares of full force (n, 2, 3) of the two thruster sets at ASIDE, by the five commands (n, 5)."""
-    bow = five[:, 4:]
-    return np.stack([np.hstack([five[:, :2], bow]), np.hstack([five[:, 2:4], 0.0 * bow])], axis=1)
-
-
-def force(five: np.ndarray, power: np.ndarray | None = None) -> np.ndarray:
-    """Nominal tau [N, N, N m], shape (n, 3), of the five commands of the real ship, shape (n, 5)."""
-    full = propellers(five)
-    x, y, bow = (full if power is None else full * power[:, None, [0, 0, 1]]).T
-    both = [thrust(x[k], y[k], bow[k], Allocation(p_y=aside)) for k, aside in enumerate(ASIDE)]
-    return np.sum(both, axis=0).T
 
 
 def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None) -> Run:
@@ -173,18 +154,18 @@ def _of_table(name: str, table: _Table, where: str, of: Ship) -> Run:
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
     """A run of its signals, commands without a gap."""
-    own = THREE if of.commands is None else tuple(of.commands)
-
+    forms = (FIVE, THREE) if of.commands is None else (tuple(of.commands),)
+    own = next((form for form in forms if form[0] in columns), forms[-1])
     absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
     columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
 
     def stack(group: tuple[str, ...]) -> np.ndarray | None:
         return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
 
-    tau, commands, five, power = (_held(stack(group)) for group in (TAU, own, FIVE, POWER))
+    tau, commands, power = (_held(stack(group)) for group in (TAU, own, POWER))
     power = None if power is None else np.maximum(power, 0.0)
-    for given in (commands if of.commands is None else None, five):
-        most = 0.0 if given is None else float(np.abs(given).max(initial=0.0))
+    if of.commands is None and commands is not None:
+        most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
     if power is not None and power.max(initial=0.0) > MOST_POWER:
@@ -194,11 +175,8 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
     missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*ALL, *own)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)
     if tau is None:
-        if five is not None:
-            tau = force(five, power)
-        else:
-            assert commands is not None
-            tau = of.commanded_force(commands)
+        assert commands is not None
+        tau = of.commanded_force(commands, power)
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
     pose = np.column_stack([columns[s] for s in POSE])
@@ -209,7 +187,6 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         pose,
         tau,
         commands,
-        five,
         power,
         notes,
         held,

@@ -44,7 +44,7 @@ def thinned(track: Track) -> Track:
     dropped = gone & ~frozen & _by(part, track.dropped).max().to_numpy()[:, 0]
     commands = {
         name: _mean(run.time, values, time)
-        for name in ("tau_cmd", "commands", "five", "power")
+        for name in ("tau_cmd", "commands", "power")
         if (values := getattr(run, name)) is not None
     }
     near = np.searchsorted(run.time, time).clip(0, run.time.size - 1)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim import InputError
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 
 from .unit_factors import UNITS
 
@@ -25,7 +25,7 @@ FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 
 
 def refuse_time(
-    row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = CSE1
+    row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = REFERENCE
 ) -> None:
     """Refuse a time in another unit than said.
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fmus.effects import Effect
-from fmus.effects.effect import EACH_VSP
+from fmus.effects.effect import APART
 from fmus.scale import Scale
 
 from ..model import Model, WeakWindows, omega
@@ -250,12 +250,13 @@ def candidates(
 ) -> list[Candidate]:
     """All effects that the ship can have and that a regression can find, but those that are known.
 
-    Those of a single propeller only where the propellers have commands of their own.
+    Those of one actuator of several with one command only where each has commands of its own.
     """
     ship = model.ship
-    each = any(w.run.five is not None for w in data)
+    apart = ship.layouts[-1]
+    each = any(ship.layout_of(w.run.commands) is apart for w in data)
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
-    possible = [e for e in effects if e.search.by == "regression" and (each or EACH_VSP not in e.needs)]
+    possible = [e for e in effects if e.search.by == "regression" and (each or APART not in e.needs)]
     tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
     remember_responses(data, [model, *map(model.plus, tried)])
     found = for_each(lambda e: candidate(data, model, base, e), possible, possible)

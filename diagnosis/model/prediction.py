@@ -1,8 +1,7 @@
 """Many short predictions at once, with the very physics of the vessel and the thrusters.
 
 The functions of :mod:`fmus` run on arrays: one column for each window, one row for each set of
-parameters. Of the five commands of the real ship each propeller is a thruster set of its own; elsewhere
-there is one.
+parameters.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,14 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from fmus.actuators.response import Prepared
 from fmus.frames import rotate_to_body
 from fmus.ops import when, wrap
 from fmus.signals import Force
 from fmus.vessel import vessel
 
+from ..data.reading import Run
 from ..smoothing import Smoothed, idle
 from .ship_model import Model
-from .thrust import Response, commanded_shares, places
+from .thrust import Response, commanded_shares, drive_of
 
 # s, times the scale of the ship; of the integration, where its error is far below the noise of any
 # measurement
@@ -32,28 +33,34 @@ INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """Windows, of one run or more, that are predicted together.
+    """Windows, of one run or more with commands in one layout, that are predicted together.
 
     Attributes:
         runs: each run with the rows of the first samples of its windows.
         h: step of integration [s], a whole part of the time between two rows.
         steps: in a window.
-        five: whether there are five commands.
     """
 
     runs: tuple[tuple[Smoothed, np.ndarray], ...]
     h: float
     steps: int
-    five: bool
 
     def first(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
     @property
+    def _measured(self) -> list[Run]:
+        return [smoothed.track.run for smoothed, _ in self.runs]
+
+    @property
     def powered(self) -> bool:
         """Whether any run tells the power of its thrusters."""
-        return any(smoothed.track.run.power is not None for smoothed, _ in self.runs)
+        return any(run.power is not None for run in self._measured)
+
+    def drive(self, model: Model) -> Prepared:
+        """The thrusters of a model, in the layout of the runs' commands."""
+        return drive_of(self._measured[0], model)
 
     def times(self, clock: float) -> list[np.ndarray]:
         """Middle of each step, (steps, w) for each run, as commands are stamped.
@@ -65,16 +72,16 @@ class Starts:
         return [smoothed.time[rows] + middle for smoothed, rows in self.runs]
 
     def power(self, clock: float) -> np.ndarray:
-        """(steps, 2, w): power of VSP and bow thruster, argument as of :meth:`times`."""
+        """(steps, m, w): settings of the thrusters' power, argument as of :meth:`times`."""
+        settings = max(1 if r.power is None else r.power.shape[1] for r in self._measured)
         found = []
-        for (smoothed, _), time in zip(self.runs, self.times(clock), strict=True):
-            run = smoothed.track.run
+        for run, time in zip(self._measured, self.times(clock), strict=True):
             row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
-            found.append(np.ones((*row.shape, 2)) if run.power is None else run.power[row])
+            found.append(np.ones((*row.shape, settings)) if run.power is None else run.power[row])
         return np.concatenate(found, axis=1).transpose(0, 2, 1)
 
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
-        """Commands that arrive and shares of full force that act, each (steps, 3, sets, 1, w)."""
+        """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
         found = []
         for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
             response = Response(smoothed.track.run, model, not at_rest(smoothed))
@@ -85,7 +92,7 @@ class Starts:
                 commands = held(smoothed, model, time)
                 found.append((commands, commands))
         given, acting = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
-        return given.transpose(0, 3, 2, 1)[:, :, :, None], acting.transpose(0, 3, 2, 1)[:, :, :, None]
+        return given.transpose(0, 2, 1)[:, :, None], acting.transpose(0, 2, 1)[:, :, None]
 
 
 def at_rest(smoothed: Smoothed) -> bool:
@@ -98,7 +105,7 @@ def at_rest(smoothed: Smoothed) -> bool:
 
 
 def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
-    """Commanded shares of full force (steps, w, sets, k) of a run at times (steps, w) [s]."""
+    """Commanded shares of full force (steps, w, k) of a run at times (steps, w) [s]."""
     run = smoothed.track.run
     row = np.searchsorted(run.time, time, side="right") - 1
     found = commanded_shares(run, model)[np.maximum(row, 0)]
@@ -132,9 +139,9 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
 
 
 def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Commands that arrive and shares of full force that act, each (steps, k, sets, p or 1, w)."""
+    """Commands that arrive and shares of full force that act, each (steps, k, p or 1, w)."""
     found = [starts.arriving(single) for single in singles(model)]
-    given, acting = (np.concatenate(part, axis=3) for part in zip(*found, strict=True))
+    given, acting = (np.concatenate(part, axis=2) for part in zip(*found, strict=True))
     return given, acting
 
 
@@ -148,20 +155,18 @@ def propagate(
         model: as of :func:`predict`.
         thrust: commands that arrive and shares that act, from :func:`arriving`.
     """
-    body, drive, h = model.hull, model.drive, starts.h
+    body, drive, h = model.hull, starts.drive(model), starts.h
     layout = drive.effects.layout
-    aside = np.array(places(starts.runs[0][0].track.run))[:, None, None]
     power = starts.power(model.clock) if starts.powered else None
-    thrusters = layout.placed(drive, aside, None)
+    thrusters = drive
     s = first_state(starts, body)
     yield s
     for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
         with np.errstate(all="ignore"):
             if power is not None:
-                thrusters = layout.placed(drive, aside, power[k])
+                thrusters = layout.powered(drive, power[k])
             now = layout.running(s.t + h, s.u, s.v, s.r, tuple(given), thrusters)
-            forces = layout.act(tuple(shares), now, thrusters)
-            s = moved(s, Force(*[np.sum(f, axis=0) for f in forces]), body, h)
+            s = moved(s, Force(*layout.act(tuple(shares), now, thrusters)), body, h)
         yield s
 
 
@@ -207,10 +212,10 @@ def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.S
 
 
 def sizes(*groups: Any) -> list[tuple[int, ...]]:
-    """Shapes (p, 1) of the parameters that are arrays, those of single propellers aside."""
+    """Shapes (p, 1) of the parameters that are arrays."""
     found: list[tuple[int, ...]] = []
     for item in groups:
-        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)[-2:]]
+        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)]
     return found
 
 

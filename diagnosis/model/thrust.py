@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from fmus.actuators.response import at_rest, command_response, force_response
+from fmus.actuators.response import Prepared, at_rest, command_response, force_response
 from fmus.effects import Memory
 
-from ..data.reading import ASIDE, Run, propellers
+from ..data.reading import Run
 from .ship_model import Model
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -25,24 +25,19 @@ LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond what windows o
 PART = 4.0  # s; about as long as a memory, which costs least
 
 
-def commanded_shares(run: Run, model: Model) -> np.ndarray:
-    """(n, sets, k), what each set of thrusters is commanded, as shares of full force or as it is.
+def drive_of(run: Run, model: Model) -> Prepared:
+    """The thrusters of a model, in the layout of a run's commands."""
+    drive, layout = model.drive, model.ship.layout_of(run.commands)
+    return drive._replace(effects=drive.effects._replace(layout=layout))
 
-    Of the five commands of the real ship each propeller is a set of its own, at ``ASIDE``; elsewhere
-    there is one, amidships.
-    """
-    if run.five is not None:
-        return propellers(run.five)
+
+def commanded_shares(run: Run, model: Model) -> np.ndarray:
+    """(n, k), what the thrusters are commanded, as shares of full force or as it is."""
     if run.commands is not None:
-        return run.commands[:, None]
+        return run.commands
     X, Y, N = run.tau_cmd.T
     shares = model.drive.effects.layout.allocate((X, Y, N), model.drive.params)
-    return np.column_stack(np.broadcast_arrays(*shares))[:, None]
-
-
-def places(run: Run) -> tuple[float, ...]:
-    """How far [m] to starboard each set of thrusters sits."""
-    return ASIDE if run.five is not None else (0.0,)
+    return np.column_stack(np.broadcast_arrays(*shares))
 
 
 def full_thrust(model: Model) -> np.ndarray:
@@ -56,20 +51,20 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
     Args:
         run: its time and power.
         model: whose thrusters act.
-        between: (1 to 3, sets, k, n), what becomes of the commands, :attr:`Response.between_samples`.
+        between: (1 to 3, k, n), what becomes of the commands, :attr:`Response.between_samples`.
         nu: (n, 3), body-fixed velocity.
     """
-    layout = model.drive.effects.layout
-    power = None if run.power is None else run.power.T
+    drive = drive_of(run, model)
+    layout = drive.effects.layout
+    if run.power is not None:
+        drive = layout.powered(drive, run.power.T)
     total = np.zeros((3, run.time.size))
     points = between[1:] if len(between) > 1 else between
-    for j, (aside, given) in enumerate(zip(places(run), between[0], strict=True)):
-        drive = layout.placed(model.drive, aside, power)
-        now = layout.running(run.time, *nu.T, tuple(given), drive)
-        for acting in points:
-            force = layout.act(tuple(acting[j]), now, drive)
-            for axis in range(3):
-                total[axis] += force[axis] / len(points)
+    now = layout.running(run.time, *nu.T, tuple(between[0]), drive)
+    for acting in points:
+        force = layout.act(tuple(acting), now, drive)
+        for axis in range(3):
+            total[axis] += force[axis] / len(points)
     return total.T
 
 
@@ -83,12 +78,13 @@ class Response:
             else nothing was commanded before.
 
     Attributes:
-        slow: whether the thrusters have any memory.
+        drive: the thrusters, in the layout of the run's commands.
+        slow: whether they have any memory.
     """
 
     def __init__(self, run: Run, model: Model, moving: bool = False) -> None:
         self.run, self.model, self.moving = run, model, moving
-        drive = model.drive
+        self.drive = drive = drive_of(run, model)
         self._memories = [
             (acts, member, memory)
             for of in ("command", "force")
@@ -105,7 +101,7 @@ class Response:
 
     @property
     def between_samples(self) -> np.ndarray:
-        """Means (2, sets, k, n) from each sample to the next: commands that arrive, shares that act.
+        """Means (2, k, n) from each sample to the next: commands that arrive, shares that act.
 
         Where these are the same there is one of them. Where forces are not in proportion to what acts,
         and that changes from sample to sample, it is told at the two points of Gauss' rule.
@@ -115,7 +111,7 @@ class Response:
         else:
             ends = np.append(self.run.time, self.run.time[-1] + self._period)
             means = np.array(self.mean(ends[:-1], ends[1:]))
-            if self.slow and self.model.drive.effects.layout.curved:
+            if self.slow and self.drive.effects.layout.curved:
                 middle = 0.5 * (ends[:-1] + ends[1:])
                 halves = (self.mean(a, b)[1] for a, b in ((ends[:-1], middle), (middle, ends[1:])))
                 off = np.subtract(*halves) / np.sqrt(3.0)
@@ -130,10 +126,10 @@ class Response:
             start, end: (...) [s].
 
         Returns:
-            Two arrays (..., sets, k).
+            Two arrays (..., k).
         """
         a, b = self._elapsed(start), self._elapsed(end)
-        given, acting = ((at(b) - at(a)) / like(b - a, 2) for at in self._integrals)
+        given, acting = ((at(b) - at(a)) / like(b - a, 1) for at in self._integrals)
         return given, acting
 
     @cached_property
@@ -182,13 +178,13 @@ class Response:
         return float(max([fine, *kept]))
 
     def _lasts(self, member: Any, memory: Memory) -> float:
-        return float(memory.lasts(*self.model.drive.params.dynamics[member.parameters]))
+        return float(memory.lasts(*self.drive.params.dynamics[member.parameters]))
 
     def _stepped(self, edges: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Means over each step (K, sets, k): commands that arrive, and shares that act."""
-        drive = self.model.drive
+        """Means over each step (K, k): commands that arrive, and shares that act."""
+        drive = self.drive
         memory = sum(self._lasts(member, m) for _, member, m in self._memories)
-        largest = np.abs(self._commands.values).max(axis=(0, 1), initial=0.0)
+        largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
         rates = np.broadcast_to(drive.params.rate, largest.shape)
         memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
         scale = self.model.ship.scale.time
@@ -199,7 +195,7 @@ class Response:
         # Column m holds the steps of part m, those before it that it remembers first.
         rows = np.arange(-before, part)[:, None] + part * np.arange(parts)
         commands = np.diff(self._commands(np.append(edges, edges[-1] + h)), axis=0) / h
-        commanded = np.where(like(rows < 0, 2), self._commands.before, commands[np.clip(rows, 0, size)])
+        commanded = np.where(like(rows < 0, 1), self._commands.before, commands[np.clip(rows, 0, size)])
         past = at_rest(drive.effects)
         given = np.empty_like(commanded)
         acting = np.empty_like(commanded)

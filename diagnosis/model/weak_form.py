@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fmus.scale import CSE1, Scale
+from fmus.scale import REFERENCE, Scale
 from fmus.signals import Force
 from fmus.vessel import vessel
 
@@ -122,7 +122,7 @@ class WeakWindows:
         return found
 
 
-def places(t: np.ndarray, scale: Scale = CSE1) -> np.ndarray:
+def places(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
     """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
     width, every = WIDTH * scale.time, EVERY * scale.time
     last = np.floor((t[-1] - t[0] - width + 1e-9) / every)

@@ -63,10 +63,10 @@ class Fitted:
 def shootings(runs: Sequence[WeakWindows]) -> list[Shooting]:
     """The windows of all lengths, those of runs with one kind of commands together."""
     found = []
-    for five in (False, True):
-        these = [w for w in runs if (w.run.five is not None) == five]
+    for signals in sorted({w.run.signals for w in runs}):
+        these = [w for w in runs if w.run.signals == signals]
         smoothed = [w.smoothed for w in these]
-        found += [Shooting(smoothed, share * these[0].horizon) for share in LENGTHS if these]
+        found += [Shooting(smoothed, share * these[0].horizon) for share in LENGTHS]
     return [s for s in found if s.run.size]
 
 

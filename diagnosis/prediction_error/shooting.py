@@ -80,9 +80,8 @@ class Shooting:
         parts = [usable_windows(smoothed, length) for smoothed in runs]
         rows = [p.first_rows for p in parts]
         self.every = length / INSTANTS
-        five = runs[0].track.run.five is not None
         groups = tuple(zip(runs, rows, strict=True))
-        self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS, five)
+        self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS)
         self.since = self.every * np.arange(1.0, INSTANTS + 1.0)
         self.run = np.repeat(np.arange(len(runs)), [r.size for r in rows])
         self.start = np.concatenate([s.time[r] for s, r in groups])

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fmus.actuators.response import Layout
 from fmus.effects import Effect, Motion
 from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
@@ -13,7 +14,7 @@ from fmus.hull import damping_force
 
 from ..assessment.evaluation import Evaluation
 from ..model import Model
-from ..model.thrust import commanded_shares, places
+from ..model.thrust import commanded_shares
 
 COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
 POINTS = 401
@@ -71,10 +72,15 @@ def surge_speed(e: Evaluation) -> np.ndarray:
 
 def given(p: Picture, m: Model, command: Any, u: Any = 0.0) -> Any:
     """The force [N] of the actuator that a picture shows, by its command and the surge speed [m/s]."""
-    layout, drive = m.drive.effects.layout, m.drive
-    commands = with_one((0.0 * command,) * len(layout.commands), p.command, command)
+    layout, drive = _apart(m), m.drive
+    commands = with_one((0.0 * command,) * len(layout.commands), p.commands[0], command)
     f = layout.thrust(commands, layout.running(0.0, u, 0.0, 0.0, commands, drive), drive)
     return (f.X if p.axis == "X" else f.Y)[p.members[0]]
+
+
+def _apart(m: Model) -> Layout:
+    """The layout in which each actuator has commands of its own."""
+    return m.ship.layouts[-1]
 
 
 def commands(p: Picture, m: Model) -> Callable[[Evaluation], np.ndarray]:
@@ -82,28 +88,22 @@ def commands(p: Picture, m: Model) -> Callable[[Evaluation], np.ndarray]:
 
     def of(e: Evaluation) -> np.ndarray:
         run = e.weak_windows.run
-        sets = zip(places(run), np.moveaxis(commanded_shares(run, m)[..., p.command], 1, 0), strict=True)
-        layout = m.drive.effects.layout
-        shown = []
-        for aside, given in sets:
-            now = layout.running(0.0, 0.0, 0.0, 0.0, (0.0,) * len(layout.commands), m.drive)
-            f = layout.thrust(now.given, now, layout.placed(m.drive, aside, None))
-            if any(f.gain[k] for k in p.members):
-                shown.append(given)
-        return np.concatenate(shown)
+        shared = m.ship.layout_of(run.commands).shared
+        given = sorted({shared[k] if shared else k for k in p.commands})
+        return np.concatenate(commanded_shares(run, m).T[given])
 
     return of
 
 
 def _over_command(p: Picture, e: Effect, m: Model) -> Sweep:
     way = {"X": "surge", "Y": "sway"}[p.axis]
-    span = m.drive.effects.layout.limits(m.drive.params)[p.command]
+    span = _apart(m).limits(m.drive.params)[p.commands[0]]
     over, what = f"{p.whose}: command in {way}", f"{p.whose}: {way} force [N]"
     return Sweep(over, what, span, lambda c, m: given(p, m, c), commands(p, m))
 
 
 def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
-    low, high = m.drive.effects.layout.limits(m.drive.params)[p.command]
+    low, high = _apart(m).limits(m.drive.params)[p.commands[0]]
     full = float(given(p, m, high))
 
     # The nominal force over the command is inverted by interpolation.
@@ -122,7 +122,7 @@ def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
 
 
 def _effectiveness(p: Picture, e: Effect, m: Model) -> Sweep:
-    _, most = m.drive.effects.layout.limits(m.drive.params)[p.command]
+    _, most = _apart(m).limits(m.drive.params)[p.commands[0]]
 
     def share(u: np.ndarray, learned: Model) -> np.ndarray:
         nominal = np.broadcast_to(given(p, m, most, u), u.shape)

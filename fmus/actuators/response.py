@@ -38,8 +38,8 @@ class Layout(NamedTuple):
         allocate: ``allocate(tau, params)``: the commands, or shares of full force, that give a force.
         full: ``full(params)``: the largest force and moment on each axis [N, N, N m].
         limits: ``limits(params)``: the lowest and the highest value of each command.
-        placed: ``placed(b, aside, power)``: the thrusters where they are one of two sets, ``aside`` [m]
-            to starboard, at a power of the run or None. Only a ship with two sets has it.
+        powered: ``powered(b, settings)``: the thrusters at settings of their power, if they have any.
+        shared: for each command of each actuator the place of the one that is given; empty: each is.
         curved: whether forces are not in proportion to what acts.
         round: for each command whether it is an angle that goes round; empty: none is.
     """
@@ -51,7 +51,8 @@ class Layout(NamedTuple):
     allocate: Callable[[Triple, Any], tuple[Any, ...]]
     full: Callable[[Any], Triple]
     limits: Callable[[Any], tuple[tuple[Any, Any], ...]]
-    placed: Callable[[Any, Any, Any], Any] = lambda b, aside, power: b
+    powered: Callable[[Any, Any], Any] = lambda b, settings: b
+    shared: tuple[int, ...] = ()
     curved: bool = False
     round: tuple[bool, ...] = ()
 
@@ -120,7 +121,6 @@ class Prepared(NamedTuple):
         slow: for each effect with a memory, whether it acts.
         acting: for each effect without, whether it acts.
         any_acts: whether any of these acts.
-        aside: how far to starboard [m] of the middle these thrusters sit, where they are one set of two.
     """
 
     params: Any
@@ -128,7 +128,6 @@ class Prepared(NamedTuple):
     slow: tuple[Any, ...]
     acting: tuple[Any, ...]
     any_acts: Any
-    aside: Any = 0.0
 
 
 def prepared(p: Any, effects: ThrusterEffects) -> Prepared:

@@ -11,7 +11,7 @@ from . import (
     scaling,
 )
 from .effect import (
-    EACH_VSP,
+    APART,
     Effect,
     Loaded,
     Memory,
@@ -26,7 +26,7 @@ from .effect_set import EffectSet, effects_of
 from .families import Family
 
 __all__ = [
-    "EACH_VSP",
+    "APART",
     "STANDARD",
     "Effect",
     "EffectSet",

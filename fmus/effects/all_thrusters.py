@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import Range
 from ..ops import Number, exp, floor, fmax, pick, when, where, wrap
-from ..scale import CSE1
+from ..scale import REFERENCE
 from .devices import SHARE, Devices, declared, parameter
 from .effect import Effect, Memory, Running, Search, Thrust, Wording, effect
 from .families import PROPELLERS, SIDE_THRUST, SYNC_PULSE, TIMING
@@ -157,7 +157,7 @@ loss_yaw = _axis_loss(
     symbol="dx, dy",
     sign="positive: ahead and to starboard of where it is assumed",
     source="(2.17)-(2.19)",
-    parameters=place_parameters("attack_point", "point of attack", CSE1),
+    parameters=place_parameters("attack_point", "point of attack", REFERENCE),
     description="the force acts elsewhere than assumed",
     wording=Wording(
         lambda f: f"The thrust acts {offset(f, 'attack_point')} of where the model believes.",
@@ -169,7 +169,7 @@ def attack_point(f: Thrust, now: Running, dx: float, dy: float) -> Thrust:
 
 
 lag = slow(
-    Devices("", "thrusters", "all thrusters", (), (0, 0), "XYN", TIMING, plural=True),
+    Devices("", "thrusters", "all thrusters", (), (), "XYN", TIMING, plural=True),
     "lag",
     lambda f: (
         f"The thrusters follow their commands slowly, with a time constant of {number(f['lag'])} s."

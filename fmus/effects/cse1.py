@@ -1,8 +1,8 @@
 """What may go wrong with the thrusters of CyberShip Enterprise 1.
 
 VSP 1 sits to port and VSP 2 to starboard of the middle, so that the surge force of each turns the ship.
-Where the two have commands of their own, each counts by its own; where one set of commands stands for
-both, as in the FMU, each is half of it: the same change of both is a change of the set.
+Where one set of commands stands for both, as in the FMU, each has half of the force: the same change of
+both is a change of the set.
 """
 
 from typing import Annotated
@@ -11,7 +11,7 @@ from ..declare import Range
 from ..ops import power
 from .all_thrusters import attack_point, loss_surge, loss_sway, loss_yaw
 from .devices import SHARE, Devices, added, changed, parameter
-from .effect import EACH_VSP, Running, Search, Thrust, Wording, effect
+from .effect import APART, Running, Search, Thrust, Wording, effect
 from .families import BOW_THRUSTER, PROPELLERS, SMALL_OR_LARGE
 from .lost_force import Inflow, deadband, failure, inflow, loss, outage, saturation, speed_loss
 from .own_curves import ALONG, force_curve, speed_curve, thrust_curve
@@ -28,7 +28,7 @@ vsp = Devices(
     "propellers",
     "VSP",
     (PORT, STARBOARD),
-    (0, 1),
+    ((0, 1), (2, 3)),
     "XYN",
     PROPELLERS,
     F_VSP,
@@ -42,8 +42,9 @@ vsp1, vsp2 = (
         title=f"propeller {side} (VSP {k + 1})",
         label=f"VSP {k + 1}",
         members=(k,),
+        commands=vsp.commands[k : k + 1],
         plural=False,
-        needs=frozenset({"vsp", EACH_VSP}),
+        needs=frozenset({"vsp", APART}),
     )
     for k, side in enumerate(("to port", "to starboard"))
 )
@@ -52,7 +53,7 @@ bow = Devices(
     "bow thruster",
     "bow",
     (BOW,),
-    (2, 2),
+    ((4, 4),),
     "YN",
     BOW_THRUSTER,
     F_BOW,
@@ -64,7 +65,7 @@ thrusters = Devices(
     "thrusters",
     "thruster",
     (PORT, STARBOARD, BOW),
-    (0, 1),
+    (*vsp.commands, *bow.commands),
     "XYN",
     SMALL_OR_LARGE,
     F_VSP,
@@ -171,9 +172,9 @@ EFFECTS = (
                     f"{way} force lost by the inflow, full command",
                 ),
                 axis,
-                k,
+                axis,
             )
-            for k, (axis, way) in enumerate(ALONG.items())
+            for axis, way in ALONG.items()
         ],
         {"X_u": "coast, and drive at the same speed", "Y_v": "drift freely"},
     ),

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..declare import Range, Variable
-from ..scale import CSE1, Scale
+from ..scale import REFERENCE, Scale
 from .effect import Effect, Picture, Thrust, Wording, effect
 from .families import Family
 from .text import Found, capital
@@ -27,7 +27,8 @@ class Devices(NamedTuple):
         title: in sentences.
         label: in descriptions of parameters.
         members: numbers of the actuators.
-        commands: number of the command that makes the force on each axis, X and Y.
+        commands: for each of these the number in :attr:`.effect.Running.part` of the command that makes
+            its force on each axis, X and Y.
         axis: axes on which their force may act.
         family: the manoeuvre that brings out what is wrong with them.
         full: the largest force of one of them at rest [N].
@@ -41,14 +42,14 @@ class Devices(NamedTuple):
     title: str
     label: str
     members: tuple[int, ...]
-    commands: tuple[int, int]
+    commands: tuple[tuple[int, int], ...]
     axis: str
     family: Family
     full: float = 0.0
     strength: str = ""
     plural: bool = False
     needs: frozenset[str] = frozenset()
-    scale: Scale = CSE1
+    scale: Scale = REFERENCE
 
     def does(self, verb: str, article: str = "The") -> str:
         """Subject and verb of a sentence, such as ``The propellers give``."""
@@ -58,8 +59,11 @@ class Devices(NamedTuple):
     def picture(self, what: Any, axis: str = "") -> Picture:
         """A picture of the force along an axis, by default the first that it acts on."""
         axis = axis or self.axis[0]
-        command = self.commands["XY".index(axis)]
-        return Picture(what, capital(self.title), self.members, command, axis)
+        return Picture(what, capital(self.title), self.members, self.commanding(axis), axis)
+
+    def commanding(self, axis: str) -> tuple[int, ...]:
+        """For each actuator the number of the command that makes its force along an axis."""
+        return tuple([pair["XY".index(axis)] for pair in self.commands])
 
 
 def with_one(values: tuple[Any, ...], k: int, value: Any) -> tuple[Any, ...]:
@@ -79,6 +83,28 @@ def replaced(
     known = {id(values[k]): values[k] for k in members}
     after = {key: change(x) for key, x in known.items()}
     return tuple([after[id(x)] if k in members else x for k, x in enumerate(values)])
+
+
+def by_command(
+    f: Thrust, members: Sequence[int], axis: str, parts: Sequence[Any], change: Callable[[Any, Any], Any]
+) -> Thrust:
+    """The forces with those of some actuators along an axis changed, each by its command.
+
+    Args:
+        f: the forces.
+        members: the actuators.
+        axis: X or Y.
+        parts: command of each of these; those that are one object are of actuators alike.
+        change: ``change(force, command)``: the force instead.
+    """
+    known: dict[tuple[int, int], Any] = {}
+    after = list(getattr(f, axis))
+    for k, c in zip(members, parts, strict=True):
+        key = id(after[k]), id(c)
+        if key not in known:
+            known[key] = change(after[k], c)
+        after[k] = known[key]
+    return f._replace(X=tuple(after)) if axis == "X" else f._replace(Y=tuple(after))
 
 
 def changed(f: Thrust, members: Sequence[int], change: Callable[[Any], Any]) -> Thrust:

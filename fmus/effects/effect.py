@@ -34,8 +34,8 @@ from .families import UNKNOWN, Family
 
 Kind = Literal["force", "inertia", "actuator", "environment", "measurement"]
 Device = Literal["vsp", "bow", "each vsp"]
-# Of an effect on one of the two propellers: these have commands of their own.
-EACH_VSP: Device = "each vsp"
+# Of an effect on one of several actuators that may share a command: here each has its own.
+APART: Device = "each vsp"
 
 
 class Picture(NamedTuple):
@@ -45,14 +45,14 @@ class Picture(NamedTuple):
         what: the curve.
         whose: title of the actuators.
         members: their numbers; the force of the first is shown.
-        command: number of the command.
+        commands: for each of these the number of the command that makes the force.
         axis: of the force, X or Y.
     """
 
     what: Literal["damping over speed", "force over command", "force given", "effectiveness over speed"]
     whose: str = ""
     members: tuple[int, ...] = ()
-    command: int = 0
+    commands: tuple[int, ...] = ()
     axis: str = "X"
 
 
@@ -90,8 +90,8 @@ class Loaded(NamedTuple):
 class Running(NamedTuple):
     """What the force of a ship's actuators may depend on: time [s], velocity, commands that arrive.
 
-    ``given`` has the commands, ``part`` each as a share of its largest one; ``power`` is for each
-    actuator the setting by which its force is scaled.
+    ``given`` has the commands as they are given; ``part`` has those of each actuator, as shares of their
+    largest ones; ``power`` is for each actuator the setting by which its force is scaled.
     """
 
     t: Any = 0.0

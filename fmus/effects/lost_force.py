@@ -217,11 +217,11 @@ def saturation(parts: Sequence[Devices], whole: Devices, name: str = "") -> Effe
 
 
 class Inflow(NamedTuple):
-    """A slope by which force is lost with the inflow: its parameter, axes, and number of the command."""
+    """A slope by which force is lost with the inflow: its parameter, axes, and that of the command."""
 
     parameter: Variable
     axes: str
-    command: int
+    command: str
 
 
 def inflow(d: Devices, slopes: Sequence[Inflow], apart: dict[str, str] | None = None) -> Effect:
@@ -251,9 +251,10 @@ def inflow(d: Devices, slopes: Sequence[Inflow], apart: dict[str, str] | None = 
         description=f"force of the {d.title} lost with the water's speed at its place",
     )
     def function(f: Thrust, now: Running, *values: Number) -> Thrust:
-        for k in d.members:
+        commanding = {slope: d.commanding(slope.command) for slope in slopes}
+        for n, k in enumerate(d.members):
             for slope, value in zip(slopes, values, strict=True):
-                lost = value * abs(now.part[slope.command])
+                lost = value * abs(now.part[commanding[slope][n]])
                 if "X" in slope.axes:
                     f = added(f, [k], "X", -lost * (now.u - f.y[k] * now.r))
                 if "Y" in slope.axes:

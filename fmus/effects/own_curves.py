@@ -3,7 +3,7 @@
 from ..declare import Range
 from ..ops import Number, fmax, where
 from .curve import NODES, interpolate, node_parameters
-from .devices import SHARE, Devices, added, changed, declared, parameter, replaced
+from .devices import SHARE, Devices, by_command, changed, declared, parameter
 from .effect import Effect, Running, Search, Thrust
 from .text import Found, peak, percent, reach, towards
 
@@ -51,7 +51,7 @@ def speed_curve(d: Devices) -> Effect:
 
 def command_curve(d: Devices, command: str) -> Effect:
     """The force changes freely over the command, as a share of it."""
-    stem, place = f"curve_{d.name}", d.commands[0]
+    stem, places = f"curve_{d.name}", d.commanding("X")
 
     def sentence(f: Found) -> str:
         at, value = peak(f)
@@ -75,8 +75,10 @@ def command_curve(d: Devices, command: str) -> Effect:
     )
     def function(f: Thrust, now: Running, *values: Number) -> Thrust:
         *heights, span = values
-        gain = 1.0 + interpolate(now.part[place], -span, span, heights)
-        return changed(f, d.members, lambda x: x * gain)
+        for k, place in zip(d.members, places, strict=True):
+            gain = 1.0 + interpolate(now.part[place], -span, span, heights)
+            f = changed(f, [k], lambda x, gain=gain: x * gain)
+        return f
 
     return function
 
@@ -84,7 +86,7 @@ def command_curve(d: Devices, command: str) -> Effect:
 def force_curve(d: Devices, axis: str) -> Effect:
     """A free force along an axis over the command on that axis."""
     way, on = ALONG[axis], axis.lower()
-    stem, place = f"curve_{d.name}_{on}_c", d.commands["XY".index(axis)]
+    stem, places = f"curve_{d.name}_{on}_c", d.commanding(axis)
     push = {"X": "", "Y": " aside"}[axis]
     verb, whose = ("push", "their") if d.plural else ("pushes", "its")
 
@@ -112,14 +114,15 @@ def force_curve(d: Devices, axis: str) -> Effect:
     )
     def function(f: Thrust, now: Running, *values: Number) -> Thrust:
         *nodes, span = values
-        return added(f, d.members, axis, interpolate(now.part[place], -span, span, nodes))
+        parts = [now.part[place] for place in places]
+        return by_command(f, d.members, axis, parts, lambda x, c: x + interpolate(c, -span, span, nodes))
 
     return function
 
 
 def thrust_curve(d: Devices) -> Effect:
     """The surge force is another ahead than astern, and has a dead band over the command."""
-    name, (place, _) = "thrust_curve", d.commands
+    name, places = "thrust_curve", d.commanding("X")
     ways = (f"{name}_ahead", f"{name}_astern")
     band = f"{name}_deadband"
 
@@ -154,10 +157,11 @@ def thrust_curve(d: Devices) -> Effect:
         description=f"surge force of the {d.title} asymmetric and with a dead band over the command",
     )
     def function(f: Thrust, now: Running, ahead: Number, astern: Number, least: Number) -> Thrust:
-        c = now.part[place]
-        size = abs(c)
-        left = fmax(0.0, size - least) / fmax(size, 1e-9)
-        gain = 1.0 + where(c > 0.0, ahead, astern)
-        return f._replace(X=replaced(f.X, d.members, lambda x: x * left * gain))
+        def change(x: Number, c: Number) -> Number:
+            size = abs(c)
+            left = fmax(0.0, size - least) / fmax(size, 1e-9)
+            return x * left * (1.0 + where(c > 0.0, ahead, astern))
+
+        return by_command(f, d.members, "X", [now.part[place] for place in places], change)
 
     return function

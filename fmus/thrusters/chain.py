@@ -26,7 +26,7 @@ from ..declare import POSITIVE, Component, Known, bundle
 from ..effects import STANDARD, EffectSet, Running, Thrust
 from ..effects.cse1 import ASIDE, PORT, STARBOARD
 from ..hull import Triple
-from ..ops import Number, clip, finite, sign, when
+from ..ops import Number, clip, finite, when
 from ..signals import Force, Velocity
 from .allocation import Allocation, allocate, thrust
 
@@ -61,6 +61,10 @@ class Rate(NamedTuple):
     plant_rate: Annotated[float, "1/s", "limit of a command's rate; 0: none", POSITIVE] = 0.0
 
 
+# Commands of VSP 1, VSP 2 and the bow thruster where one set of commands is for both VSP.
+BOTH = (0, 1, 0, 1, 2)
+
+
 class Inputs(NamedTuple):
     request: Force = Force()
     velocity: Velocity = Velocity()
@@ -79,7 +83,13 @@ class Outputs(NamedTuple):
 
 
 def running(t: Number, u: Number, v: Number, r: Number, commands: Triple, b: Prepared) -> Running:
-    """What the force of this ship's thrusters may depend on."""
+    """What the force of this ship's thrusters may depend on, one set of commands for both VSP."""
+    vsp, bow = b.params.power
+    return Running(t, u, v, r, commands, tuple([commands[k] for k in BOTH]), (vsp, vsp, bow))
+
+
+def running_apart(t: Number, u: Number, v: Number, r: Number, commands: Any, b: Prepared) -> Running:
+    """The same where each VSP has commands of its own."""
     vsp, bow = b.params.power
     return Running(t, u, v, r, commands, commands, (vsp, vsp, bow))
 
@@ -88,21 +98,36 @@ def acting(shares: Triple, now: Running, b: Prepared) -> Thrust:
     """The forces of thrusters that give these shares of their full force, effects included.
 
     Args:
-        shares: of the VSP's surge and sway force and of the bow thruster's.
+        shares: of the VSP's surge and sway force, half of which is of each, and of the bow thruster's.
         now: of :func:`running`.
-        b: the thrusters; one of two sets, or one that stands for both.
+        b: the thrusters.
     """
+    F_vsp = b.params.plant.plant_F_vsp
+    ahead, aside = F_vsp * shares[0], F_vsp * shares[1]
+    return _forces((ahead, ahead), (aside, aside), shares[2], 0.5, now, b)
+
+
+def acting_apart(shares: Any, now: Running, b: Prepared) -> Thrust:
+    """The same for shares of surge and sway force of VSP 1, of VSP 2, and of the bow thruster."""
+    port, port_aside, starboard, starboard_aside, across = shares
+    F_vsp = b.params.plant.plant_F_vsp
+    ahead, aside = (F_vsp * port, F_vsp * starboard), (F_vsp * port_aside, F_vsp * starboard_aside)
+    return _forces(ahead, aside, across, 1.0, now, b)
+
+
+def _forces(
+    ahead: tuple[Any, Any], aside: tuple[Any, Any], across: Any, each: float, now: Running, b: Prepared
+) -> Thrust:
+    """The forces of both VSP [N], ``each`` of which counts so often, and of the bow thruster."""
     p = b.params
-    F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
+    _, F_bow, l_vsp, l_bow, p_x, p_y = p.plant
     vsp, bow = p.power
-    ahead, aside, across = F_vsp * shares[0], F_vsp * shares[1], F_bow * shares[2]
-    starboard = 0.5 + 0.5 * sign(b.aside)
     f = Thrust(
-        (ahead, ahead, 0.0),
-        (aside, aside, across),
+        (*ahead, 0.0),
+        (*aside, F_bow * across),
         (l_vsp + p_x, l_vsp + p_x, l_bow + p_x),
         (ASIDE[PORT] + p_y, ASIDE[STARBOARD] + p_y, p_y),
-        ((1.0 - starboard) * vsp, starboard * vsp, bow),
+        (each * vsp, each * vsp, bow),
     )
     for member, acts in zip(b.effects.forces.members, b.acting, strict=True):
         f = member.apply(acts, p.wrong, f, f, now)
@@ -114,17 +139,40 @@ def believed(commands: Triple, p: Any) -> Triple:
     return thrust(*commands, p.allocation)
 
 
+def believed_apart(commands: Any, p: Any) -> Triple:
+    """The same of five shares of full force, at the power of the thrusters."""
+    port, port_aside, starboard, starboard_aside, across = commands
+    vsp, bow = p.power
+    X, Y, N = thrust(vsp * port, vsp * port_aside, bow * across, _shifted(p.allocation, PORT))
+    more = thrust(vsp * starboard, vsp * starboard_aside, 0.0, _shifted(p.allocation, STARBOARD))
+    return X + more[0], Y + more[1], N + more[2]
+
+
+def allocate_apart(tau: Triple, p: Any) -> tuple[Number, ...]:
+    """Five shares of full force that give a force, both VSP alike."""
+    shares = allocate(*tau, _both(p.allocation))
+    return tuple([shares[k] for k in BOTH])
+
+
+def _both(a: Allocation) -> Allocation:
+    return a._replace(F_vsp=2.0 * a.F_vsp)
+
+
+def _shifted(a: Allocation, side: int) -> Allocation:
+    return a._replace(p_y=a.p_y + ASIDE[side])
+
+
 def full(p: Any) -> Triple:
     """The largest force and moment on each axis [N, N, N m]."""
     F_vsp, F_bow, l_vsp, l_bow, p_x, _ = p.allocation
     return F_vsp, F_vsp + F_bow, abs(l_vsp + p_x) * F_vsp + abs(l_bow + p_x) * F_bow
 
 
-def placed(b: Prepared, aside: Any, power: Any) -> Prepared:
-    """Thrusters that sit ``aside`` [m] to starboard, at settings of the power (VSP, bow) or None."""
+def powered(b: Prepared, settings: Any) -> Prepared:
+    """The thrusters at settings (VSP, bow) of their power."""
     p = b.params
-    scaled = p.power if power is None else Power(p.power[0] * power[0], p.power[1] * power[1])
-    return b._replace(params=p._replace(power=scaled), aside=aside)
+    power = Power(p.power[0] * settings[0], p.power[1] * settings[1])
+    return b._replace(params=p._replace(power=power))
 
 
 THREE = Layout(
@@ -135,7 +183,19 @@ THREE = Layout(
     lambda tau, p: allocate(tau[0], tau[1], tau[2], p.allocation),
     full,
     lambda p: ((-1.0, 1.0),) * 3,
-    placed,
+    powered,
+    BOTH,
+)
+# Of the real ship: each VSP has commands of its own, in surge and sway, and then the bow thruster.
+FIVE = Layout(
+    ("u1", "u2", "u3", "u4", "u5"),
+    running_apart,
+    acting_apart,
+    believed_apart,
+    allocate_apart,
+    lambda p: full(p._replace(allocation=_both(p.allocation))),
+    lambda p: ((-1.0, 1.0),) * 5,
+    powered,
 )
 act = THREE.act
 

@@ -22,6 +22,7 @@ from diagnosis import (
 from diagnosis.identification import Prior
 from diagnosis.model import Response
 from diagnosis.progress import Advance
+from fmus.thrusters.chain import FIVE
 
 SAME = 1e-6
 TOGETHER = 2  # blocks of 15 s: what counts as independent
@@ -97,10 +98,15 @@ def gather(files: Sequence[Path], advance: Advance) -> list[WeakWindows]:
     return diagnosis.gather(files, advance)
 
 
+def apart(w: WeakWindows) -> bool:
+    """Whether each VSP has commands of its own."""
+    return w.run.signals == FIVE.commands and w.run.commands is not None
+
+
 def steered(w: WeakWindows) -> bool:
     """Whether a controller steered for most of the time: both VSP then have one sway command."""
-    five = w.run.five
-    return five is not None and bool(np.mean(np.abs(five[:, 1] - five[:, 3]) < SAME) > 0.5)
+    given = w.run.commanded
+    return apart(w) and bool(np.mean(np.abs(given["u2"] - given["u4"]) < SAME) > 0.5)
 
 
 def at_full_power(w: WeakWindows) -> np.ndarray:
@@ -134,11 +140,11 @@ def commanded(e: Evaluation, model: Model) -> Commanded:
         model: the learned one.
     """
     w = e.weak_windows
-    if w.run.five is None:
+    if not apart(w):
         return Commanded(np.zeros(3), np.zeros(3))
     power = 1.0 if w.run.power is None else w.run.power[:, :1]
     arriving = Response(w.run, model).between_samples[0]
-    first, second = np.moveaxis(arriving[:, :2], -1, 1)
+    first, second = arriving[:2].T, arriving[2:4].T
     two, four = first + second, np.hstack([first, second])
     return Commanded(*(_explained(w, e.after.omega, power * c) for c in (two, four)))
 
