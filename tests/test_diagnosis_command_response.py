@@ -8,6 +8,7 @@ from support.cases import slow
 from support.measured import DATA, NOISE, base, needs_data, true_nu
 
 from diagnosis import Run, clean, read, smooth
+from diagnosis.smoothing import without_commands
 from diagnosis.smoothing.command_motion import FORGETTING, Commands
 from diagnosis.smoothing.spline import knots
 
@@ -72,10 +73,11 @@ def driven(seed, gains, late=0.0):
 @pytest.mark.parametrize("late", [0.0, 0.34])
 def test_motion_by_commands_alone_is_found_again(late):
     run, eta_dot = driven(3, [[0.05, 0.0, 0.0], [0.0, 0.04, 0.01], [0.0, 0.0, 0.0]], late)
-    knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+    knowing = smooth(clean(run))
+    blind = without_commands(knowing)
     better = rms((blind.eta_dot - eta_dot)[INNER]) / rms((knowing.eta_dot - eta_dot)[INNER])
     assert (better[:2] > 4.0).all()
-    assert smooth(clean(run)).delay == pytest.approx(late, abs=0.02)
+    assert knowing.delay == pytest.approx(late, abs=0.02)
 
 
 @pytest.mark.parametrize("seed", [2, slow(3), slow(4)])
@@ -83,7 +85,8 @@ def test_commands_that_do_nothing_do_no_harm(seed):
     tau = np.random.default_rng(seed).standard_normal((N, 3))
     for command in (0.0 * tau, 0.0 * tau + 0.3, tau):
         run = replace(base(), tau_cmd=command)
-        knowing, blind = (smooth(clean(run), driven=each) for each in (True, False))
+        knowing = smooth(clean(run))
+        blind = without_commands(knowing)
         assert (rms((knowing.nu - true_nu())[INNER]) < 1.05 * rms((blind.nu - true_nu())[INNER])).all()
 
 

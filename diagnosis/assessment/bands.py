@@ -3,12 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import gammaincinv
 
 from .windows import Windows
 
 LEVELS = (0.5, 0.9)
 POINTS = 41  # of an ellipse that is drawn; chosen
+
+
+def quantile(level: float, dof: int) -> float:
+    """That of chi^2; `scipy.stats` takes a while to import."""
+    return 2.0 * float(gammaincinv(0.5 * dof, level))
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,20 +51,20 @@ class Bands:
         V = self.at_samples
         place = residuals[:, :2, None]
         squares = np.swapaxes(place, 1, 2) @ np.linalg.solve(V[:, :2, :2], place)
-        position = squares[:, 0, 0] <= stats.chi2.ppf(level, 2)
-        heading = residuals[:, 2] ** 2 <= stats.chi2.ppf(level, 1) * V[:, 2, 2]
+        position = squares[:, 0, 0] <= quantile(level, 2)
+        heading = residuals[:, 2] ** 2 <= quantile(level, 1) * V[:, 2, 2]
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
         """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
         around = np.linspace(0.0, 2.0 * np.pi, POINTS)
-        circle = np.sqrt(stats.chi2.ppf(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
+        circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
         factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
         return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
 
     def headings(self, window: int, level: float) -> np.ndarray:
         """(2, T), lower and upper end of the band about the predicted heading of a window [rad]."""
-        reach = np.sqrt(stats.chi2.ppf(level, 1) * self.covariance[window, :, 2, 2])
+        reach = np.sqrt(quantile(level, 1) * self.covariance[window, :, 2, 2])
         return np.stack([-reach, reach]) + self.predicted[window, :, 2]
 
     def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:

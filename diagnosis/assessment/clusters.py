@@ -9,7 +9,7 @@ K. Y. Liang and S. L. Zeger, Longitudinal data analysis using generalized linear
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtr
 
 
 class ClusterMean(NamedTuple):
@@ -49,4 +49,4 @@ def welch_p_value(a: ClusterMean, b: ClusterMean) -> float:
     if a.dof < 1 or b.dof < 1 or variance <= 0.0:
         return 1.0
     dof = variance**2 / (a.variance**2 / a.dof + b.variance**2 / b.dof)  # Satterthwaite
-    return float(stats.t.sf((a.mean - b.mean) / np.sqrt(variance), dof))
+    return float(stdtr(dof, (b.mean - a.mean) / np.sqrt(variance)))

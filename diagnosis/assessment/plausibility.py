@@ -22,7 +22,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from cosim import InputError
 
@@ -205,7 +205,7 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     if now.max() < MISSING:
         return None
     found, readings = [], [*directions(w.run)]
-    least = chi2.isf(CHANCE / len(readings), 1) / (w.middle.size / OVERLAP)
+    least = chdtri(1, CHANCE / len(readings)) / (w.middle.size / OVERLAP)
     for reading in readings:
         z = as_read if reading.still else _varying(w, model, reading)
         then = shares(z, commands @ reading.commands.T)

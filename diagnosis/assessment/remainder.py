@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from ..model import Model, WeakWindows
 from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
@@ -80,7 +80,7 @@ def axis_remainders(
     for k, axis in enumerate(AXES):
         size = float(np.mean((left[:, k] / noise[:, k]) ** 2)) / NOISE_TOLERANCE**2
         dof = len(left) / OVERLAP
-        by_size = float(stats.chi2.sf(dof * size, dof))
+        by_size = float(chdtrc(dof, dof * size))
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups)
         rms, start = _rms(left[:, k]), _rms(first[:, k])
         least = max(SHARE_OF_FIRST * start, SHARE_OF_COMMAND * _rms(command[:, k]))
@@ -113,7 +113,7 @@ def _slow_part(left: np.ndarray, noise: np.ndarray, groups: np.ndarray) -> tuple
     variance = (np.bincount(groups, noise**2) / count * SLOW_NOISE * OVERLAP / count)[full]
     weight = count[full] / count[full].sum()
     slow = float(np.sqrt(max(weight @ (mean**2 - variance), 0.0)))
-    p_value = float(stats.chi2.sf(np.sum(mean**2 / variance) / NOISE_TOLERANCE**2, full.sum()))
+    p_value = float(chdtrc(full.sum(), np.sum(mean**2 / variance) / NOISE_TOLERANCE**2))
     return slow, p_value
 
 

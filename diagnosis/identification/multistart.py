@@ -17,7 +17,6 @@ from math import asinh, pi
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import qmc
 
 from fmus.declare import Variable
 from fmus.effects import Effect
@@ -80,6 +79,8 @@ class Landscape:
         """Where some parameters are tried: as they are, and spread over their ranges."""
         yield {n: self.values[n] for n in names}
         if names:
+            from scipy.stats import qmc  # takes a while to import
+
             shares = qmc.Sobol(len(names), scramble=False).random(POINTS)
             for row in shares.tolist():
                 pairs = zip(self.declared(names), row, strict=True)

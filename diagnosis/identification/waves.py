@@ -6,21 +6,20 @@ form let hardly any of them through.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 
-from ..data import Track
+from ..data import Run
 from ..model import Model
 from ..model.thrust import Response, thrust
 from ..model.weak_form import acceleration, by_mass
 from ..parallel import for_each
-from ..smoothing import Smoothed, smooth
+from ..smoothing import Motion, Smoothed, without_commands
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
@@ -30,6 +29,7 @@ FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes 
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, width of the spectrum around
 SEGMENT = 25.0  # s; six periods of the slowest wave
+TAPER = 0.25  # share of a segment over which it fades in and out; chosen
 NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
 REPLICATES = 200  # of the bootstrap over segments
 DRAWINGS = 3  # of noise; chosen: of one, false waves stand out in a twelfth where much is unexplained
@@ -120,20 +120,14 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what noise makes of that, and its noise (3,)."""
-    run = smooth(smoothed.track, driven=False)
-    error = model_error(run, model)
-    white = 2.0 * run.noise**2 * run.track.period
+    motion = without_commands(smoothed)
+    error = model_error(smoothed.track.run, motion, model)
+    white = 2.0 * smoothed.noise**2 * smoothed.track.period
     rate = RATE / smoothed.scale.time
-    left, other = stretches(error, run.time, rate), redrawn(run, drawn)
-    del run  # of a long run there is not room for two
-    noise = model_error(smooth(other, driven=False), model) - error
-    return left, stretches(noise, smoothed.time, rate), white
-
-
-def redrawn(run: Smoothed, drawn: np.ndarray) -> Track:
-    """The run as it was smoothed, with other noise of the same strength, by draws (n, 3)."""
-    pose = run.eta + run.noise * drawn
-    return replace(run.track, pose=np.where(run.used[:, None], pose, run.track.pose))
+    # The same run with other noise of the same strength.
+    other = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * drawn, smoothed.track.pose)
+    noise = model_error(smoothed.track.run, without_commands(smoothed, other), model) - error
+    return stretches(error, smoothed.time, rate), stretches(noise, smoothed.time, rate), white
 
 
 def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -143,9 +137,20 @@ def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, n
         parts: (n, 3), of each signal.
         time: scale of the ship.
     """
-    length = round(SEGMENT * RATE)
-    found = [spectrogram(x, RATE / time, nperseg=length, axis=0, detrend="linear") for x in parts]
-    return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
+    length, rate = round(SEGMENT * RATE), RATE / time
+    count = np.arange(length)
+    ramp = np.minimum(count, length - count) / (0.5 * TAPER * length)
+    window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(ramp, 1.0))
+    line = np.linalg.qr(np.vander(count, 2))[0]
+    found = []
+    for x in parts:
+        first = np.arange(0, len(x) - length + 1, length - length // 8)
+        pieces = x[first[:, None] + count].transpose(1, 2, 0)
+        bent = pieces - np.tensordot(line, np.tensordot(line, pieces, (0, 0)), 1)
+        power = np.abs(np.fft.rfft(window[:, None, None] * bent, axis=0)) ** 2
+        power[1 : (length + 1) // 2] *= 2.0
+        found.append(power / (rate * np.sum(window**2)))
+    return np.fft.rfftfreq(length, 1.0 / rate), np.concatenate(found, axis=-1)
 
 
 def followed(
@@ -188,22 +193,36 @@ def peak(
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
-    above = np.zeros_like(band)
-    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
-        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
-    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
-    row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
-    return level, Peak(int(row), int(axis), float(height[row, axis]))
+    height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
+    for place in np.argsort(-height, axis=None):
+        row, axis = divmod(int(place), 3)
+        if height[row, axis] > 0.0 and stands_out(power[:, axis], row):
+            return level, Peak(row, axis, float(height[row, axis]))
+    return level, Peak(0, 0, 0.0)
 
 
-def model_error(run: Smoothed, model: Model) -> np.ndarray:
-    """omega (n, 3) [N, N, N m] by the smoothed acceleration, NaN where there is none."""
-    u_dot, v_dot = rotate_to_body(run.eta[:, 2], run.eta_ddot[:, 0], run.eta_ddot[:, 1])
-    u, v, r = run.nu.T
-    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, run.eta_ddot[:, 2]])
-    between = Response(run.track.run, model).between_samples
-    driven = by_mass(model, thrust(run.track.run, model, between, np.nan_to_num(run.nu)))
-    free = acceleration(model, run.time, run.eta, run.nu)
+def stands_out(power: np.ndarray, row: int) -> bool:
+    """Whether a spectrum (m,) falls to a PEAK-th on both sides of a place before it rises above that."""
+    higher = power > power[row]
+    sides = zip(
+        (power[:row][::-1], power[row + 1 :]), (higher[:row][::-1], higher[row + 1 :]), strict=True
+    )
+    return all(
+        side.size
+        and side[: int(above.argmax()) if above.any() else None].min(initial=np.inf) * PEAK <= power[row]
+        for side, above in sides
+    )
+
+
+def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
+    """omega (n, 3) [N, N, N m] by the acceleration of a run's motion, NaN where there is none."""
+    eta, _, eta_ddot, nu = motion
+    u_dot, v_dot = rotate_to_body(eta[:, 2], eta_ddot[:, 0], eta_ddot[:, 1])
+    u, v, r = nu.T
+    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, eta_ddot[:, 2]])
+    between = Response(run, model).between_samples
+    driven = by_mass(model, thrust(run, model, between, np.nan_to_num(nu)))
+    free = acceleration(model, run.time, eta, nu)
     return (nu_dot - free - driven) @ model.reference_mass.T
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ..model import Model, WeakWindows, omega
 from ..model.uncertainty import NOISE_TOLERANCE, omega_std
@@ -103,7 +103,7 @@ def unrecorded(
     noise = [NOISE_TOLERANCE * omega_std(w, model) for w in runs]
     # As far as the noise of the measurement allows, the same in all runs.
     usual = MAD * np.median(np.abs(np.concatenate(left)), axis=0)
-    beyond = float(norm.isf(0.5 * CHANCE / max(3 * sum(w.middle.size for w in runs), 1)))
+    beyond = -float(ndtri(0.5 * CHANCE / max(3 * sum(w.middle.size for w in runs), 1)))
     found = []
     for w, error, std in zip(runs, left, noise, strict=True):
         for k in range(3):

@@ -19,7 +19,7 @@ import numpy as np
 
 from .command_motion import CommandResponse, Commands
 from .delay import Regression, likeliest_delay
-from .likelihood import adapt, likeliest
+from .likelihood import adapt, deviance, likeliest
 from .penalised import Fit, Problem, solve
 
 ROUNDS = 3  # of gains and smoothness in turn; further ones change neither (chosen)
@@ -50,14 +50,15 @@ def with_commands(
         What is left beside the response, its smoothness (3,) and spline, and the response.
     """
     response = CommandResponse.none(commands.psi.size)
-    least = likeliest(even, weights, smoothness)[1] - PARAMETERS
+    least = deviance(even, weights, likeliest(even, weights, smoothness)) - PARAMETERS
     delay, sure = likeliest_delay(Regression(even, fit, commands))
     rest, smoother, near = even, smoothness, None
     for _ in range(ROUNDS):
         gains = Regression(even, fit, commands).gains(delay)
         tried = commands.response(gains, delay)._replace(sure=sure)
         left = even._replace(z=even.z - tried.eta[even.rows])
-        near, cost = likeliest(left, weights, near)
+        near = likeliest(left, weights, near)
+        cost = deviance(left, weights, near)
         if cost >= least:
             break
         rest, smoother, response, least = left, near, tried, cost - BETTER

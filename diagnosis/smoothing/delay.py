@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from .command_motion import Commands
 from .penalised import Fit, Problem
@@ -176,4 +176,4 @@ def surely_positive(values: np.ndarray, chance: float) -> bool:
     if k < 2:
         return False
     deviation = float(values.std(ddof=1)) / k**0.5
-    return float(values.mean()) > deviation * float(student.isf(chance, k - 1))
+    return float(values.mean()) > deviation * -float(stdtrit(k - 1, chance))

@@ -35,24 +35,23 @@ COARSE = 0.1  # decades, of the search for the valley; its bottom is a root
 LAST_STEP = 1e-7
 
 
-def likeliest(
-    p: Problem, weights: np.ndarray, near: np.ndarray | None = None
-) -> tuple[np.ndarray, float]:
+def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
     """The smoothness (3,) with the largest restricted likelihood.
 
     Args:
         p: problem.
         weights: (n,), of the samples.
         near: (3,), smoothness to begin the search with; None: everywhere.
-
-    Returns:
-        Smoothness, and -2 log L, the sum of all channels.
     """
     starts = (None, None, None) if near is None else np.log10(near).tolist()
     shared = Weighted(p, weights)
-    found = [Criterion(shared, channel).minimum(starts[channel]) for channel in range(3)]
-    decades, costs = zip(*found, strict=True)
-    return 10.0 ** np.array(decades), float(sum(costs))
+    return 10.0 ** np.array([Criterion(shared, k).minimum(starts[k]) for k in range(3)])
+
+
+def deviance(p: Problem, weights: np.ndarray, smoothness: np.ndarray) -> float:
+    """-2 log L at a smoothness (3,), the sum of all channels."""
+    shared = Weighted(p, weights)
+    return sum(Criterion(shared, k).cost(float(np.log10(smoothness[k]))) for k in range(3))
 
 
 class Criterion:
@@ -94,14 +93,13 @@ class Criterion:
             raise LinAlgError("the likelihood of its smoothness is not finite")
         return found
 
-    def minimum(self, near: float | None) -> tuple[float, float]:
-        """Where it is least [decades], and its value; searched from nearby or, with None, everywhere."""
+    def minimum(self, near: float | None) -> float:
+        """Where it is least [decades]; searched from nearby or, with None, everywhere."""
         if near is None:
             search = {"bounds": DECADES, "method": "bounded", "options": {"xatol": COARSE}}
             found: Any = minimize_scalar(self.cost, **search)
             near = float(found.x)
-        decades = _bottom(cache(self.slope), near)
-        return decades, self.cost(decades)
+        return _bottom(cache(self.slope), near)
 
 
 def _bottom(slope: Callable[[float], float], near: float) -> float:
@@ -136,7 +134,7 @@ def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Prob
     """
     for _ in range(ADAPTIONS):
         p = adapted(p, smoothness, weights)
-        smoothness, _ = likeliest(p, weights, smoothness)
+        smoothness = likeliest(p, weights, smoothness)
     return p, smoothness
 
 

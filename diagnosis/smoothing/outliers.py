@@ -42,7 +42,7 @@ def robust(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndarr
         TooFewError: in some stretch.
     """
     weights = outlier_test(p, local, robust_weights(p, local))
-    p, smoothness = adapt(p, likeliest(p, weights)[0], weights)
+    p, smoothness = adapt(p, likeliest(p, weights), weights)
     return p, smoothness, outlier_test(p, smoothness, weights)
 
 

@@ -7,7 +7,8 @@ the jerk by restricted maximum likelihood, and how it varies over time from the 
 is a spike.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -19,10 +20,10 @@ from fmus.scale import Scale
 from ..data import Counts, Track
 from ..data.cleaning import noise
 from ..sensors import Examined
-from .command_motion import CommandResponse, Commands, idle
+from .command_motion import Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
-from .likelihood import adapt
+from .likelihood import adapt, likeliest
 from .measured_rates import ALONE, Agreeing, measured_rates
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
@@ -41,6 +42,30 @@ LEAST_NOISE = 2e-5
 LOCAL = 64.0
 
 
+class PoseOnly(NamedTuple):
+    """How the pose alone is smoothed, its response to the commands left out.
+
+    Attributes:
+        rows: of the run, that are tried.
+        weights: of those in a stretch: 1, and 0 for a spike.
+        stiffness, smoothness: (3, intervals) and (3,), see :mod:`.penalised`.
+    """
+
+    rows: np.ndarray
+    weights: np.ndarray
+    stiffness: np.ndarray
+    smoothness: np.ndarray
+
+
+class Motion(NamedTuple):
+    """Pose, its derivatives and body-fixed velocity, (n, 3) each, as those of :class:`Smoothed`."""
+
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+    nu: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Smoothed:
     """A smoothed run. All arrays (n, 3) are NaN where too much is missing.
@@ -55,6 +80,7 @@ class Smoothed:
         jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
         delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
         late: whether the whole run agrees on that delay.
+        pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
         sensors: what the run's channels say of each other; None where nobody asked.
     """
 
@@ -72,6 +98,7 @@ class Smoothed:
     jerk: np.ndarray
     delay: float
     late: bool
+    pose_only: PoseOnly
     sensors: Examined | None = None
 
     @property
@@ -105,14 +132,12 @@ class Smoothed:
         return self.track.counts(int(self.spikes.sum()))
 
 
-def smooth(track: Track, driven: bool = True, agreeing: Agreeing = ALONE) -> Smoothed:
+def smooth(track: Track, agreeing: Agreeing = ALONE) -> Smoothed:
     """Smooth a run.
 
     Args:
         track: the run.
         agreeing: channels of velocity and yaw rate that count beside the pose, and their noise.
-        driven: whether the response to the commands is modelled, see :mod:`.command_response`. Without,
-            the spline follows whatever is quick, and noise with it.
 
     Raises:
         InputError: no stretch of it is dense enough, or its samples do not determine a motion.
@@ -120,7 +145,7 @@ def smooth(track: Track, driven: bool = True, agreeing: Agreeing = ALONE) -> Smo
     rows = np.flatnonzero(track.valid)
     while True:
         try:
-            found = _smooth(track, rows, driven, agreeing)
+            found = _smooth(track, rows, agreeing)
         except TooFewError as stretch:
             rows = np.setdiff1d(rows, stretch.rows)
         except LinAlgError as error:
@@ -131,31 +156,67 @@ def smooth(track: Track, driven: bool = True, agreeing: Agreeing = ALONE) -> Smo
             return found
 
 
-def _smooth(track: Track, rows: np.ndarray, driven: bool, agreeing: Agreeing) -> Smoothed:
-    """Smooth a run by some of its rows."""
-    time = track.run.time - track.run.time[0]
+def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
+    """The motion by the pose alone: its spline follows whatever is quick, and noise with it.
+
+    Args:
+        run: a smoothed run.
+        pose: (n, 3), that of the run by default; of another one with as much noise the smoothness is
+            found anew, and no sample is judged again.
+    """
+    rows, weights, stiffness, smoothness = run.pose_only
+    track = run.track if pose is None else replace(run.track, pose=pose)
+    p, origin = _problem(track, rows)
+    if pose is None:
+        p = p._replace(stiffness=stiffness)
+    else:
+        p, smoothness = adapt(p, likeliest(p, weights, smoothness), weights)
+    time = run.time - run.time[0]
+    where = within(p.grid, time)
+    coefficients = solve(p, smoothness, weights).coefficients
+    derivatives = (spread(basis(p.grid, time[where], k)(coefficients), where) for k in range(3))
+    return _motion(origin, *derivatives)
+
+
+def _motion(origin: np.ndarray, offset: np.ndarray, eta_dot: np.ndarray, eta_ddot: np.ndarray) -> Motion:
+    """The motion by the pose about an origin (3,), and its derivatives."""
+    eta = offset + origin
+    u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
+    return Motion(eta, eta_dot, eta_ddot, np.column_stack([u, v, eta_dot[:, 2]]))
+
+
+def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """The spline that is to follow some rows of a run, with an even penalty, and its origin (3,)."""
+    time, scale = track.run.time - track.run.time[0], track.scale
     with np.errstate(over="ignore"):  # of poses that are no place on earth
         origin = np.nanmedian(track.pose, axis=0)
-    scale = track.scale
     grid = knots(*stretches(rows, track), max(SPACING * scale.time, track.period))
-    inside = within(grid, time)
-    dense = rows[inside[rows]]
+    dense = rows[within(grid, time[rows])]
     z = track.pose[dense] - origin
     sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
     average = max(1, round(AVERAGE * scale.time / grid.spacing))
-    even = Problem(dense, z, basis(grid, time[dense]), grid, roughness(grid), stiffness, sigma, average)
+    b = basis(grid, time[dense])
+    return Problem(dense, z, b, grid, roughness(grid), stiffness, sigma, average), origin
+
+
+def _smooth(track: Track, rows: np.ndarray, agreeing: Agreeing) -> Smoothed:
+    """Smooth a run by some of its rows."""
+    time, scale = track.run.time - track.run.time[0], track.scale
+    even, origin = _problem(track, rows)
+    grid, dense, sigma = even.grid, even.rows, even.sigma
+    inside = within(grid, time)
     local = np.full(3, LOCAL * (track.period / grid.spacing) ** 5)
     adapted, smoothness, weights = robust(even, local)
-    fit, response = solve(adapted, smoothness, weights), CommandResponse.none(time.size)
+    pose_only = PoseOnly(rows, weights, adapted.stiffness, smoothness)
+    fit = solve(adapted, smoothness, weights)
     psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
-    if driven:
-        first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
-        still = idle(scale)
-        slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
-        commands = Commands(track, psi, grid, bool(slow))
-        left = with_commands(even, adapted, smoothness, fit, weights, commands)
-        adapted, smoothness, fit, response = left
+    first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
+    still = idle(scale)
+    slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
+    commands = Commands(track, psi, grid, bool(slow))
+    left = with_commands(even, adapted, smoothness, fit, weights, commands)
+    adapted, smoothness, fit, response = left
     rates = measured_rates(track, dense, psi, agreeing, grid)
     if rates is not None:
         at, beside = rates
@@ -166,29 +227,21 @@ def _smooth(track: Track, rows: np.ndarray, driven: bool, agreeing: Agreeing) ->
     spikes = track.valid.copy()
     spikes[rows] = False
     spikes[dense] = weights == 0.0
-    found = []
-    for derivative, known in enumerate(response[:3]):
-        b = basis(grid, time[inside], derivative)
-        found += [spread(b(fit.coefficients) + known[inside], inside)]
-        found += [spread(np.sqrt(variance(b, inverse)), inside)]
-    eta, eta_std, eta_dot, eta_dot_std, eta_ddot, eta_ddot_std = found
-    eta += origin
-    u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
+    derivatives = [basis(grid, time[inside], k) for k in range(3)]
+    known = zip(derivatives, response[:3], strict=True)
+    motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
+    std = [spread(np.sqrt(variance(b, inverse)), inside) for b in derivatives]
     return Smoothed(
         track,
         spikes,
-        eta,
-        eta_dot,
-        eta_ddot,
-        np.column_stack([u, v, eta_dot[:, 2]]),
-        eta_std,
-        eta_dot_std,
-        eta_ddot_std,
-        _body_std(eta, u, v, eta_std, eta_dot_std),
+        *motion,
+        *std,
+        _body_std(motion.eta, *motion.nu.T[:2], *std[:2]),
         sigma,
         sigma**2 / (smoothness * grid.spacing**5),
         response.delay,
         response.sure,
+        pose_only,
     )
 
 

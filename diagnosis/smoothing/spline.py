@@ -133,10 +133,13 @@ def penalty(grid: Knots, weights: np.ndarray) -> np.ndarray:
         grid: knots.
         weights: (intervals,), of each interval, those of all stretches in a row.
     """
-    band, at = np.zeros((WIDTH, grid.size)), inside(grid)
-    for j in range(WIDTH):
-        for k in range(j, WIDTH):
-            band[k - j, at + j] += PENALTY[j, k] * weights
+    band = np.zeros((WIDTH, grid.size))
+    stretches = np.split(weights, np.cumsum(grid.intervals)[:-1])
+    for first, of_stretch in zip(grid.first, stretches, strict=True):
+        for j in range(WIDTH):
+            at = slice(first + j, first + j + of_stretch.size)
+            for k in range(j, WIDTH):
+                band[k - j, at] += PENALTY[j, k] * of_stretch
     return band
 
 
