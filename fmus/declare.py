@@ -55,6 +55,19 @@ class Known:
     share: float
 
 
+@dataclass(frozen=True)
+class Estimate:
+    """What a parameter is the first estimate of, from which an adaptive law learns.
+
+    Attributes:
+        of: a parameter of the plant.
+        change: whether it is of what is added to that one.
+    """
+
+    of: str
+    change: bool = False
+
+
 class Outline(NamedTuple):
     """A ship as tools draw it.
 
@@ -85,16 +98,15 @@ class Variable:
     range: Range = Range()
     fixed: bool = False
     known: Known | None = None
+    estimate: Estimate | None = None
 
 
-def vector(
-    typename: str, fields: Sequence[tuple[str, str, str, float]], extra: Sequence[Any] = ()
-) -> type[Any]:
+def vector(typename: str, fields: Sequence[tuple[Any, ...]], extra: Sequence[Any] = ()) -> type[Any]:
     """A NamedTuple class of scalars that are made rather than written out.
 
     Args:
         typename: name of the class.
-        fields: (name, unit, description, start) of each scalar.
+        fields: (name, unit, description, start, and what stands behind the description) of each scalar.
         extra: what stands behind the description of every field, such as a Range.
 
     Returns:
@@ -102,7 +114,8 @@ def vector(
     """
     made = namedtuple(typename, [f[0] for f in fields], defaults=[f[3] for f in fields])
     made.__annotations__ = {
-        name: Annotated[(float, unit, description, *extra)] for name, unit, description, _ in fields
+        name: Annotated[(float, unit, description, *own, *extra)]
+        for name, unit, description, _, *own in fields
     }
     return made
 
@@ -130,9 +143,8 @@ def group_of(typename: str, fields: Iterable[Variable]) -> type[Any]:
 
 
 def _annotation(v: Variable) -> Any:
-    known = () if v.known is None else (v.known,)
-    fixed = (FIXED,) if v.fixed else ()
-    return Annotated[(float, v.unit, v.description, v.range, *known, *fixed)]
+    more = [extra for extra in (v.known, v.estimate, FIXED if v.fixed else None) if extra is not None]
+    return Annotated[(float, v.unit, v.description, v.range, *more)]
 
 
 def redeclared(cls: type[Any], change: Callable[[Variable], Variable]) -> type[Any]:
@@ -202,17 +214,17 @@ def variables(cls: type[Any]) -> tuple[Variable, ...]:
             raise DeclarationError(f"{cls.__name__}.{name} needs a unit and a description")
         if name not in defaults:
             raise DeclarationError(f"{cls.__name__}.{name} needs a start value")
-        ranges = [extra for extra in meta[2:] if isinstance(extra, Range)]
-        known = [extra for extra in meta[2:] if isinstance(extra, Known)]
+        more = {type(extra): extra for extra in meta[2:]}
         found.append(
             Variable(
                 name,
                 meta[0],
                 meta[1],
                 float(defaults[name]),
-                ranges[0] if ranges else Range(),
+                more.get(Range, Range()),
                 FIXED in meta[2:],
-                known[0] if known else None,
+                more.get(Known),
+                more.get(Estimate),
             )
         )
     return tuple(found)

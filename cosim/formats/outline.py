@@ -1,4 +1,4 @@
-"""What annotations in model descriptions tell: the ship that an FMU is the hull of, and a trial."""
+"""What annotations in model descriptions tell: the ship to draw, a trial, estimates of parameters."""
 
 import math
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element
 
 SHIP = "Tool[@name='cybership']/Ship"  # among the vendor annotations
 TRIAL = "Tool[@name='cybership']/Trial"
+ESTIMATE = "Tool[@name='cybership']/Estimate"
 MOST_CORNERS = 1000
 
 
@@ -61,3 +62,21 @@ def read_trial(annotations: Element | None, instance: str) -> Trial | None:
     """The trial that an FMU conducts, by its output ``order``; None: it conducts none."""
     trial = None if annotations is None else annotations.find(TRIAL)
     return None if trial is None else Trial(trial.get("kind", ""), f"{instance}.order")
+
+
+class Estimate(NamedTuple):
+    """What a parameter is the first estimate of.
+
+    Attributes:
+        of: a parameter of the plant.
+        change: whether it is of what is added to that one.
+    """
+
+    of: str
+    change: bool
+
+
+def read_estimates(annotations: Element | None) -> dict[str, Estimate]:
+    """The parameters of an FMU that are estimates of a plant's, by name."""
+    told = [] if annotations is None else annotations.findall(ESTIMATE)
+    return {e.get("parameter", ""): Estimate(e.get("of", ""), e.get("change") == "true") for e in told}

@@ -1,9 +1,9 @@
 """What controllers and observers believe of the plant: the model of a parameter set, by names.
 
 An FMU believes in a plant if it has parameters of the same names as the plant's (``m``, ``X_u``, ...),
-or a parameter described as ``estimate at the start of NAME``, from which it learns. It gets the whole
-model: of what the file does not name, the start value of the plant's FMU. ``delta_NAME`` adds to
-``NAME``.
+or parameters from which it learns that its model description annotates as estimates of these
+(:func:`cosim.formats.outline.read_estimates`). It gets the whole model: of what the file does not name,
+the start value of the plant's FMU. ``delta_NAME`` adds to ``NAME``.
 """
 
 from collections.abc import Iterator
@@ -11,10 +11,11 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..fmu.fmu_model import Model, Value, Variable
+from ..formats.outline import read_estimates
 from ..formats.ssv import ParameterSet
 from .system import System
 
-ADDITION, ESTIMATE, ADDED = "delta_", "estimate at the start of ", ", added"
+ADDITION = "delta_"
 
 # Instance -> parameter -> value and its origin.
 Chosen = dict[str, dict[str, tuple[Value, str]]]
@@ -70,19 +71,18 @@ class _Believed:
     def of(self, fmu: Model) -> Iterator[tuple[Variable, float, list[str]]]:
         """Parameters of an FMU, what it believes of each, and the names of the set that say so."""
         parameters = [v for v in fmu.variables.values() if v.causality == "parameter"]
-        estimates = {v.name: v.description.removeprefix(ESTIMATE) for v in parameters}
+        estimates = read_estimates(fmu.annotations)
+        changing = {estimate.of for estimate in estimates.values() if estimate.change}
         for v in parameters:
-            name = estimates[v.name]
-            if name == v.description:  # no estimate
-                known = v.name in self._plant and v.unit == self._plant[v.name].unit
-                if known and f"{v.name}{ADDED}" in estimates.values():
-                    yield v, self._base(v.name), [v.name]
-                elif known:
-                    yield v, self._sum(v.name), [v.name, ADDITION + v.name]
-            elif name.endswith(ADDED) and name.removesuffix(ADDED) in self._plant:
-                change = ADDITION + name.removesuffix(ADDED)
-                yield v, self._given.get(change, 0.0), [change]
-            elif name in self._plant:
+            estimate = estimates.get(v.name)
+            name = v.name if estimate is None else estimate.of
+            if name not in self._plant or (estimate is None and v.unit != self._plant[name].unit):
+                continue
+            if estimate is not None and estimate.change:
+                yield v, self._given.get(ADDITION + name, 0.0), [ADDITION + name]
+            elif estimate is None and name in changing:
+                yield v, self._base(name), [name]
+            else:
                 yield v, self._sum(name), [name, ADDITION + name]
 
     def _base(self, name: str) -> float:

@@ -54,8 +54,8 @@ def _surge_damping(nu: Triple, nu_dot: Triple, tau: Triple, b: Belief) -> Regres
 
 
 _SURGE = (
-    Coefficient("X_absu_u, added", "N.s2/m2", "surge force, |u|u", 0.0, 8.0),
-    Coefficient("X_u, added", "N.s/m", "surge force, u", 0.0, 4.0),
+    Coefficient("X_absu_u", "N.s2/m2", "surge force, |u|u", 0.0, 8.0, added=True),
+    Coefficient("X_u", "N.s/m", "surge force, u", 0.0, 4.0, added=True),
     Coefficient("X_absu_r", "N.s2/(m.rad)", "surge force, |u|r", 0.0, 8.0),
 )
 

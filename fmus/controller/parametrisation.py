@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from ..declare import Range, vector
+from ..declare import Estimate, Range, vector
 from ..hull import Inertia, TowedDamping, Triple, inertia_force
 from ..ops import Number, clip, cos, sin
 
@@ -21,13 +21,25 @@ Regressors = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 
 
 class Coefficient(NamedTuple):
-    """A parameter that is learned: its true value for the default vessel, and an adaptation gain."""
+    """A parameter that is learned: its true value for the default vessel, and an adaptation gain.
 
-    name: str
+    ``added`` is whether it is learned what is to be added to what the controller believes.
+    """
+
+    parameter: str
     unit: str
     description: str
     value: float
     gain: float
+    added: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.parameter}, added" if self.added else self.parameter
+
+    @property
+    def estimate(self) -> Estimate:
+        return Estimate(self.parameter, self.added)
 
 
 class Belief(NamedTuple):
@@ -67,15 +79,24 @@ class Parametrisation:
     loss: tuple[int, int, int] | None = None
     by_acceleration: bool = False
 
-    def _vector(self, stem: str, text: str, start: Callable[[Coefficient], float]) -> type[Any]:
+    def _vector(
+        self,
+        stem: str,
+        text: str,
+        start: Callable[[Coefficient], float],
+        extra: Callable[[Coefficient], Sequence[Any]] = lambda c: (),
+    ) -> type[Any]:
         """A NamedTuple class with one scalar for each parameter."""
         name = stem.title().replace("_", "")
-        fields = enumerate(self.coefficients, 1)
-        return vector(name, [(f"{stem}_{k}", c.unit, f"{text} {c.name}", start(c)) for k, c in fields])
+        fields = [
+            (f"{stem}_{k}", c.unit, f"{text} {c.name}", start(c), *extra(c))
+            for k, c in enumerate(self.coefficients, 1)
+        ]
+        return vector(name, fields)
 
     @cached_property
     def start(self) -> type[Any]:
-        return self._vector("phi_0", "estimate at the start of", lambda c: 0.0)
+        return self._vector("phi_0", "estimate at the start of", lambda c: 0.0, lambda c: (c.estimate,))
 
     @cached_property
     def hat(self) -> type[Any]:

@@ -74,9 +74,10 @@ def _units(root: Element, component: Component) -> None:
 
 
 def _annotations(root: Element, component: Component) -> None:
-    """What tools draw of the ship, corners ``forward,starboard`` [m] with blanks between; the trial."""
+    """A ship to draw, corners ``forward,starboard`` [m]; a trial; what parameters are estimates of."""
     outline = component.outline
-    if outline is None and not component.trial:
+    estimates = {v.name: v.estimate for v in component.variables if v.estimate is not None}
+    if outline is None and not component.trial and not estimates:
         return
     tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
     if outline is not None:
@@ -84,6 +85,9 @@ def _annotations(root: Element, component: Component) -> None:
         SubElement(tool, "Ship", name=outline.name, length=repr(outline.length), outline=corners)
     if component.trial:
         SubElement(tool, "Trial", kind=component.trial)
+    for name, estimate in estimates.items():
+        told = {"parameter": name, "of": estimate.of, "change": str(estimate.change).lower()}
+        SubElement(tool, "Estimate", told)
 
 
 def _variables(root: Element, component: Component) -> None:

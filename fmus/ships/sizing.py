@@ -10,8 +10,6 @@ from ..ops import Number
 from ..scale import Scale
 from ..ship_description import Description
 
-ESTIMATE = "estimate at the start of "
-
 
 def sized(component: Component, ship: Description) -> Component:
     """A component for a ship: parameters that a hull has too are the ship's, the others to its scale.
@@ -28,10 +26,10 @@ def sized(component: Component, ship: Description) -> Component:
     scale = ship.scale
 
     def for_ship(v: Variable) -> Variable:
-        named = v.description.removeprefix(ESTIMATE)
-        name = v.name if named == v.description else named
+        estimate = v.estimate
+        name = estimate.of if estimate else v.name
         known = name in nominal and nominal[name].unit == v.unit
-        if known and (v.start != 0.0 or named == v.description):
+        if known and (estimate is None or (v.start != 0.0 and not estimate.change)):
             return replace(v, start=given.get(name, 0.0))
         return scale.of(v)
 
