@@ -69,11 +69,11 @@ def _gap(run: Run) -> Run:
 
 
 def _wrapped(run: Run) -> Run:
-    """The heading in 0 to 2 pi, a telegram each half second, straight lines between."""
+    """The heading within a turn about what it mostly is, a telegram each half second, lines between."""
     good = np.isfinite(run.pose[:, 2])
     psi = np.interp(run.time, run.time[good], np.unwrap(run.pose[good, 2]))
-    at = np.arange(0, run.time.size, EVERY)
-    line = np.interp(run.time, run.time[at], np.mod(psi[at], 2.0 * pi))
+    at, cut = np.arange(0, run.time.size, EVERY), float(np.median(psi))
+    line = np.interp(run.time, run.time[at], cut + np.mod(psi[at] - cut, 2.0 * pi))
     return replace(run, pose=np.column_stack([run.pose[:, :2], line]))
 
 

@@ -12,6 +12,7 @@ from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Run, compare, read, weak_windows
+from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -75,6 +76,15 @@ def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_p
     assert mistake in text
     assert f"put {json.dumps({'columns': line})} into" in text
     assert "\n" not in text
+
+
+def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():
+    def one_thruster(tau):
+        return np.column_stack([tau[:, :2], -0.5 * tau[:, 1]])
+
+    w = weak_windows(smoothed(edited(commands=one_thruster)))
+    assert np.isnan(gains(w, Model()).value).tolist() == [False, True, True]
+    assert gains(weak_windows(smoothed(base())), Model()).told.all()
 
 
 HARMLESS = [

@@ -10,7 +10,7 @@ from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate, TrainingSet
 from diagnosis.identification.shortlist import NEW, novelty, rank
 from diagnosis.model import Model, omega, weak_windows
-from diagnosis.model.weak_form import kernel, kernel_integral, kernel_rate
+from diagnosis.model.weak_form import kernel, kernel_integral, kernel_moment
 from fmus.effects import STANDARD
 
 
@@ -33,8 +33,21 @@ def test_kernel_has_unit_area_and_its_own_derivatives():
     s = np.linspace(-1.0, 1.0, 20001)
     assert np.trapezoid(kernel(s), s) == pytest.approx(1.0, abs=1e-9)
     assert np.gradient(kernel_integral(s), s) == pytest.approx(kernel(s), abs=1e-4)
-    assert np.gradient(kernel(s), s)[1:-1] == pytest.approx(kernel_rate(s)[1:-1], abs=1e-4)
+    assert np.gradient(kernel_moment(s), s) == pytest.approx(s * kernel(s), abs=1e-4)
     assert kernel_integral(1.0) - kernel_integral(-1.0) == pytest.approx(1.0)
+
+
+def test_windows_are_exact_for_straight_signals_however_uneven_the_samples():
+    run, _ = sail(60.0, 0.02)
+    rng = np.random.default_rng(0)
+    kept = np.sort(rng.choice(np.arange(1, run.time.size - 1), run.time.size // 4, replace=False))
+    w = weak_windows(smoothed(run.rows(np.concatenate([[0], kept, [run.time.size - 1]]))))
+    one, t = np.ones(w.run.time.size), w.run.time
+    np.testing.assert_allclose(w.smooth @ one, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(w.held @ one, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(w.slope @ one, 0.0, atol=1e-12)
+    np.testing.assert_allclose(w.smooth @ t, w.middle, rtol=1e-12)
+    np.testing.assert_allclose(w.slope @ t, 1.0, rtol=1e-9)
 
 
 HIDDEN = [

@@ -11,6 +11,7 @@ length in another unit multiplies it by that unit on the axes of force, a force 
 that runs s times too fast divides it by s^2 on all axes.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,8 @@ EXPLAINED = 0.5
 SURE = 3.0  # standard errors
 SILENT = 1e-6  # of the largest commanded force; less is no command, and varies no more than rounding
 NEGLIGIBLE = 1e-10  # relative size of a singular value
+# Of the variation of an axis' commands: with less of their own, what is due to them is not told.
+OWN = 0.01  # chosen: a thruster aft that only ever pushes sideways and turns at once has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,8 @@ class Gains:
 
     Attributes:
         value, error: (3,), k and its standard error.
-        told: (3,), whether the commands of that axis explain most of its inertial force.
+        told: (3,), whether the commands of that axis explain most of its inertial force, and follow from
+            those of no other axis.
     """
 
     value: np.ndarray
@@ -97,6 +101,8 @@ def gains(w: WeakWindows, model: Model) -> Gains:
         )
         if len(a) < OVERLAP * x.shape[1] or not np.isfinite(x).all():
             continue  # of fewer independent windows than unknowns nothing is told
+        if _own(T[:, j], others) < OWN:
+            continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = np.linalg.pinv(x / size, rcond=NEGLIGIBLE)
         beta = inverse @ a[:, j]
@@ -106,3 +112,12 @@ def gains(w: WeakWindows, model: Model) -> Gains:
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
         told[j] = beta[0] ** 2 > EXPLAINED * (beta[0] ** 2 + free * variance)
     return Gains(value, error * np.sqrt(correlated_windows([w], left)), told)
+
+
+def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:
+    """Share of the variation of a command (K,) that follows from no other."""
+    known = np.column_stack([*others, np.ones(command.size)])
+    known = known / np.maximum(np.linalg.norm(known, axis=0), np.finfo(float).tiny)
+    varying = command - command.mean()
+    left = command - known @ (np.linalg.pinv(known, rcond=NEGLIGIBLE) @ command)
+    return float((left @ left) / (varying @ varying))

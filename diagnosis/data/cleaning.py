@@ -174,7 +174,7 @@ def lost(pose: np.ndarray) -> np.ndarray:
 
 
 def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """(n,): where a pose (n, 3) is to the bit the last one that was there."""
+    """(n,): where a pose, or channels of it, (n, k), is to the bit the last one that was there."""
     rows = np.flatnonzero(there)
     repeats = np.zeros(there.size, bool)
     repeats[rows[1:]] = (np.diff(pose[rows], axis=0) == 0.0).all(axis=1)

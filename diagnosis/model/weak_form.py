@@ -34,6 +34,7 @@ HORIZON = 8.0  # s, of predictions. Chosen: motions of the unstable nominal hull
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
+AT_EDGE = 1e-9  # of the half width of a window
 KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
 ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
 # Bytes for commands that thrusters with a memory respond to: of 700 s with two sets of thrusters those
@@ -46,12 +47,13 @@ def kernel(s: np.ndarray) -> np.ndarray:
     return 35.0 / 32.0 * (1.0 - s * s) ** 3
 
 
-def kernel_rate(s: np.ndarray) -> np.ndarray:
-    return -6.0 * 35.0 / 32.0 * s * (1.0 - s * s) ** 2
-
-
 def kernel_integral(s: np.ndarray) -> np.ndarray:
     return 35.0 / 32.0 * (s - s**3 + 0.6 * s**5 - s**7 / 7.0)
+
+
+def kernel_moment(s: np.ndarray) -> np.ndarray:
+    """Integral of s (1 - s^2)^3 of the kernel, zero at the ends."""
+    return -35.0 / 256.0 * (1.0 - s * s) ** 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +65,8 @@ class WeakWindows:
         middle: (K,) [s].
         block: (K,), number of the block that the middle lies in.
         smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
-            times one that is held from each sample to the next.
+            times one that is held from each sample to the next. They are exact for signals that are
+            straight between samples, however far apart these are.
         horizon: length of the windows in which models predict the run [s].
         memory: parts of the model error that were computed lately.
     """
@@ -161,12 +164,14 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         & (busy[last] > busy[first])
     )
     middles, first, last = middles[kept], first[kept], last[kept]
+    # Where no sample is at its edge, a window begins between two.
+    first = np.where(t[first] > middles - half + AT_EDGE * half, np.maximum(first - 1, 0), first)
+    last = np.where(t[last - 1] < middles + half - AT_EDGE * half, np.minimum(last + 1, t.size), last)
     rows = np.repeat(np.arange(middles.size), last - first)
     columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
-    s = np.clip((t[columns] - middles[rows]) / half, -1.0, 1.0)
-    after = np.clip((t[np.minimum(columns + 1, t.size - 1)] - middles[rows]) / half, -1.0, 1.0)
-    gap = np.gradient(t)[columns]
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
+    area, share, step = _span(t, middles[rows], half, columns)
+    area_before, share_before, step_before = _span(t, middles[rows], half, columns - 1)
     shape = (middles.size, t.size)
     block = max(BLOCK * scale.time, float(t[-1] - t[0]) / BLOCKS)
 
@@ -177,11 +182,30 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         smoothed,
         middles,
         np.floor((middles - t[0]) / block).astype(int),
-        matrix(kernel(s) / half * gap),
-        matrix(-kernel_rate(s) / half**2 * gap),
-        matrix(kernel_integral(after) - kernel_integral(s)),
+        matrix(area - share + share_before),
+        matrix(area_before / step_before - area / step),
+        matrix(area),
         horizon or HORIZON * scale.time,
     )
+
+
+def _span(
+    t: np.ndarray, middle: np.ndarray, half: float, row: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the time from a row to the next: the kernel's area, its part of the next row, and its length.
+
+    Args:
+        t: (n,), times of the rows [s].
+        middle: (m,), of windows [s].
+        half: their half width [s].
+        row: (m,), a row of each; before the first and after the last there is no time.
+    """
+    a, b = t[np.maximum(row, 0)], t[np.minimum(row + 1, t.size - 1)]
+    low, high = (np.clip((x - middle) / half, -1.0, 1.0) for x in (a, b))
+    area = kernel_integral(high) - kernel_integral(low)
+    step = np.where(b > a, b - a, 1.0)
+    moment = half * (kernel_moment(high) - kernel_moment(low)) + (middle - a) * area
+    return area, moment / step, step
 
 
 def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:

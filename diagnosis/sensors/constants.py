@@ -107,10 +107,17 @@ def place(e: Evidence, scale: Scale) -> tuple[Column, Column]:
 
 @constant("velocity")
 def velocity_delay(e: Evidence, scale: Scale) -> Column:
-    """The velocity is stamped later than the position by the value."""
+    """The velocity is stamped later than the position by the value.
+
+    In the ship's own axes it is turned by the heading of now, so that what turns of the ship change in
+    the velocity over ground is not late.
+    """
     assert e.by is not None
     assert e.velocity is not None
     path = _path(e, e.velocity)
+    if e.by == ("u", "v"):
+        mean, turn = 0.5 * (e.velocity[1:] + e.velocity[:-1]), np.diff(e.psi)
+        path[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
     return Column(e.by[0], "delay", "s", "velocity", path, LEAST_DELAY * _period(e), False)
 
 

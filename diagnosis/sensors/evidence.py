@@ -59,6 +59,9 @@ def evidence(run: Run) -> Evidence | None:
     run = run.rows(in_order(run.time))
     there = ~lost(run.pose)
     fresh = np.flatnonzero(there & ~repeated(run.pose, there))
+    # A position that was held while the heading went on is of an earlier instant.
+    moved = np.flatnonzero(there & ~repeated(run.pose[:, :2], there))
+    fresh = moved if moved.size >= FEWEST else fresh
     if fresh.size < FEWEST:
         return None
     between = np.zeros(run.time.size, bool)

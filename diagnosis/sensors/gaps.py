@@ -13,6 +13,12 @@ FAST = 3.0  # times the log's step: what is less is a clock that runs fast (chos
 STAND = 0.75  # of the log's step that no motion fills, where the log jumps ahead (chosen)
 LONG = 5.0  # sampling periods that the log's step has then; chosen
 ALIGNED = 0.7  # cosine between the jump and the way that the velocity says (chosen)
+LEAST_TURN = 0.1  # rad, of a heading that jumps along; chosen
+MOST_BEND = 1.5  # rad, half of the turn of a bend that is taken as even (chosen)
+# Windows elsewhere: times that are tried, from a share to a multiple of what the speed says; how many
+# windows of each are looked at, and how many the least. Chosen.
+WIDE, TIMES, MOST_WINDOWS, FEWEST = 3.0, 81, 1000, 20
+ALIKE = 0.3  # relative difference of their turns, and of speeds at their ends (chosen)
 AROUND = 5  # samples before and after, in which a spike returns, and whose speed counts (chosen)
 SPEED = 0.01  # relative uncertainty of a speed that does not change (chosen)
 
@@ -23,24 +29,21 @@ class Gap(NamedTuple):
     Attributes:
         start, end: the log's time before and after [s].
         missing: true time that passed, less the log's [s].
-        std: its standard deviation.
+        interval: in which that is, 95 % [s].
     """
 
     start: float
     end: float
     missing: float
-    std: float
+    interval: tuple[float, float]
 
     @property
     def finding(self) -> SensorFinding:
         """The same as a finding."""
-        start, end, half = self.start, self.end, Z95 * self.std
+        start, end = self.start, self.end
         many = "are missing in" if self.missing > 0.0 else "were never in"
         text = f"{abs(self.missing):.3g} s {many} the log near {0.5 * (start + end):.1f} s"
-        interval = self.missing - half, self.missing + half
-        return SensorFinding(
-            "time", "clock_gap", self.missing, "s", interval, self.start, self.end, text
-        )
+        return SensorFinding("time", "clock_gap", self.missing, "s", self.interval, start, end, text)
 
 
 def gaps(e: Evidence) -> list[Gap]:
@@ -62,9 +65,13 @@ def gaps(e: Evidence) -> list[Gap]:
     beyond = late * mean  # m; where a ship is slow, noise of the position is a long time
     noise = 1.4826 * float(np.median(np.abs(beyond - np.median(beyond))))
     aligned = (moved * said).sum(axis=1) > ALIGNED * way * np.hypot(*said.T)
-    missing = (late > FAST * step) & aligned
+    turned = np.diff(e.psi[rows]) - np.diff(e.turned[rows])
+    least = FAR * 1.4826 * float(np.median(np.abs(turned - np.median(turned))))
+    # Position and heading jump together in time alone, however the ship went meanwhile.
+    missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
     ahead = (late < -STAND * step) & (step > LONG * period)
-    jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > max(SHORTEST, 2.0 * period))
+    shortest = max(SHORTEST, 2.0 * period)
+    jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > shortest)
     jumps &= going & (missing | ahead)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], jumps, [0]]).astype(int)))
     found = []
@@ -73,16 +80,73 @@ def gaps(e: Evidence) -> list[Gap]:
         net = np.hypot(*(e.run.pose[rows[after], :2] - e.run.pose[rows[before], :2]))
         at = np.median(speed[before : a + 1]), np.median(speed[b : after + 1])
         u = float(np.mean(at))
-        chord = np.hypot(*(e.run.pose[rows[b], :2] - e.run.pose[rows[a], :2]))
-        half = 0.5 * abs(float(e.psi[rows[b]] - e.psi[rows[a]]))
-        arc = chord * (half / np.sin(half) if 1e-6 < half < 1.5 else 1.0)
+        arc = float(
+            _arc(e.run.pose[rows[b], :2] - e.run.pose[rows[a], :2], e.psi[rows[b]] - e.psi[rows[a]])
+        )
         value = float(arc / u - (time[b] - time[a]))
-        if value > 0.0 and net / u - (time[after] - time[before]) < 0.5 * value:
+        if abs(value) <= shortest or (
+            value > 0.0 and net / u - (time[after] - time[before]) < 0.5 * value
+        ):
             continue  # a spike of the position, which comes back
         reach = max(abs(value), 2.0 * period)
         near = (time > time[a] - reach) & (time < time[b] + reach)
         share = float(np.hypot((at[1] - at[0]) / 2.0, np.std(speed[near])) / u)
         share += 1.0 - float(np.exp(-0.5 * np.var(e.psi[rows[near]])))  # of a way that bends
-        std = float(np.hypot(noise / u, value * (share + SPEED)))
-        found.append(Gap(float(time[a]), float(time[b]), value, std))
+        half = Z95 * float(np.hypot(noise / u, value * (share + SPEED)))
+        low, high = value - half, value + half
+        if value > 0.0:
+            by_speed = value, max(low, 0.0), high
+            likely = _elsewhere(e, speed, (a, b), value) or by_speed
+            value, low, high = min(likely, by_speed, key=lambda each: each[2] - each[1])
+        found.append(Gap(float(time[a]), float(time[b]), value, (low, high)))
     return found
+
+
+def _arc(chord: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Length of an even bend with a chord (..., 2) [m], in which the heading turns (...) [rad]."""
+    half = np.clip(0.5 * np.abs(turn), 1e-6, None)
+    bent = np.where(half < MOST_BEND, half / np.sin(np.minimum(half, MOST_BEND)), 1.0)
+    return np.asarray(np.hypot(chord[..., 0], chord[..., 1]) * bent)
+
+
+def _elsewhere(
+    e: Evidence, speed: np.ndarray, jump: tuple[int, int], value: float
+) -> tuple[float, float, float] | None:
+    """Likeliest, shortest and longest time [s] that is missing, by how the ship goes elsewhere.
+
+    A ship that winds goes less far than its speed says. A time is possible if windows of that length,
+    which begin and end about as fast and turn as much, would be told as the jump is. None: there are
+    too few of these.
+
+    Args:
+        e: the channels.
+        speed: (k,), at the rows with a pose [m/s].
+        jump: the rows before and after it.
+        value: time that is missing for the speed [s].
+    """
+    rows, time, (a, b) = e.rows, e.time[e.rows], jump
+    ends = np.median(speed[max(0, a - AROUND) : a + 1]), np.median(speed[b : b + AROUND + 1])
+    turn, step = float(e.psi[rows[b]] - e.psi[rows[a]]), float(time[b] - time[a])
+    starts = np.arange(0, time.size, max(1, time.size // MOST_WINDOWS))
+    possible: list[tuple[float, float]] = []
+    for seconds in np.geomspace((value + step) / WIDE, (value + step) * WIDE, TIMES):
+        last = np.searchsorted(time, time[starts] + seconds)
+        inside = (last < time.size) & ((starts > a) | (last < b))
+        i, j = starts[inside], last[inside]
+        turned = e.psi[rows[j]] - e.psi[rows[i]]
+        alike = np.abs(np.angle(np.exp(1j * (turned - turn)))) < max(LEAST_TURN, ALIKE * abs(turn))
+        for k, end in zip((i, j), ends, strict=True):
+            alike &= np.abs(speed[k] - end) < ALIKE * end
+        i, j = i[alike], j[alike]
+        if i.size < FEWEST:
+            continue
+        moved = e.run.pose[rows[j], :2] - e.run.pose[rows[i], :2]
+        said = 2.0 * _arc(moved, turned[alike]) / (speed[i] + speed[j])
+        if said.min() <= value + step <= said.max():
+            possible.append((abs(float(np.median(said)) - value - step), float(seconds)))
+    if len(possible) < 2:
+        return None
+    _, likeliest = min(possible)
+    between = WIDE ** (2.0 / (TIMES - 1))  # two times that are tried
+    shortest, longest = min(t for _, t in possible) / between, max(t for _, t in possible) * between
+    return likeliest - step, shortest - step, longest - step

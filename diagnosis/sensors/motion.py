@@ -74,12 +74,17 @@ def motion(run: Run, scale: Scale) -> Examined:
 
 
 def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
-    """Delays that were taken off with what is left of them, and all else."""
+    """Delays that were taken off with what is left of them, and all else.
+
+    What was taken off and found again with the other sign was none.
+    """
     left = {(f.channel, f.kind): f.value for f in rest}
     yield from (f for f in rest if (f.channel, f.kind) not in {(d.channel, d.kind) for d in late})
     for f in late:
         more = left.get((f.channel, f.kind), 0.0)
-        yield replace(f, value=f.value + more, ci95=(f.ci95[0] + more, f.ci95[1] + more))
+        low, high = f.ci95[0] + more, f.ci95[1] + more
+        if not low < 0.0 < high:
+            yield replace(f, value=f.value + more, ci95=(low, high))
 
 
 def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFinding]) -> Correction:

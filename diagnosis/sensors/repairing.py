@@ -50,7 +50,7 @@ def corrected(e: Evidence, fix: Correction) -> Run:
         rate = (late - fix.of("r", "offset")) / fix.of("r", "scale", 1.0)
         measured["r"] = np.where(np.isfinite(measured["r"]), rate, np.nan)
     if e.velocity is not None and e.by is not None:
-        velocity = _later(time, e.velocity, fix.of(e.by[0], "delay")) / fix.of(e.by[0], "scale", 1.0)
+        velocity = _punctual(e, fix.of(e.by[0], "delay")) / fix.of(e.by[0], "scale", 1.0)
         heading = fix.of("psi", "offset")
         axes = fix.of(e.by[1], "offset") * (-1.0 if e.by[1] == "y_dot" else 1.0)
         turned = np.full(time.size, heading or axes)
@@ -90,6 +90,15 @@ def _later(time: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
     flat = values.reshape(time.size, -1)
     moved = [np.interp(time + delay, time, column) for column in flat.T]
     return np.column_stack(moved).reshape(values.shape)
+
+
+def _punctual(e: Evidence, delay: float) -> np.ndarray:
+    """Velocity (n, 2) over ground without a delay [s] of its channels."""
+    assert e.velocity is not None
+    if e.by != ("u", "v"):
+        return _later(e.time, e.velocity, delay)
+    body = _later(e.time, np.column_stack(rotate_to_body(e.psi, *e.velocity.T)), delay)
+    return np.column_stack(rotate_to_earth(e.psi, *body.T))
 
 
 def _as_given(e: Evidence, velocity: np.ndarray, psi: np.ndarray) -> dict[str, np.ndarray]:

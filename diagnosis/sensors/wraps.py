@@ -14,7 +14,7 @@ LARGE = 8.0  # times the usual step of an angle: no ship turns so much faster th
 LEAST = (
     0.1  # rad; a smaller step is none of an angle that leads through a turn within a few rows (chosen)
 )
-MOST = 12  # rows between two telegrams, of which a line leads through the turn (chosen)
+MOST = int(2.0 * np.pi / LEAST)  # rows between two telegrams, of which a line leads through the turn
 
 
 def wraps(run: Run, scale: Scale) -> Examined:
