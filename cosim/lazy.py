@@ -20,7 +20,8 @@ def lazy_names(
 
     Args:
         package: its ``__name__``.
-        file: its ``__file__``; the stub beside it holds lines ``from .module import name as name``.
+        file: its ``__file__``; the stub beside it holds lines ``from .module import name as name``, or
+            ``from . import module as module``.
     """
     homes: dict[str, str] = {}
     with open(f"{file.rpartition('.')[0]}.pyi", encoding="utf-8") as stub:
@@ -32,7 +33,9 @@ def lazy_names(
     def get(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(homes[name], package), name)
+        inside = homes[name] != "."
+        module = import_module(homes[name] if inside else f".{name}", package)
+        value = getattr(module, name) if inside else module
         setattr(sys.modules[package], name, value)
         return value
 

@@ -1,5 +1,6 @@
 from cosim import InputError as InputError
 
+from . import compare as compare
 from .assessment.evaluation import Evaluation as Evaluation
 from .assessment.evaluation import PredictionError as PredictionError
 from .assessment.evaluation import evaluate_run as evaluate_run

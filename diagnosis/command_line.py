@@ -21,6 +21,7 @@ from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
 INPUTS = ("train", "test", "runs", "run", "model", "map", "effects")
+MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
 RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
 
 
@@ -63,7 +64,10 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument(
-        "--model", type=Path, metavar="FILE.ssv", help="model to begin with (the nominal one)"
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="model to begin with, a parameter set .ssv or an .fmu (the nominal one)",
     )
     made.add_argument(
         "--effects",
@@ -86,6 +90,16 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         help="length of the windows in which models predict the runs (8 s, times the scale of the ship)",
     )
     return made
+
+
+def map_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--map``."""
+    made.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE.json",
+        help="which variables of an FMU given by --model are which signals (as names and units tell)",
+    )
 
 
 def ship_option(made: argparse.ArgumentParser) -> None:

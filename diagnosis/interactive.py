@@ -12,8 +12,10 @@ from cosim import InputError, Result
 
 from . import session
 from .data import Run, read_frame, ship_of_logs
+from .foreign import Fmu
 from .gathering import gather
 from .identification import DEFAULT, Method, Prior, shares
+from .initial_model import initial_model
 from .model import Model, WeakWindows, ship_with, write_model
 from .progress import Advance, silent
 from .report.content import diagnosis_content
@@ -174,11 +176,38 @@ class ShownDiagnosis(session.Diagnosis):
         return as_html(self.content, self.plot)
 
 
+def compare(
+    runs: Sequence[WeakWindows] | Source | Sequence[Source],
+    model: Model | Fmu | str | Path | None = None,
+    map: str | Path | None = None,  # noqa: A002 - as the option of the command
+    advance: Advance = silent,
+    ship: str | Path | None = None,
+) -> session.Comparison:
+    """Hold a model against measured runs; ``diagnosis.compare(...)`` calls this.
+
+    Args:
+        runs: from :func:`load`, or what that takes.
+        model: the nominal one of the runs' ship by default; or the path of a parameter set or an FMU.
+        map: file that tells which of an FMU's variables are which signals; else its names and units do.
+        advance: receives the name of each step when it begins.
+        ship: whose nominal model that is, as :func:`load` has it.
+
+    Raises:
+        InputError: a run or the model cannot be used.
+    """
+    given = _listed(runs)
+    of = _model_of(model if isinstance(model, Model) else None, ship, given)
+    if isinstance(model, (str, Path)):
+        of, model = initial_model(model, map, of.ship)
+    loaded = given if _are_loaded(given) else load(given, model=of)
+    return session.evaluate(loaded, model or of, advance=advance)
+
+
 def diagnose(
     runs: Sequence[WeakWindows] | Source | Sequence[Source],
     held_out: Sequence[WeakWindows] | Source | Sequence[Source] = (),
     prior: Prior = None,
-    model: Model | None = None,
+    model: Model | Fmu | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
@@ -191,7 +220,8 @@ def diagnose(
         held_out: runs to test on only; likewise.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
+            beside which the effects of that ship are tried.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -201,9 +231,9 @@ def diagnose(
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
     given, others = _listed(runs), _listed(held_out)
-    model = _model_of(model, ship, [*given, *others])
-    shares(model.ship, prior)  # before any work
-    train = given if _are_loaded(given) else load(given, model=model)
-    test = others if not others or _are_loaded(others) else load(others, model=model)
-    found = session.diagnose(train, test, prior, model, advance, seed, by)
+    of = _model_of(model if isinstance(model, Model) else None, ship, [*given, *others])
+    shares(of.ship, prior)  # before any work
+    train = given if _are_loaded(given) else load(given, model=of)
+    test = others if not others or _are_loaded(others) else load(others, model=of)
+    found = session.diagnose(train, test, prior, model or of, advance, seed, by)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -12,7 +12,17 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command_line import Done, command_of, inputs_of, out_options, parser, prior, run
+from .command_line import (
+    MAP,
+    Done,
+    command_of,
+    inputs_of,
+    map_option,
+    out_options,
+    parser,
+    prior,
+    run,
+)
 from .identification.methods import DEFAULT, METHODS, method
 from .progress import Advance
 from .result_folder import together
@@ -25,6 +35,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.csv",
     "coefficients.tex",
 )
+LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,30 +48,39 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from . import session  # only now: it takes a second to import
     from .gathering import gather
     from .identification import shares
-    from .model import Model, read_model, ship_with, write_model
+    from .initial_model import initial_model, proposing, write_map
+    from .model import ship_with, write_model
     from .prediction_error.output_fit import fitted
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
-    with together(options.out, FILES) as new:
+    with together(options.out, (*FILES, MAP)) as new:
         craft = ship_with(options.effects, options.ship)
-        model = read_model(options.model, craft) if options.model else Model(ship=craft)
+        model, fmu = initial_model(options.model, options.map, craft)
+        if fmu is not None and options.fit:
+            raise InputError("--fit is for a model of this project, not for an FMU")
         shares(craft, options.prior)
         by = method(options.method)
         paths = [*options.train, *options.test]
         runs = gather(paths, advance, options.anyway, model, options.horizon)
         train = len(options.train)
         model = fitted(runs[:train], model, options.prior, options.fit)
-        diagnosis = session.diagnose(runs[:train], runs[train:], options.prior, model, advance, by=by)
-        refused = "" if diagnosis.sound or options.allow_unstable else UNSOUND
-        if not refused:
+        with proposing():
+            diagnosis = session.diagnose(
+                runs[:train], runs[train:], options.prior, fmu or model, advance, by=by
+            )
+        refused = ""
+        if diagnosis.comparison.use is not None:
+            write_map(new / MAP, diagnosis.comparison.use.given.content())
+        elif not (diagnosis.sound or options.allow_unstable):
+            refused = UNSOUND
+        else:
             try:
                 write_model(new / MODEL, diagnosis.learned.model)
+                diagnosis.posterior.write(new / POSTERIOR)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        if not refused:
-            diagnosis.posterior.write(new / POSTERIOR)
-        files = [name for name in FILES if not (refused and name in (MODEL, POSTERIOR))]
+        files = [name for name in (*FILES, MAP) if (new / name).exists() or name in LATER]
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
         write_coefficients(content, new / CSV, new / TEX)
@@ -129,6 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"
     )
+    map_option(made)
     out_options(made, Path("results", "diagnosis"))
     return made
 

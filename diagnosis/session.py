@@ -19,7 +19,7 @@ from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
 from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
-from .foreign import Fmu, Use, evaluate_fmu, use_of
+from .foreign import Fmu, Use, as_model, by_fmu, evaluate_fmu, use_of
 from .identification import DEFAULT, Method, Prior, method
 from .identification.findings import Finding, Findings
 from .identification.prior import NominalPrior
@@ -47,7 +47,7 @@ class Comparison:
     Attributes:
         evaluations: one for each run.
         omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
-        use: how an FMU predicts the runs, of which no model error is known; None: it is no FMU.
+        use: how an FMU predicts the runs; None: it is no FMU.
     """
 
     evaluations: Sequence[Evaluation]
@@ -115,8 +115,8 @@ class Diagnosis:
 
     @property
     def sound(self) -> bool:
-        """Whether the learned model has a mass and stays bounded in closed loop."""
-        return bool(self.stability.safe)
+        """Whether the learned model has a mass and stays bounded in closed loop; not asked of an FMU."""
+        return self.comparison.use is not None or bool(self.stability.safe)
 
 
 @contextmanager
@@ -172,9 +172,11 @@ def evaluate(
     if isinstance(model, (str, Path)):
         model = Fmu(model)
     if isinstance(model, Fmu):
-        use, ship_model = use_of(model, [w.run for w in every]), nominal(every)
-        predicted = [evaluate_fmu(w, use, ship_model) for w in every]
-        return Comparison(predicted, [e.before.omega for e in predicted], use)
+        every = told_apart(every)
+        use = use_of(model, [w.run for w in every])
+        beside = as_model(every, use, nominal(every))
+        predicted = [evaluate_fmu(w, use, beside) for w in every]
+        return Comparison(predicted, [omega_std(w, beside) for w in every], use)
     before = model or nominal(every)
     known = [before, after, *every, *(w.smoothed for w in every)]
 
@@ -190,7 +192,7 @@ def diagnose(
     train: Sequence[WeakWindows],
     held_out: Sequence[WeakWindows] = (),
     prior: Prior = None,
-    model: Model | None = None,
+    model: Model | Fmu | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
@@ -202,7 +204,8 @@ def diagnose(
         held_out: runs to test on only.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
+            beside which the effects of that ship are tried.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -210,7 +213,8 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    start = model or nominal([*train, *held_out])
+    fmu = Fmu(model) if isinstance(model, (str, Path)) else model if isinstance(model, Fmu) else None
+    start = model if isinstance(model, Model) else nominal([*train, *held_out])
     prior_shares(start.ship, prior)  # before any work
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
@@ -221,6 +225,11 @@ def diagnose(
         )
     runs = told_apart([*train, *held_out])
     train, held_out = runs[: len(train)], runs[len(train) :]
+    use = None
+    if fmu is not None:
+        advance(f"what {fmu.name} does in measured states")
+        use = use_of(fmu, [w.run for w in runs])
+        start = as_model(runs, use, start)
     chosen = method(by) if isinstance(by, str) else by
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
     region = OperatingRegion.of(nu, start.ship.scale)
@@ -239,6 +248,8 @@ def diagnose(
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)
+    if use is not None:
+        comparison = replace(comparison, evaluations=by_fmu(comparison.evaluations, use), use=use)
 
     def bands(e: Evaluation) -> Bands | None:
         return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)

@@ -53,7 +53,7 @@ DIAGNOSIS_LAYERS = (
     ("report",),
     ("analysis",),
     ("open_loop",),
-    ("interactive", "command_line"),
+    ("interactive", "command_line", "initial_model"),
     (
         "compare",
         "learn",

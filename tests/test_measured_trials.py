@@ -99,7 +99,7 @@ def errors(files, ship, learned=None) -> list[Any]:
     model = diagnosis.Model(ship=craft)
     after = model if learned is None else model.plus(learned)
     runs = diagnosis.gather(files, model=model)
-    return [trial_errors(w.smoothed, model, after) for w in runs]
+    return [trial_errors(e) for e in diagnosis.evaluate(runs, model, after).evaluations]
 
 
 def test_the_model_of_the_ship_predicts_its_trial_and_another_one_does_not(sailed, tmp_path):

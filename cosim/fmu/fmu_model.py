@@ -152,6 +152,17 @@ class Model:
         return found
 
     @cached_property
+    def exact(self) -> frozenset[str]:
+        """Local variables whose start value the FMU begins with: states that can be set (2.2.7)."""
+        listed = self.description.modelVariables
+        exact = (v for v in listed if v.initial == "exact" and v.variability != "constant")
+        return frozenset(v.name for v in exact if (v.causality or "local") == "local")
+
+    def can_be_set(self, variable: Variable) -> bool:
+        """Whether a variable takes a value before the simulation."""
+        return variable.causality in ("parameter", "input") or variable.name in self.exact
+
+    @cached_property
     def feedthrough(self) -> dict[str, list[str]]:
         """Input -> outputs that depend on it at the same instant; all where the FMU lists none."""
         inputs = [v.name for v in self.variables.values() if v.causality == "input"]

@@ -31,8 +31,9 @@ def check_parameters(system: System, overrides: Overrides, beliefs: Overrides = 
     for path, given in beliefs:
         believe(system, path, given, chosen)
     for name, values in chosen.items():
-        known = system.models[name].variables
-        settable = {k: v for k, v in known.items() if v.causality in ("parameter", "input")}
+        model = system.models[name]
+        known = model.variables
+        settable = {k: v for k, v in known.items() if model.can_be_set(v)}
         system.parameters[name] = []
         for parameter, (value, where) in values.items():
             if parameter not in settable:

@@ -1,6 +1,6 @@
 """Evaluation of a model on a measured run, before and after something was learned."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from cosim import InputError
 from ..model import Model, WeakWindows, omega
 from ..smoothing import Smoothed
 from .bands import Bands
-from .windows import WindowErrors, Windows
+from .windows import WindowErrors, Windows, free_runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +57,7 @@ class Evaluation:
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
-        by_force: whether the force that the model lacks is known; else only predictions are, and
-            ``model`` tells no more than the ship.
+        foreign: how an FMU predicts the run from a time on, in place of the model; None: it is no FMU.
     """
 
     model: Model
@@ -69,7 +68,7 @@ class Evaluation:
     after: PredictionError
     bands: Bands | None = None
     learned: Model | None = None
-    by_force: bool = True
+    foreign: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None
 
     @property
     def smoothed(self) -> Smoothed:
@@ -78,6 +77,21 @@ class Evaluation:
     @property
     def name(self) -> str:
         return self.weak_windows.run.name
+
+    def free_runs(self, begin: float = -np.inf) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The run as it is predicted from one state, see :func:`.windows.free_runs`.
+
+        Args:
+            begin: the state is that of the last sample before [s], else of the first there is.
+
+        Returns:
+            Times (n,) [s], and the pose (n, 3) [m, m, rad] by the initial and by the learned model.
+        """
+        if self.foreign is not None:
+            time, pose = self.foreign(begin)
+            return time, [pose, pose]
+        models = [self.model, self.learned or self.model]
+        return free_runs(self.smoothed, models, begin)
 
 
 def evaluate_run(

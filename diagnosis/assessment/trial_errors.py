@@ -11,9 +11,8 @@ from cosim.trials import Passage, executes, measure, passage
 from fmus.ship import Ship
 
 from ..data import Run
-from ..model import Model
 from ..smoothing import Smoothed
-from .windows import free_runs
+from .evaluation import Evaluation
 
 APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
 NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")
@@ -57,27 +56,25 @@ def measured_passage(smoothed: Smoothed, ship: Ship) -> Passage:
     return found
 
 
-def trial_errors(smoothed: Smoothed, before: Model, after: Model) -> TrialErrors | None:
+def trial_errors(e: Evaluation) -> TrialErrors | None:
     """Measures of a trial: measured, and as two models predict it by the commands that were given.
 
     All three are from shortly before the first execute on, where the predictions begin; the instants
     at which the order is put over are those of the measurement.
 
     Args:
-        smoothed: the run.
-        before, after: the initial and the learned model.
+        e: the run.
 
     Returns:
         Name of a measure -> [measured, before, after]; ``overshoot`` and ``overshoot_time`` -> a list of
         these; None in place of what a track does not tell. None for a run that is no trial.
     """
-    run = smoothed.track.run
+    run, ship = e.weak_windows.run, e.model.ship
     if run.trial is None:
         return None
-    ship = before.ship
-    whole = measured_passage(smoothed, ship)
-    begin = executes(whole)[0] - APPROACH * smoothed.scale.time
-    time, predicted = free_runs(smoothed, [before, after], begin)
+    whole = measured_passage(e.smoothed, ship)
+    begin = executes(whole)[0] - APPROACH * e.smoothed.scale.time
+    time, predicted = e.free_runs(begin)
     rows = (whole.time >= time[0]) & (whole.time <= time[-1])
     seen = Passage(*(column[rows] for column in whole))
     found = [_measures(seen, run.trial, ship)]

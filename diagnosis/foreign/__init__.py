@@ -1,6 +1,7 @@
 """Models that this project did not make: FMUs for co-simulation, held against measured runs."""
 
-from .fmu_windows import Use, evaluate_fmu, use_of
+from .fmu_windows import Use, by_fmu, evaluate_fmu, use_of
 from .foreign_fmu import SUFFIX, Fmu, UnmatchedError
+from .inverse import as_model
 
-__all__ = ["SUFFIX", "Fmu", "UnmatchedError", "Use", "evaluate_fmu", "use_of"]
+__all__ = ["SUFFIX", "Fmu", "UnmatchedError", "Use", "as_model", "by_fmu", "evaluate_fmu", "use_of"]

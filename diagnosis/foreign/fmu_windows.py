@@ -8,7 +8,7 @@ it gives is laid onto the measured pose where the comparison begins, in place an
 
 import csv
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,13 @@ import numpy as np
 
 import cosim
 from cosim.process import scratch_folder
+from fmus.frames import rotate_to_body
 from fmus.ops import wrap
 
 from ..assessment.evaluation import Evaluation, PredictionError
 from ..assessment.windows import RunWindows, Windows, between_steps
 from ..data import UNITS, Column, Run, to_si
-from ..model import Model, WeakWindows
+from ..model import Model, WeakWindows, omega
 from ..model.prediction import at_rest
 from ..smoothing import Smoothed
 from .foreign_fmu import TAU, Fmu, commands_of
@@ -56,8 +57,7 @@ class Use:
     @property
     def placed(self) -> bool:
         """Whether predictions are laid onto the measured pose, for that cannot be set."""
-        outputs, start = self.map.told("outputs").keys(), self.map.told("start").keys()
-        return not (set(POSE) <= outputs and set(POSE) <= start)
+        return not set(POSE) <= self.map.told("outputs").keys() & self.map.told("start").keys()
 
     def run_in(self, smoothed: Smoothed) -> float:
         """The first part of a run that does not count [s]."""
@@ -71,6 +71,10 @@ class Use:
         unit = UNITS[self.quantity[signal]].get(column.unit or "", 1.0)
         return (values / unit - column.offset) / factor
 
+    def in_si(self, signal: str, values: Any) -> Any:
+        """Values of an output's variable as the signal in SI."""
+        return to_si(values, signal, self.map.told("outputs")[signal], self.quantity[signal])
+
     def told(self, smoothed: Sequence[Smoothed]) -> Iterator[str]:
         """How it predicts, a sentence each."""
         start = ", ".join(c.name for c in self.map.told("start").values())
@@ -79,7 +83,7 @@ class Use:
             began = "from rest" if not any(waits) else f"after a run-in of {max(waits):.3g} s"
             yield (
                 f"Its velocity cannot be set ({', '.join(VELOCITY)} of the map's start): runs are "
-                f"predicted as a whole, {began}."
+                f"predicted as a whole, {began}. The force that it lacks is that along its prediction."
             )
         else:
             yield f"Each window starts from the measured state, by {start}."
@@ -97,29 +101,54 @@ def use_of(fmu: Fmu, runs: Sequence[Run]) -> Use:
     return Use(fmu, fmu.given(runs), fmu.variables(runs), {**known["outputs"], **known["inputs"]})
 
 
-def evaluate_fmu(w: WeakWindows, use: Use, ship: Model) -> Evaluation:
+def evaluate_fmu(w: WeakWindows, use: Use, model: Model) -> Evaluation:
     """Hold an FMU against a run.
 
     Args:
         w: windows of the run.
         use: how the FMU predicts it.
-        ship: a model of the ship, of which only the outline is drawn.
+        model: that moves as the FMU does, from :func:`.inverse.as_model`.
 
     Raises:
         InputError: the FMU fails, or the run is too short for its run-in.
     """
-    smoothed = w.smoothed
-    windows = _windows(w, use)
-    unknown = np.full((w.middle.size, 3), np.nan)
+    windows, lacking = _windows(w, use), omega(w, model)
     if windows is None:
-        error = PredictionError(unknown, np.zeros((0, 3)), None)
-        return Evaluation(ship, w, None, False, error, error, by_force=False)
+        error = PredictionError(lacking, np.zeros((0, 3)), None)
+    else:
+        residuals = _residuals(w.smoothed, use, windows)
+        error = PredictionError(lacking, residuals, windows.summary(residuals))
+    return Evaluation(
+        model, w, windows, False, error, error, foreign=lambda begin: free_run(w.smoothed, use, begin)
+    )
+
+
+def by_fmu(evaluations: Sequence[Evaluation], use: Use) -> list[Evaluation]:
+    """Evaluations of a model that moves as an FMU does, with the FMU's own predictions before.
+
+    After that what was learned changes them by as much as it changes those of the model. Those of an FMU
+    whose velocity cannot be set are left as they are, as it has none in windows.
+    """
+    found = []
+    for e in evaluations:
+        if e.windows is not None and not use.whole:
+            own = _residuals(e.smoothed, use, e.windows)
+            learned = own + e.after.residuals - e.before.residuals
+            learned[:, 2] = wrap(learned[:, 2])
+            before = replace(e.before, residuals=own, errors=e.windows.summary(own))
+            after = replace(e.after, residuals=learned, errors=e.windows.summary(learned))
+            e = replace(e, before=before, after=before if e.after is e.before else after)
+        found.append(e)
+    return found
+
+
+def _residuals(smoothed: Smoothed, use: Use, windows: Windows) -> np.ndarray:
+    """Measured minus predicted pose (samples, 3) [m, m, rad], heading wrapped."""
     begins = np.searchsorted(smoothed.time, windows.start)
-    h, _ = RunWindows(smoothed, begins, begins, begins).step_and_commands
+    h = _step(smoothed)
     parts = [begins[k : k + TOGETHER] for k in range(0, begins.size, TOGETHER)]
     steps = int(np.ceil(windows.length / h - 1e-6))
-    motion = np.concatenate([_simulated(smoothed, use, part, h, steps) for part in parts], axis=-1)
-    pose = _track(motion, h) if np.isnan(motion[0, :3]).all() else motion[:, :3]
+    pose = np.concatenate([_poses(smoothed, use, part, h, steps) for part in parts], axis=-1)
     if use.placed:
         first = round(use.run_in(smoothed) / h)
         rows = np.searchsorted(smoothed.time, windows.start + first * h - 1e-9)
@@ -127,8 +156,62 @@ def evaluate_fmu(w: WeakWindows, use: Use, ship: Model) -> Evaluation:
     predicted = between_steps(pose[:, :, None], windows.sample_window, windows.since / h)[0]
     residuals = windows.measured - predicted
     residuals[:, 2] = wrap(residuals[:, 2])
-    error = PredictionError(unknown, residuals, windows.summary(residuals))
-    return Evaluation(ship, w, windows, False, error, error, by_force=False)
+    return residuals
+
+
+def free_run(smoothed: Smoothed, use: Use, begin: float) -> tuple[np.ndarray, np.ndarray]:
+    """A run as an FMU predicts it from one state; or, where that cannot be set, from its own start.
+
+    Args:
+        smoothed: the run.
+        use: how the FMU predicts it.
+        begin: the state is that of the last sample before [s], else of the first there is.
+
+    Returns:
+        (n,), times at equal distances [s], and (n, 3), pose [m, m, rad].
+    """
+    usable = np.flatnonzero(smoothed.used)
+    row = int(usable[max(np.searchsorted(smoothed.time[usable], begin, side="right") - 1, 0)])
+    start = 0 if use.whole else row
+    h = _step(smoothed)
+    steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
+    pose = _poses(smoothed, use, np.array([start]), h, steps)
+    first = round((smoothed.time[row] - smoothed.time[start]) / h)
+    if use.placed:
+        pose = _laid(pose, first, smoothed.eta[row][:, None])
+    return smoothed.time[start] + h * np.arange(first, steps + 1), pose[first:, :, 0]
+
+
+def whole_run(smoothed: Smoothed, use: Use) -> tuple[np.ndarray, np.ndarray]:
+    """Pose and velocity, each (n, 3) in SI, of an FMU along a run from its own start."""
+    h = _step(smoothed)
+    steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
+    motion = _simulated(smoothed, use, np.array([0]), h, steps)
+    pose = _laid(_pose(motion, h), 0, smoothed.eta[:1].T)[:, :, 0]
+    nu = motion[:, 3:, 0]
+    if np.isnan(nu).any():
+        rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
+        nu = np.column_stack([*rotate_to_body(pose[:, 2], rate[:, 0], rate[:, 1]), rate[:, 2]])
+    time = smoothed.time[0] + h * np.arange(steps + 1)
+    columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu]).T
+    found = np.column_stack([np.interp(smoothed.time, time, x) for x in columns])
+    return found[:, :3], found[:, 3:]
+
+
+def _step(smoothed: Smoothed) -> float:
+    """Step of predictions [s], which divides the sample period."""
+    none = np.zeros(0, int)
+    return RunWindows(smoothed, none, none, none).step_and_commands[0]
+
+
+def _poses(smoothed: Smoothed, use: Use, begins: np.ndarray, h: float, steps: int) -> np.ndarray:
+    """Pose (steps + 1, 3, w) from each of some rows on."""
+    return _pose(_simulated(smoothed, use, begins, h, steps), h)
+
+
+def _pose(motion: np.ndarray, h: float) -> np.ndarray:
+    """Pose of a motion (steps + 1, 6, w); where it has none, by its velocity from the origin on."""
+    return _track(motion, h) if np.isnan(motion[0, :3]).any() else motion[:, :3]
 
 
 def _windows(w: WeakWindows, use: Use) -> Windows | None:
@@ -183,26 +266,36 @@ def _simulated(smoothed: Smoothed, use: Use, begins: np.ndarray, h: float, steps
     for signal, column in outputs.items():
         for k, name in enumerate(names):
             values = log[f"{name}.{column.name}"]
-            motion[:, MOTION.index(signal), k] = to_si(values, signal, column, use.quantity[signal])
+            motion[:, MOTION.index(signal), k] = use.in_si(signal, values)
+    for signal, value in use.map.fixed.items():
+        motion[:, MOTION.index(signal)] = value
     return motion
 
 
 def _commands(run: Run, use: Use, time: np.ndarray) -> dict[str, np.ndarray]:
     """Input -> its values at some times [s]; a command acts from its time to the next."""
     row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
-    given = dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+    given = _commanded(run)
     inputs = use.map.told("inputs")
     return {c.name: use.in_variable(s, c, given[s][row]) for s, c in inputs.items()}
 
 
+def _commanded(run: Run) -> dict[str, np.ndarray]:
+    """Force or command -> its values (n,) in a run [SI]."""
+    return dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+
+
+def at_samples(smoothed: Smoothed) -> dict[str, np.ndarray]:
+    """Signal -> its values (n,) at the samples of a run [SI]: commands, and the smoothed motion."""
+    motion = np.concatenate([smoothed.eta, smoothed.nu], axis=1).T
+    return _commanded(smoothed.track.run) | dict(zip(MOTION, motion, strict=True))
+
+
 def _start(smoothed: Smoothed, use: Use, row: int) -> dict[str, float]:
     """Start value -> its value for a prediction from a row of a run on."""
-    run = smoothed.track.run
-    given = dict(zip(TAU, run.tau_cmd[row], strict=True))
-    given |= {s: values[row] for s, values in run.commanded.items()}
-    given |= dict(zip(MOTION, (*smoothed.eta[row], *smoothed.nu[row]), strict=True))
+    given = at_samples(smoothed)
     start = use.map.told("start")
-    return {c.name: float(use.in_variable(s, c, given[s])) for s, c in start.items()}
+    return {c.name: float(use.in_variable(s, c, given[s][row])) for s, c in start.items()}
 
 
 def _write(path: Path, time: np.ndarray, columns: dict[str, np.ndarray]) -> None:

@@ -30,7 +30,7 @@ class Fmu:
         self.path = Path(path).absolute()
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
-        self._model = Model(self.path)
+        self.model = Model(self.path)
 
     @property
     def name(self) -> str:
@@ -40,17 +40,17 @@ class Fmu:
     @property
     def sha256(self) -> str:
         """Of the file."""
-        return self._model.sha256
+        return self.model.sha256
 
     @property
     def isolated(self) -> bool:
         """Whether each instance needs a process of its own: where one process may hold only one."""
-        told = self._model.description.coSimulation
+        told = self.model.description.coSimulation
         return bool(told is not None and told.canBeInstantiatedOnlyOncePerProcess)
 
     def given(self, runs: Sequence[Run]) -> VariableMap:
         """The map of the file, else the one that names and units tell, for some runs."""
-        return self.told or propose(self._model, commands_of(runs))
+        return self.told or propose(self.model, commands_of(runs))
 
     def variables(self, runs: Sequence[Run]) -> VariableMap:
         """The map by which the FMU predicts some runs, with the units of its variables.
@@ -61,8 +61,8 @@ class Fmu:
         """
         where = f"'{self.map or self.name}'"
         given = self.given(runs)
-        found = completed(given, self._model, commands_of(runs), where)
-        lacking = unmatched(found, self._model)
+        found = completed(given, self.model, commands_of(runs), where)
+        lacking = unmatched(found, self.model)
         if lacking:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found

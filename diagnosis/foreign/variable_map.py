@@ -9,14 +9,15 @@ A map has the form of the file beside a measurement, once for inputs, outputs an
         "run_in": 60.0,
     }
 
-A variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
+A number in place of an output is one that the FMU lacks, as the sway of what moves ahead alone. A
+variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
 """
 
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -37,13 +38,18 @@ SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "forc
            "moment": "N.m", "shaft speed": "1/s", "command": "1"}  # fmt: skip
 
 
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+
+
 class VariableMap(BaseModel):
     """The content of a map file; a signal without a variable is null or missing."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     inputs: dict[str, Column | None] = Field(default_factory=dict, description="commands or forces")
-    outputs: dict[str, Column | None] = Field(default_factory=dict, description="pose or velocity")
+    outputs: dict[str, Column | Number | None] = Field(
+        default_factory=dict, description="pose or velocity; a number [SI] where it stays the same"
+    )
     start: dict[str, Column | None] = Field(default_factory=dict, description="start values")
     run_in: float | None = Field(
         default=None, ge=0.0, allow_inf_nan=False, description="time before a whole run counts [s]"
@@ -57,15 +63,25 @@ class VariableMap(BaseModel):
 
     def told(self, group: str) -> dict[str, Column]:
         """The signals of a group that have a variable."""
-        every: Mapping[str, Column | None] = getattr(self, group)
-        return {signal: column for signal, column in every.items() if column is not None}
+        every: Mapping[str, Column | float | None] = getattr(self, group)
+        return {signal: column for signal, column in every.items() if isinstance(column, Column)}
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The outputs that stay the same [SI]."""
+        return {signal: x for signal, x in self.outputs.items() if isinstance(x, float)}
+
+    @property
+    def known(self) -> set[str]:
+        """The outputs that have a variable, or stay the same."""
+        return {*self.told("outputs"), *self.fixed}
 
     def content(self) -> dict[str, Any]:
         """As JSON holds it: a signal with the name of its variable alone, where no more is to tell."""
         told = self.model_dump(exclude_defaults=True)
         for group in (g for g in GROUPS if g in told):
             for signal, column in told[group].items():
-                if column is not None and column.keys() == {"name"}:
+                if isinstance(column, dict) and column.keys() == {"name"}:
                     told[group][signal] = column["name"]
         return told
 
@@ -129,7 +145,7 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
     found: dict[str, Any] = {"run_in": given.run_in}
     for group, known in quantities(commands).items():
         variables = {v.name: v for v in _candidates(model, group)}
-        found[group] = {}
+        found[group] = dict(given.fixed) if group == "outputs" else {}
         for signal, column in given.told(group).items():
             place = f"{where}: {group}.{signal[:SHOWN]}"
             if signal not in known:
@@ -149,9 +165,9 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
 def unmatched(found: VariableMap, model: Model) -> list[str]:
     """What an FMU lacks in order to be held against a run, a part of a sentence each."""
     lacking = []
-    outputs = found.told("outputs")
-    if not any(set(group) <= outputs.keys() for group in (POSE, VELOCITY)):
-        missing = [s for s in (POSE if outputs.keys() & {"x", "y"} else MOTION) if s not in outputs]
+    outputs = found.known
+    if not any(set(group) <= outputs for group in (POSE, VELOCITY)):
+        missing = [s for s in (POSE if outputs & {"x", "y"} else MOTION) if s not in outputs]
         lacking.append(f"no output is {_with_hints(missing, model, 'outputs')}")
     if not found.told("inputs"):
         lacking.append(f"no input is {_with_hints(found.inputs, model, 'inputs')}")
@@ -167,8 +183,10 @@ def _with_hints(signals: Iterable[str], model: Model, group: str) -> str:
 
 def _candidates(model: Model, group: str) -> list[Variable]:
     """The variables of an FMU that can be in a group of a map."""
-    causality = {"inputs": ("input",), "outputs": ("output",), "start": ("parameter", "input")}[group]
-    return [v for v in model.variables.values() if v.causality in causality and v.type == "Real"]
+    real = [v for v in model.variables.values() if v.type == "Real"]
+    if group == "start":
+        return [v for v in real if model.can_be_set(v)]
+    return [v for v in real if v.causality == group.removesuffix("s")]
 
 
 def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]:

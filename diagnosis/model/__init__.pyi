@@ -1,6 +1,7 @@
 from .parameter_set import read_model as read_model
 from .parameter_set import ship_with as ship_with
 from .parameter_set import write_model as write_model
+from .ship_model import GivenForce as GivenForce
 from .ship_model import Model as Model
 from .ship_model import of_one_run as of_one_run
 from .ship_model import of_run as of_run

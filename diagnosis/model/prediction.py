@@ -19,7 +19,7 @@ from fmus.vessel import vessel
 from ..data.reading import Run
 from ..smoothing import Smoothed, idle
 from .ship_model import Model
-from .thrust import Response, commanded_shares, drive_of
+from .thrust import Integral, Response, commanded_shares, drive_of
 
 # s, times the scale of the ship; of the integration, where its error is far below the noise of any
 # measurement
@@ -79,6 +79,24 @@ class Starts:
             row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
             found.append(np.ones((*row.shape, settings)) if run.power is None else run.power[row])
         return np.concatenate(found, axis=1).transpose(0, 2, 1)
+
+    def given(self, model: Model) -> tuple[np.ndarray, np.ndarray] | None:
+        """What is given beside all else, mean over each step; None: nothing is.
+
+        Returns:
+            Force at rest (steps, 3, 1, w), and what velocities add (steps, 3, 3, 1, w).
+        """
+        if not model.given:
+            return None
+        found = []
+        for smoothed, rows in self.runs:
+            t, given = smoothed.time, model.given[smoothed.track.run.name]
+            table = np.concatenate([given.still[:, None], given.slope], axis=1)
+            edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
+            time = t[rows] + self.h * np.arange(self.steps + 1)[:, None]
+            found.append(np.diff(Integral(edges, table, table[0])(time), axis=0) / self.h)
+        together = np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
+        return together[:, 0], together[:, 1:]
 
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
@@ -158,7 +176,7 @@ def propagate(
     body, drive, h = model.hull, starts.drive(model), starts.h
     layout = drive.effects.layout
     power = starts.power(model.clock) if starts.powered else None
-    thrusters = drive
+    thrusters, beside = drive, starts.given(model)
     s = first_state(starts, body)
     yield s
     for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
@@ -166,8 +184,23 @@ def propagate(
             if power is not None:
                 thrusters = layout.powered(drive, power[k])
             now = layout.running(s.t + h, s.u, s.v, s.r, tuple(given), thrusters)
-            s = moved(s, Force(*layout.act(tuple(shares), now, thrusters)), body, h)
+            tau = Force(*layout.act(tuple(shares), now, thrusters))
+            if beside is None:
+                s = moved(s, tau, body, h)
+            else:
+                s = vessel.integrate(s, tau, body, h, _with(beside[0][k], beside[1][k]))
         yield s
+
+
+def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
+    """Law of the motion with a force (3, 1, w) beside all else, and its slopes (3, 3, 1, w)."""
+
+    def law(s: vessel.State, tau: Force, b: Any) -> Any:
+        pairs = zip(tau, still, slope, strict=True)
+        total = [f + g + row[0] * s.u + row[1] * s.v + row[2] * s.r for f, g, row in pairs]
+        return vessel.disturbed(s, Force(*total), b)
+
+    return law
 
 
 def by_clock(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,22 @@ from fmus.vessel.vessel import Prepared
 
 Values = Mapping[str, Any]
 OF_RUN = "@"  # between a parameter and the run in which alone a value of it holds
+
+
+class GivenForce(NamedTuple):
+    """A force on the hull over the samples of a run, linear in the velocity over ground.
+
+    Attributes:
+        still: (n, 3) [N, N, N m], at rest.
+        slope: (n, 3, 3), what one unit of u, v, r adds.
+    """
+
+    still: np.ndarray
+    slope: np.ndarray
+
+    def at(self, nu: np.ndarray) -> np.ndarray:
+        """(n, 3) [N, N, N m], at velocities (n, 3)."""
+        return self.still + np.einsum("nij,nj->ni", self.slope, nu)
 
 
 def of_run(parameter: str, run: str) -> str:
@@ -71,6 +87,7 @@ class Model:
         origin: the model that this one was made from by additions; None: itself. Its inertia is the one
             by which a model error is a force.
         runs: run -> parameter of the thrusters -> value that it has in that run alone.
+        given: run -> force at its samples that acts beside all else.
     """
 
     vessel: Mapping[str, float] = field(default_factory=dict)
@@ -79,6 +96,7 @@ class Model:
     ship: Ship = field(default_factory=ship)
     origin: "Model | None" = None
     runs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    given: Mapping[str, GivenForce] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         parts = (*self.ship.parameters, "measurement")
@@ -115,7 +133,7 @@ class Model:
             parameter, run = parameter_and_run(name)
             place = runs.setdefault(run, {}) if run else parts[self.owner(parameter)]
             place[parameter] = self.value(name) + value
-        return Model(**parts, ship=self.ship, origin=self.origin or self, runs=runs)
+        return replace(self, **parts, origin=self.origin or self, runs=runs)
 
     def declared(self, name: str) -> Variable:
         """The declaration of a parameter of any part of the ship.

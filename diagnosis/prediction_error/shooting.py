@@ -199,7 +199,7 @@ def _together(model: Model, steps: Mapping[str, float]) -> Model:
         values = np.full((len(steps) + 1, 1), model.value(name))
         values[k + 1] += step
         parts[model.owner(name)][name] = values
-    return Model(**parts, ship=model.ship, origin=model.origin, runs=model.runs)
+    return replace(model, **parts)
 
 
 def _slope(s: vessel.State, model: Model) -> np.ndarray:

@@ -22,10 +22,6 @@ from .unique_share import unique_shares
 
 T = TypeVar("T")
 Z95 = 1.96  # standard deviations, 95 % of a normal distribution
-NO_FORCE = (
-    "An FMU tells no force that it lacks: nothing is said here by speed, place or time, only how far "
-    "its predictions miss."
-)
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Effects on other sets of axes count as XYN in the files.
 AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
@@ -47,7 +43,7 @@ def comparison_content(
         windows=_lengths(comparison.evaluations),
         sensors=[s for e in comparison.evaluations for s in _sensors(e)],
         errors=[_errors(e) for e in comparison.evaluations],
-        where=_where(comparison),
+        where=result_keys.WhereResult.model_validate(comparison.before),
         **_provenance(comparison, model, files),
     )
 
@@ -98,6 +94,7 @@ def diagnosis_content(
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         where_after=result_keys.WhereResult.model_validate(comparison.after),
+        fmu=_fmu(comparison),
         stability=result_keys.StabilityResult.model_validate(diagnosis.stability),
         prior=dict(prior) if isinstance(prior, Mapping) else prior,
         seed=diagnosis.seed,
@@ -173,12 +170,6 @@ def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
     return result_keys.WindowLengths(prediction=max(lengths, default=w.horizon), model_error=w.width)
 
 
-def _where(comparison: Comparison) -> result_keys.WhereResult:
-    if comparison.use is None:
-        return result_keys.WhereResult.model_validate(comparison.before)
-    return result_keys.WhereResult(sentences=[NO_FORCE], regions=[], profiles=[])
-
-
 def _fmu(comparison: Comparison) -> result_keys.FmuResult | None:
     use = comparison.use
     if use is None:
@@ -233,10 +224,10 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
                 rms_before=rms(e.weak_windows, e.model, name),
                 rms_after=rms(e.weak_windows, e.learned or e.model, name),
             )
-            for name in (named(e.weak_windows, e.model) if e.by_force else ())
+            for name in (named(e.weak_windows, e.model) if e.foreign is None else ())
         },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
-        trial=trial_errors(e.smoothed, e.model, e.learned or e.model) if e.by_force else None,
+        trial=trial_errors(e),
     )
 
 

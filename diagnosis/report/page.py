@@ -168,8 +168,7 @@ def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawin
 
 def _free(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
     """The first run of which nothing was learned, else the first one."""
-    known = [e for e in evaluations if e.by_force]
-    for e in sorted(known, key=lambda e: not e.held_out)[:1]:
+    for e in sorted(evaluations, key=lambda e: not e.held_out)[:1]:
         caption = f"{_label(e, learned)}: predicted as a whole."
         yield _draw(tracks.free(e), "free", f"{e.name} predicted as a whole", caption)
 
@@ -187,7 +186,7 @@ def _places(
             if s.axis != "N":
                 pushes.setdefault(s.run, []).append((s.start or 0.0, s.end or 0.0))
     for k, e in enumerate(evaluations):
-        if not (e.by_force and e.weak_windows.middle.size):
+        if not e.weak_windows.middle.size:
             continue
         name = _label(e, learned)
         if placed:
@@ -203,7 +202,7 @@ def _omega(
     evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
     for k, e in enumerate(evaluations):
-        if not (e.by_force and e.weak_windows.middle.size):
+        if not e.weak_windows.middle.size:
             continue
         figure = figures.model_error(e, None if std is None else std[k], learned)
         yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_label(e, learned)}.")
@@ -212,7 +211,7 @@ def _omega(
 def _profiles(
     evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
 ) -> Iterator[Drawing]:
-    if not any(e.by_force and e.weak_windows.middle.size for e in evaluations):
+    if not any(e.weak_windows.middle.size for e in evaluations):
         return
     for k, quantity in enumerate(QUANTITIES):
         figure = figures.profile(quantity, binned_errors(quantity, evaluations, std), learned)

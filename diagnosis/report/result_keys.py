@@ -364,6 +364,7 @@ class DiagnosisContent(Part):
     errors: list[RunErrors]
     where: WhereResult
     where_after: WhereResult
+    fmu: FmuResult | None = None
     stability: StabilityResult
     prior: float | dict[str, float] | None
     seed: int

@@ -21,18 +21,22 @@ def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.compare``."""
     yield from _data(r.data)
     yield from _sensors(r.sensors)
+    yield from _where(r)
+    yield from _errors(r, learned=False)
+    yield from _files(r.files, out)
+
+
+def _where(r: ComparisonContent | DiagnosisContent) -> Iterator[RenderableType]:
     if r.fmu is not None:
         yield from _lines("How the FMU predicts", r.fmu.sentences)
     yield from _lines("Where the model fails", r.where.sentences)
-    yield from _errors(r, learned=False)
-    yield from _files(r.files, out)
 
 
 def show_diagnosis(r: DiagnosisContent, out: str) -> Iterator[RenderableType]:
     """Output of ``diagnosis.learn``."""
     yield from _data(r.data)
     yield from _sensors(r.sensors)
-    yield from _lines("Where the model fails", r.where.sentences)
+    yield from _where(r)
     yield from _lines("What is left without an explanation", [r.remainder.sentence])
     if not r.effects:
         yield from _lines("Finding", [r.sentence])
@@ -162,8 +166,7 @@ def _errors(r: ComparisonContent | DiagnosisContent, learned: bool) -> Iterator[
         forces.add_row(run, *(cell(b, a) for b, a in axes))
     when = ", before -> after" if learned else ""
     yield from _titled(f"Predictions over {_number(r.windows.prediction)} s miss by{when}", predictions)
-    if isinstance(r, DiagnosisContent) or r.fmu is None:
-        yield from _titled(f"Force that the model lacks{when}", forces)
+    yield from _titled(f"Force that the model lacks{when}", forces)
     measured = _table("run", "what is measured", "off by [SI]")
     for e in r.errors:
         for name, m in e.measured.items():

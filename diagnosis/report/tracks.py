@@ -11,7 +11,6 @@ from fmus.ship import Ship
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
-from ..assessment.windows import free_runs
 from .panels import breaks, figure_of, legend, plain_numbers
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
@@ -55,10 +54,9 @@ def free(e: Evaluation) -> "Figure":
     measured = e.smoothed.eta[:, :2]
     low, high = np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)
     far = MAX_REACH * (high - low).max()
-    models = [(e.model, BEFORE, "before" if e.learned else "predicted")]
-    models += [(e.learned, AFTER, "after")] if e.learned else []
-    _, poses = free_runs(e.smoothed, [model for model, _, _ in models])
-    paths = [(p[:, :2], colour, label) for p, (_, colour, label) in zip(poses, models, strict=True)]
+    before, after = e.free_runs()[1]
+    paths = [(before[:, :2], BEFORE, "before" if e.learned else "predicted")]
+    paths += [(after[:, :2], AFTER, "after")] if e.learned else []
     near = [np.clip(_finite(path), low - far, high + far) for path, _, _ in paths]
     figure, panel = _map(np.concatenate([measured, *near]))
     panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
