@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 
 SHIP = "Tool[@name='cybership']/Ship"  # among the vendor annotations
 TRIAL = "Tool[@name='cybership']/Trial"
-ESTIMATE = "Tool[@name='cybership']/Estimate"
+ESTIMATE = "Tool[@name='cybership']/Estimates/Estimate"
 MOST_CORNERS = 1000
 
 

@@ -74,20 +74,26 @@ def _units(root: Element, component: Component) -> None:
 
 
 def _annotations(root: Element, component: Component) -> None:
-    """A ship to draw, corners ``forward,starboard`` [m]; a trial; what parameters are estimates of."""
-    outline = component.outline
-    estimates = {v.name: v.estimate for v in component.variables if v.estimate is not None}
-    if outline is None and not component.trial and not estimates:
-        return
-    tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
-    if outline is not None:
-        corners = " ".join(f"{x!r},{y!r}" for x, y in outline.corners)
-        SubElement(tool, "Ship", name=outline.name, length=repr(outline.length), outline=corners)
+    """A ship to draw, corners ``forward,starboard`` [m]; a trial; what parameters are estimates of.
+
+    The schema allows one element in a Tool, and more than one Tool.
+    """
+    found = []
+    if component.outline is not None:
+        corners = " ".join(f"{x!r},{y!r}" for x, y in component.outline.corners)
+        told = {"name": component.outline.name, "length": repr(component.outline.length)}
+        found.append(Element("Ship", told, outline=corners))
     if component.trial:
-        SubElement(tool, "Trial", kind=component.trial)
-    for name, estimate in estimates.items():
-        told = {"parameter": name, "of": estimate.of, "change": str(estimate.change).lower()}
-        SubElement(tool, "Estimate", told)
+        found.append(Element("Trial", kind=component.trial))
+    if estimates := [(v.name, v.estimate) for v in component.variables if v.estimate is not None]:
+        found.append(Element("Estimates"))
+        for name, estimate in estimates:
+            told = {"parameter": name, "of": estimate.of, "change": str(estimate.change).lower()}
+            SubElement(found[-1], "Estimate", told)
+    if found:
+        annotations = SubElement(root, "VendorAnnotations")
+        for element in found:
+            SubElement(annotations, "Tool", name=TOOL).append(element)
 
 
 def _variables(root: Element, component: Component) -> None:
