@@ -10,7 +10,7 @@ from cosim.results import thin
 from ..assessment.evaluation import Evaluation
 from ..identification.shortlist import TIE
 from .content import Z95
-from .panels import breaks, figure_of, legend, plain_numbers, stack
+from .panels import breaks, figure_of, legend, panels_of, plain_numbers, stack
 from .profiles import BinnedError, Quantity
 from .result_keys import RankedResult
 from .shape import Curve
@@ -138,8 +138,7 @@ def _explained(share: float | None) -> str:
 
 def curve(c: Curve) -> "Figure":
     """A learned shape beside the nominal one."""
-    figure = figure_of(3.3)
-    panel = figure.subplots()
+    figure, (panel,) = panels_of(3.3)
     if c.covered is not None:
         for low, high in ((c.x[0], c.covered[0]), (c.covered[1], c.x[-1])):
             if high > low:

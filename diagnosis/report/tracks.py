@@ -11,7 +11,7 @@ from fmus.ship import Ship
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
-from .panels import breaks, figure_of, legend, plain_numbers
+from .panels import ABOVE, BELOW, LEFT, RIGHT, breaks, legend, panels_of, plain_numbers
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
 
@@ -122,8 +122,7 @@ def heading_bands(e: Evaluation) -> "Figure | None":
     inside = e.windows.sample_window == worst
     since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
     centre = np.interp(since, e.bands.since, predicted)
-    figure = figure_of(2.4)
-    panel = figure.subplots()
+    figure, (panel,) = panels_of(2.4)
     measured = centre + wrap(e.windows.measured[inside, 2] - centre)
     panel.plot(since, np.degrees(measured), color=INK, lw=3.4, alpha=0.3, label="measured")
     panel.plot(e.bands.since, np.degrees(predicted), color=AFTER, lw=1.5, label="after")
@@ -165,8 +164,7 @@ def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
 
 def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
     """Quartiles of the prediction error of some runs over the time since their windows began."""
-    figure = figure_of(3.6)
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, panels = panels_of(3.6, 2)
     known = [e for e in evaluations if e.windows is not None]
     windows = [e.windows for e in known if e.windows is not None]
     since = np.concatenate([w.since for w in windows])
@@ -188,7 +186,6 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> "Figure":
         panel.set_yscale("log")
         plain_numbers(panel.yaxis)
         panel.set_ylabel(label)
-    figure.align_ylabels(panels)
     panels[1].set_xlabel("time since the window began [s]")
     panels[1].set_xlim(0.0, edges[-1])
     if learned:
@@ -221,8 +218,9 @@ def _map(places: np.ndarray) -> "tuple[Figure, Axes]":
     low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
     middle, reach = 0.5 * (low + high), 0.5 * (high - low)
     half = np.maximum(reach + MARGIN * reach.max(), MIN_ASPECT * reach.max()) + 1e-3
-    figure = figure_of(float(np.clip(0.75 + (WIDTH - 0.75) * half[0] / half[1], 2.4, 5.2)))
-    panel = figure.subplots()
+    figure, (panel,) = panels_of(
+        float(np.clip(BELOW + ABOVE + (WIDTH - LEFT - RIGHT) * half[0] / half[1], 2.4, 5.2))
+    )
     panel.set_aspect("equal", adjustable="box")
     panel.set_xlim(middle[1] - half[1], middle[1] + half[1])
     panel.set_ylim(middle[0] - half[0], middle[0] + half[0])
