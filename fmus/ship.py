@@ -15,7 +15,7 @@ from .effects.effect import Device
 from .scale import REFERENCE, Scale
 from .ship_description import Description
 from .ships.expansion import effects_of_ship
-from .ships.sizing import sized
+from .sizing import sized
 from .thrusters.chain import FIVE, THREE
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel

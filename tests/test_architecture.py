@@ -74,7 +74,7 @@ FMUS_LAYERS = (
     ("scale",),
     ("ship_description",),
     ("hull_functions",),
-    ("frames", "hull"),
+    ("frames", "hull", "sizing"),
     ("effects",),
     ("actuators",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),

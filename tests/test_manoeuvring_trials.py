@@ -19,8 +19,8 @@ from cosim.trials import MEASURES, executes, measure, outcome, passage, sheet
 from cosim.trials.measures import limits
 from fmus.declare import flatten, packer, variables
 from fmus.ship import ship
-from fmus.ships.sizing import sized
 from fmus.signals import Force, Velocity
+from fmus.sizing import sized
 
 OTTER = SHIPS["otter"]
 DEG = math.radians(1.0)

@@ -18,7 +18,6 @@ from support.ships import (
     RACE_RUDDER,
     SHIPS,
     TABLE,
-    believed,
     described,
     part,
     scaled,
@@ -29,6 +28,7 @@ from fmus.actuators.actuation import actuators, allocate, axes, command_names, f
 from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total
+from fmus.actuators.steering import believed
 from fmus.declare import group_of, variables
 from fmus.effects import Running
 from fmus.hull import (

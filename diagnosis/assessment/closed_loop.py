@@ -1,7 +1,7 @@
 """Closed-loop simulation of a model on the reference paths, in one process and without files.
 
 A ship of another size sails the paths of its size, held by the same controller with gains of its size:
-observer, controller and path are made for it (:mod:`fmus.ships.sizing`).
+observer, controller and path are made for it (:mod:`fmus.sizing`).
 
 Vessel and thrusters have the parameters of a model; observer, controller and paths are those of
 ``scenarios/ellipse.json`` and ``scenarios/eight.json``, without noise and freezes.

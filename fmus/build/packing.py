@@ -25,7 +25,7 @@ from .finding import ROOT
 FACE = "fmus.fmi.slave"
 EFFECTS = "fmus.effects"
 # What an FMU for a described ship imports beside its component.
-SHIPS = ("fmus.ship_description", "fmus.ships.expansion", "fmus.ships.sizing")
+SHIPS = ("fmus.ship_description", "fmus.ships.expansion", "fmus.sizing")
 # Zip files cannot hold an earlier date, and any fixed one makes builds repeatable.
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -166,7 +166,7 @@ def _entry(module: str, package: str, own_file: Path | None, of: Ship) -> tuple[
         names = "Description, Part, Value"
         lines += [
             f"from {package}.ship_description import {names}",
-            f"from {package}.ships.{'expansion' if has_factory else 'sizing'} import "
+            f"from {package}.{'ships.expansion' if has_factory else 'sizing'} import "
             f"{'effects_of_ship' if has_factory else 'sized'}",
             f"from {module} import {'make' if has_factory else 'COMPONENT'}",
             f"SHIP = {of.description!r}",

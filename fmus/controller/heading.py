@@ -12,8 +12,12 @@ The moment is feed-forward of the reference, by the believed yaw inertia m and d
 
 which gives the closed loop the natural frequency w and the damping ratio zeta, unless the hull alone
 damps more. The speed wanted is the target's velocity along its heading; it passes a reference model of
-first order, and the surge force is feed-forward and a PI law of the same kind. All is tuned in
-frequencies, so it fits any ship whose inertia and damping are told.
+first order, and the surge force is feed-forward and a PI law of the same kind.
+
+Frequencies and rates are in prime units, as manoeuvring coefficients are: w' = w L / U, with L the
+length between perpendiculars and U the speed, of those wanted and estimated the larger one, and at
+least ``u_least``. As forces of hull, rudder and propeller go with U^2, the same numbers give ships of
+all sizes at all speeds the same track in their lengths; inertia and damping are told.
 
 Waves move the heading faster than a rudder should. With ``omega_wave``, the frequency at which they are
 met, the feedback of heading and rate passes a notch filter (Fossen 2021, ch. 13),
@@ -23,42 +27,67 @@ met, the feedback of heading and rate passes a notch filter (Fossen 2021, ch. 13
 which leaves the share ``zeta_wave`` of them there, and slow motion as it is.
 
 The integrals follow the force that acts where the thrusters tell it (anti-windup by back-calculation).
-The references start from the ship's own heading, rate and speed, so there is no jolt at the start.
+The references start from the ship's own heading, rate and speed, so there is no jolt at the start; a
+ship that is nearer to the speed wanted than its reference takes that along.
 
 An input that is NaN or infinite keeps its last finite value.
 """
 
 from typing import Annotated, Any, NamedTuple
 
-from ..declare import POSITIVE, Range, component, group_of, variables
+from ..actuators.steering import steerable
+from ..declare import POSITIVE, Component, Range, component, group_of, variables
+from ..effects import STANDARD, EffectSet
 from ..frames import rotate_to_body
 from ..hull import Damping, Inertia, mass_matrix
 from ..ops import Number, clip, cos, exp, fmax, sin, where, wrap
+from ..scale import REFERENCE_LENGTH
+from ..ship_description import Description
 from ..signals import Force, Target
+from ..sizing import sized
 from .backstepping import HELD, Demand, Errors, Inputs, acting
+from .commanding import commanding
 
-FREQUENCY = Range(0.001, 10.0)
+FREQUENCY = Range(0.01, 100.0)
 RATIO = Range(0.1, 10.0)
 OWN_AXIS = ("X_u", "X_absu_u", "X_uuu", "N_r", "N_absr_r")
 KnownDamping = group_of("KnownDamping", [v for v in variables(Damping) if v.name in OWN_AXIS])
 
 
 class Params(NamedTuple):
-    omega_psi: Annotated[float, "rad/s", "natural frequency of the heading", FREQUENCY] = 0.7
+    omega_psi_prime: Annotated[float, "1", "natural frequency of the heading, prime", FREQUENCY] = 2.0
     zeta_psi: Annotated[float, "1", "damping ratio of the heading", RATIO] = 1.0
-    omega_u: Annotated[float, "rad/s", "natural frequency of the speed", FREQUENCY] = 0.3
+    omega_u_prime: Annotated[float, "1", "natural frequency of the speed, prime", FREQUENCY] = 0.6
     zeta_u: Annotated[float, "1", "damping ratio of the speed", RATIO] = 1.0
     integral: Annotated[
         float, "1", "integral gain of the heading, over natural frequency and K_P", Range(0.0, 1.0)
     ] = 0.1
-    omega_d: Annotated[float, "rad/s", "natural frequency of the heading reference", FREQUENCY] = 1.0
+    omega_d_prime: Annotated[
+        float, "1", "natural frequency of the heading reference, prime", FREQUENCY
+    ] = 1.8
     zeta_d: Annotated[float, "1", "damping ratio of the heading reference", RATIO] = 1.0
-    r_max: Annotated[float, "rad/s", "rate at which the heading reference settles", POSITIVE] = 0.1
-    omega_u_d: Annotated[float, "rad/s", "pole of the speed reference", FREQUENCY] = 0.2
+    r_max_prime: Annotated[
+        float, "1", "rate at which the heading reference settles, prime", Range(0.001, 10.0)
+    ] = 0.5
+    omega_u_d_prime: Annotated[float, "1", "pole of the speed reference, prime", FREQUENCY] = 0.4
+    length: Annotated[float, "m", "length between perpendiculars, of prime units", Range(0.1)] = (
+        REFERENCE_LENGTH
+    )
+    u_least: Annotated[float, "m/s", "least speed of prime units", Range(0.001, 10.0)] = 0.1
     inertia: Inertia = Inertia()
     damping: Any = KnownDamping()
     omega_wave: Annotated[float, "rad/s", "frequency of the waves as met; 0: no filter", POSITIVE] = 0.0
     zeta_wave: Annotated[float, "1", "share of the waves that the filter leaves", Range(0.0, 1.0)] = 0.1
+
+
+class Tuning(NamedTuple):
+    """Frequencies and rates of the present speed [rad/s]."""
+
+    omega_psi: Any
+    omega_u: Any
+    omega_d: Any
+    r_max: Any
+    omega_u_d: Any
 
 
 class Reference(NamedTuple):
@@ -100,23 +129,38 @@ def wanted_speed(t: Target) -> Number:
     return t.x_t_dot * cos(t.psi_t) + t.y_t_dot * sin(t.psi_t)
 
 
-def follow(d: Reference, t: Target, p: Params, h: Number) -> Reference:
+def tuning(i: Inputs, p: Params) -> Tuning:
+    """The prime numbers at the speed wanted, or the estimated one if that is larger."""
+    U = fmax(fmax(abs(wanted_speed(i.target)), abs(i.estimate.u_hat)), p.u_least)
+    unit = U / p.length  # of rates, U / L [1/s]
+    return Tuning(
+        p.omega_psi_prime * unit,
+        p.omega_u_prime * unit,
+        p.omega_d_prime * unit,
+        p.r_max_prime * unit,
+        p.omega_u_d_prime * unit,
+    )
+
+
+def follow(d: Reference, i: Inputs, p: Params, at: Tuning, h: Number) -> Reference:
     """The reference after h [s]."""
-    w = p.omega_d
+    t, own, w = i.target, i.estimate.u_hat, at.omega_d
     k = 2.0 * p.zeta_d + 1.0
-    most = k * p.r_max / w  # the error at which the rate settles at r_max
+    most = k * at.r_max / w  # the error at which the rate settles at r_max
     error = clip(wrap(t.psi_t - d.psi), -most, most)
     jerk = w * (w * (w * error - k * d.r) - k * d.r_dot)
     r_dot = d.r_dot + h * jerk
     r = d.r + h * r_dot
-    return Reference(d.psi + h * r, r, r_dot, d.u + h * p.omega_u_d * (wanted_speed(t) - d.u))
+    speed = wanted_speed(t)
+    before = where((h > 0.0) & ((own - d.u) * (speed - own) > 0.0), own, d.u)  # the ship is ahead of it
+    return Reference(d.psi + h * r, r, r_dot, before + h * at.omega_u_d * (speed - before))
 
 
-def feedback(d: Reference, i: Inputs, p: Params) -> Number:
+def feedback(d: Reference, i: Inputs, p: Params, at: Tuning) -> Number:
     """K_P (psi_d - psi) + K_D (r_d - r) [N m]."""
     _, _, (_, _, m_r) = mass_matrix(p.inertia)
-    K_D = fmax(2.0 * p.zeta_psi * p.omega_psi * m_r + p.damping.N_r, 0.0)
-    K_P = m_r * p.omega_psi * p.omega_psi
+    K_D = fmax(2.0 * p.zeta_psi * at.omega_psi * m_r + p.damping.N_r, 0.0)
+    K_P = m_r * at.omega_psi * at.omega_psi
     return K_P * wrap(d.psi - i.estimate.psi_hat) + K_D * (d.r - i.estimate.r_hat)
 
 
@@ -136,14 +180,14 @@ def without_waves(n: Notch, moment: Number, p: Params) -> Number:
     return moment - 2.0 * (1.0 - p.zeta_wave) * w * (n.once - w * n.twice)
 
 
-def law(s: State, i: Inputs, p: Params) -> Outputs:
+def law(s: State, i: Inputs, p: Params, at: Tuning) -> Outputs:
     """The force of a state, and what it is made of."""
     e, t, d, c = i.estimate, i.target, s.reference, p.damping
     (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
     turn, r, u = wrap(d.psi - e.psi_hat), d.r - e.r_hat, d.u - e.u_hat
-    K_P_u = fmax(2.0 * p.zeta_u * p.omega_u * m_u + c.X_u, 0.0)
-    lX = m_u * p.omega_u_d * (wanted_speed(t) - d.u) + K_P_u * u + s.surge
-    lN = m_r * d.r_dot + without_waves(s.notch, feedback(d, i, p), p) + s.yaw
+    K_P_u = fmax(2.0 * p.zeta_u * at.omega_u * m_u + c.X_u, 0.0)
+    lX = m_u * at.omega_u_d * (wanted_speed(t) - d.u) + K_P_u * u + s.surge
+    lN = m_r * d.r_dot + without_waves(s.notch, feedback(d, i, p, at), p) + s.yaw
     nX = 0.0 - (c.X_u + c.X_absu_u * abs(d.u) + c.X_uuu * d.u * d.u) * d.u
     nN = 0.0 - (c.N_r + c.N_absr_r * abs(d.r)) * d.r
     ahead, aside = rotate_to_body(e.psi_hat, e.x_hat - t.x_t, e.y_hat - t.y_t)
@@ -161,15 +205,15 @@ def law(s: State, i: Inputs, p: Params) -> Outputs:
 def init(i: Inputs, p: Params) -> State:
     e = i.estimate
     s = State(Reference(e.psi_hat, e.r_hat, 0.0, e.u_hat))
-    return s._replace(tau=law(s, i, p).demand.tau)
+    return s._replace(tau=law(s, i, p, tuning(i, p)).demand.tau)
 
 
 def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
-    e = i.estimate
-    d = follow(s.reference, i.target, p, h)
+    e, at = i.estimate, tuning(i, p)
+    d = follow(s.reference, i, p, at, h)
     acted = acting(i.applied, s.tau)
     (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
-    w_u, w = p.omega_u, p.omega_psi
+    w_u, w = at.omega_u, at.omega_psi
     K_I_u, K_I = m_u * w_u * w_u, p.integral * w * m_r * w * w
     seen = where(e.frozen > 0.5, 0.0, h)  # of a frozen measurement nothing adds up
     s = State(
@@ -177,9 +221,9 @@ def step(s: State, i: Inputs, p: Params, h: Number) -> tuple[State, Outputs]:
         s.surge + seen * (K_I_u * (d.u - e.u_hat) + w_u * (acted.tau_X - s.tau.tau_X)),
         s.yaw + seen * (K_I * wrap(d.psi - e.psi_hat) + w * (acted.tau_N - s.tau.tau_N)),
         s.tau,
-        filtered(s.notch, feedback(d, i, p), p, h),
+        filtered(s.notch, feedback(d, i, p, at), p, h),
     )
-    out = law(s, i, p)
+    out = law(s, i, p, at)
     asked = Force(*[where(h > 0.0, new, old) for new, old in zip(out.demand.tau, s.tau, strict=True)])
     return s._replace(tau=asked), out
 
@@ -191,3 +235,16 @@ COMPONENT = component(
     step=step,
     held=HELD,
 )
+
+
+def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component | None:
+    """The autopilot of CyberShip Enterprise 1, or of a described ship.
+
+    Where thrusters get commands in place of a force, it gives these; None: none of them steers.
+    """
+    if ship is None:
+        return COMPONENT
+    autopilot = sized(COMPONENT, ship)
+    if ship.allocates:
+        return autopilot
+    return commanding(autopilot, ship) if steerable(ship) else None

@@ -15,6 +15,7 @@ from ..actuators.actuation import (
     total,
     variable,
 )
+from ..actuators.command_variables import commands_of, rates_of
 from ..actuators.response import (
     Past,
     Prepared,
@@ -24,7 +25,7 @@ from ..actuators.response import (
     prepared,
     thruster_effects,
 )
-from ..declare import POSITIVE, Component, Variable, bundle, group_of, redeclared, variables
+from ..declare import Component, Variable, bundle, group_of, redeclared, variables
 from ..effects import EffectSet
 from ..ops import Number, finite, when
 from ..ship_description import Description
@@ -41,36 +42,6 @@ class Applied(NamedTuple):
     tau_act_X: Annotated[float, "N", "surge force that acts"] = 0.0
     tau_act_Y: Annotated[float, "N", "sway force that acts"] = 0.0
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
-
-
-def commands_of(ship: Description) -> type[Any]:
-    """The commands of a ship as a group of variables."""
-    return group_of(
-        "Commands",
-        [
-            Variable(variable(f"{a.order}.{c.name}"), c.unit, f"{a.part.title}: {c.description}", 0.0)
-            for a in ordered(ship)
-            for c in a.law.commands
-        ],
-    )
-
-
-def rates_of(ship: Description) -> type[Any]:
-    """The limit of each command's rate."""
-    return group_of(
-        "Rate",
-        [
-            Variable(
-                f"plant_{a.order}_{c.name}_rate",
-                "1/s" if c.unit == "1" else f"{c.unit}2" if c.unit == "1/s" else f"{c.unit}/s",
-                f"{a.part.title}: limit of the rate of {c.name}; 0: none",
-                a.part.number(f"{c.name}_rate"),
-                POSITIVE,
-            )
-            for a in ordered(ship)
-            for c in a.law.commands
-        ],
-    )
 
 
 def outputs_of(ship: Description) -> type[Any]:

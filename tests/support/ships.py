@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from fmus.actuators.actuation import actuators, parameters
+from fmus.actuators.actuation import actuators
+from fmus.controller import heading
 from fmus.declare import Component, variables
 from fmus.ship import ship
 from fmus.ship_description import Description, Part, Value
@@ -53,11 +54,6 @@ def scaled(d: Description, ratio: float) -> Description:
     )
 
 
-def believed(ship: Description) -> tuple:
-    """What the allocation believes of a ship's actuators."""
-    return tuple(parameters(a, "", False)() for a in actuators(ship))
-
-
 PROPELLER = {"k_ahead": 0.5, "k_astern": 0.3, "n_max": 10.0, "n_min": -9.0}
 OPEN_WATER = {
     "diameter": 0.2, "K_T0": 0.4, "K_T1": -0.3, "K_T2": -0.1, "wake": 0.2, "thrust_deduction": 0.1,
@@ -96,10 +92,16 @@ SHIPS = {name: read_ship(find_ship(name)) for name in shipped_ships()} | {
     "every_law": EVERY_LAW,
     "commanded": COMMANDED,
 }
+COMMANDED_SHIPS = [name for name, d in SHIPS.items() if not d.allocates]
 PARTS = [f"{name} {part}" for name in SHIPS for part in ("vessel", "thrusters")]
+PARTS += [f"{name} autopilot" for name in COMMANDED_SHIPS]
 
 
 def component(name: str) -> Component:
     """One of :data:`PARTS`, such as ``otter vessel``."""
     of, which = name.split()
+    if which == "autopilot":
+        autopilot = heading.make(ship=SHIPS[of])
+        assert autopilot is not None
+        return autopilot
     return getattr(ship(description=SHIPS[of]), which)

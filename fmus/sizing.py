@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from ..declare import Component, Variable, flatten, packer, redeclared, variables
-from ..hull import Damping, Inertia
-from ..ops import Number
-from ..scale import Scale
-from ..ship_description import Description
+from .declare import Component, Variable, flatten, packer, redeclared, variables
+from .hull import Damping, Inertia
+from .ops import Number
+from .scale import Scale
+from .ship_description import Description
 
 
 def sized(component: Component, ship: Description) -> Component:
