@@ -473,6 +473,16 @@ class TestRoles:
         with pytest.raises(MetricsError, match=r"the log lacks boat\.n, "):
             compute(log, roles=self.OTHER)
 
+    def test_energy_is_the_integral_of_the_power_that_is_stated(self):
+        log = wild()
+        time = log["time"]
+        log |= {"thrusters.a_power": 2.0 + 0.0 * time, "thrusters.b_power": 3.0 * time}
+        roles = Roles(power=("thrusters.a_power", "thrusters.b_power"))
+        found = compute(log, 1.0, 5.0, roles)
+        first, last = found["from"], found["to"]
+        assert found["energy"] == pytest.approx(2.0 * (last - first) + 1.5 * (last**2 - first**2))
+        assert {k: v for k, v in found.items() if k != "energy"} == compute(log, 1.0, 5.0)
+
     @pytest.mark.slow
     def test_pictures_do_not_depend_on_names(self, tmp_path):
         log = wild()

@@ -153,7 +153,7 @@ def table(cases: Iterable[tuple[Case, str]], rows: Mapping[str, Row]) -> pandas.
         columns[name] = _plain([case.shown[name] for case, _ in ended])
     for metric in EVERY:
         if metric not in METRICS and not any(metric.name in rows[h].metrics for _, h in ended):
-            continue  # of trials, and these are none
+            continue  # of trials or of power, and there is none
         columns[metric.name] = [rows[h].metrics.get(metric.name, math.nan) for _, h in ended]
     columns["status"] = ["done" if rows[h].status == "done" else "failed" for _, h in ended]
     columns["message"] = [rows[h].message for _, h in ended]

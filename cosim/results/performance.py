@@ -39,6 +39,8 @@ METRICS = (
     Metric("from", "s", "first time used"),
     Metric("to", "s", "last time used"),
 )
+# Where the scenario states the role power.
+ENERGY = Metric("energy", "J", "energy that actuators take: integral of their power")
 OVER_TIME = ("ISE", "IAE", "W", "I_tau_dot", "IAEW", "IAEWWT", "IWWT")
 
 # Rounding that the ends of a window may have [s]; steps are at least 1e-6 s.
@@ -58,7 +60,7 @@ def needed(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
 def read(names: Iterable[str], roles: Roles = DEFAULT_ROLES) -> list[str]:
     """Those of the given column names that metrics use, in the given order."""
     given = list(names)
-    known = {*roles.of("pose", "velocity", "target"), *_commanded(given, roles)}
+    known = {*roles.of("pose", "velocity", "target", "power"), *_commanded(given, roles)}
     return [name for name in given if name in known]
 
 
@@ -85,7 +87,7 @@ def _commanded(log: Container[str], roles: Roles) -> tuple[str, ...]:
 
 def _require(log: Log, roles: Roles) -> tuple[str, ...]:
     """The columns that the metrics read, all present."""
-    names = ("time", *roles.of("pose", "velocity", "target"), *_commanded(log, roles))
+    names = ("time", *roles.of("pose", "velocity", "target", "power"), *_commanded(log, roles))
     missing = [name for name in names if name not in log]
     if missing:
         raise MetricsError(f"the log lacks {', '.join(missing)}")
@@ -239,7 +241,7 @@ def compute(
         roles: the columns to use.
 
     Returns:
-        The entries of :data:`METRICS`, in their order and units.
+        The entries of :data:`METRICS`, in their order and units, and :data:`ENERGY`.
 
     Raises:
         MetricsError: as for :func:`over_time`, or a metric is too large for a number.
@@ -253,12 +255,15 @@ def compute(
         found["e_pos_max"] = float(np.max(errors["e_pos"]))
         found["cross_track_rms"] = _rms(errors["cross_track"])
         found["heading_rms"] = _rms(errors["heading"])
+        if roles.power:
+            taken = np.sum([part[name] for name in roles.power], axis=0)
+            found[ENERGY.name] = float(_integral(np.diff(part["time"]), taken)[-1])
     found["from"] = float(part["time"][0])
     found["to"] = float(part["time"][-1])
-    infinite = [metric.name for metric in METRICS if not np.isfinite(found[metric.name])]
+    infinite = [name for name, value in found.items() if not np.isfinite(value)]
     if infinite:
         raise MetricsError(f"the run grows without bound: {', '.join(infinite)} too large to compute")
-    return {metric.name: found[metric.name] for metric in METRICS}
+    return {metric.name: found[metric.name] for metric in (*METRICS, ENERGY) if metric.name in found}
 
 
 def _rms(values: np.ndarray) -> float:
@@ -272,7 +277,7 @@ def table(metrics: Mapping[str, float]) -> Table:
     shown.add_column("value", justify="right", no_wrap=True)
     shown.add_column("unit", no_wrap=True)
     shown.add_column("meaning")
-    for name, unit, meaning in METRICS:
+    for name, unit, meaning in (*METRICS, ENERGY):
         if name in metrics:
             shown.add_row(name, f"{metrics[name]:.4g}", unit, meaning)
     return shown

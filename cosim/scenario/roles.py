@@ -57,6 +57,10 @@ class Roles(Strict):
         default=_axes("controller.omega_hat_"), description="estimated model error"
     )
 
+    power: tuple[str, ...] = Field(
+        default=(), description="power [W] that each actuator takes, such as thrusters.NAME_power"
+    )
+
     def of(self, *roles: str) -> tuple[str, ...]:
         """The columns of some roles, one after the other."""
         return tuple(column for role in roles for column in getattr(self, role))
@@ -64,12 +68,12 @@ class Roles(Strict):
     @property
     def metric_inputs(self) -> tuple[str, ...]:
         """All columns that metrics may read."""
-        return self.of("pose", "velocity", "target", "force", "requested_force")
+        return self.of("pose", "velocity", "target", "force", "requested_force", "power")
 
     @property
     def columns(self) -> tuple[str, ...]:
         """``time`` and all columns that metrics and pictures may read."""
-        tracking = self.of("pose", "velocity", "target", "requested_force", "force")
+        tracking = self.of("pose", "velocity", "target", "requested_force", "force", "power")
         forces = self.of("linear_force", "nonlinear_force", "acting_force", "model_error", "estimate")
         return ("time", *tracking, *forces)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from ..errors import InputError, nearest
-from ..results.performance import METRICS, Metric
+from ..results.performance import ENERGY, METRICS, Metric
 from .ship_passage import Passage
 from .stopping_trial import stopping_measures
 from .turning_circle import turning_circle
@@ -46,7 +46,7 @@ MEASURES = (
     Metric("rate_port", "rad/s", "steady rate at the full order to port"),
     Metric("loop_height", "rad/s", "difference of the rates at no order, coming from either side"),
 )
-EVERY = (*METRICS, *MEASURES)  # what metrics.json may hold
+EVERY = (*METRICS, ENERGY, *MEASURES)  # what metrics.json may hold
 
 KINDS: Mapping[str, Callable[[Passage, float], dict[str, float]]] = {
     "circle": turning_circle,
