@@ -1,12 +1,13 @@
 """Faults of sensors in simulated runs: are they named, and is none told of a clean run?
 
-``python -m benchmarks.sensor_faults [--seeds N] [--learn]``. Runs of CyberShip Enterprise 1 in closed
+``python -m benchmarks.sensor_faults [--seeds N] [--learn N]``. Runs of CyberShip Enterprise 1 in closed
 loop, with noise, freezes and spikes of the pose; velocity and yaw rate are measured too. Each fault
-is put into runs of the nominal ship, and of one with a hidden effect, which ``--learn`` looks for.
+is put into runs of the nominal ship, and of one with a hidden effect, for which ``--learn`` looks in
+some of the seeds.
 """
 
 import argparse
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import pi
@@ -86,8 +87,9 @@ def _moved(run: Run) -> Run:
     return _with(run, v=run.measured["v"] - PLACE * run.measured["r"])
 
 
+CLEAN = "none"
 FAULTS = {
-    "clean": Fault("", "", None, lambda run: run),
+    CLEAN: Fault("", "", None, lambda run: run),
     "clock wanders": Fault("time", "clock_rate", None, _wandering),
     "clock slow": Fault("time", "clock_rate", EVEN, lambda r: replace(r, time=r.time / EVEN)),
     "clock jumps": Fault("time", "clock_gap", LOST, _gap),
@@ -136,35 +138,48 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.sensor_faults", description=__doc__)
     parser.add_argument("--seeds", type=int, default=2, help="of manoeuvres, noise and faults (2)")
-    parser.add_argument("--learn", action="store_true", help="also learn the hidden effect")
+    parser.add_argument(
+        "--learn", type=int, default=0, metavar="N", help="learn the hidden effect too, in N seeds (0)"
+    )
     options = parser.parse_args(arguments)
     scale = ship().scale
-    print(f"{'fault':18}{'hidden':8}{'named':>8}{'others told':>13}  effect found")
-    for hidden in ({}, HIDDEN):
-        runs = list(voyages(options.seeds, hidden))
-        for name, fault in FAULTS.items():
-            broken = [(seed, fault.put(run)) for seed, run in runs]
-            found = [examine(run, scale).findings for _, run in broken]
-            told = sum(named(fault, f) for f in found)
-            other = sum(any((f.channel, f.kind) != fault[:2] for f in each) for each in found)
-            line = (
-                f"{name:18}{'X_u' if hidden else '-':8}{told:4}/{len(runs):<3}{other:9}/{len(runs):<3}"
-            )
-            if options.learn and hidden:
-                line += f"  {learned(broken)}"
-            print(line, flush=True)
+    fleets = [list(voyages(options.seeds, hidden)) for hidden in ({}, HIDDEN)]
+    total: Counter[str] = Counter()
+    print("| fault | named | with another told | effect found |")
+    print("|---|--:|--:|--:|")
+    for name, fault in FAULTS.items():
+        count: Counter[str] = Counter()
+        for _, run in (each for runs in fleets for each in runs):
+            found = examine(fault.put(run), scale).findings
+            count["runs"] += 1
+            count["named"] += named(fault, found)
+            count["another"] += any((f.channel, f.kind) != fault[:2] for f in found)
+        learn = [(seed, fault.put(run)) for seed, run in fleets[1] if seed < options.learn]
+        count += learned(learn)
+        line = _row(name, count)
+        print(line.replace(f"0/{count['runs']} |", "– |", 1) if name == CLEAN else line, flush=True)
+        total += count if name != CLEAN else Counter()
+    print(_row("all faults", total))
 
 
-def learned(runs: Sequence[tuple[int, Run]]) -> str:
-    """In how many seeds the hidden effect is first among what is learned."""
+def _row(name: str, count: Counter[str]) -> str:
+    """A line of the table."""
+    named, another = (f"{count[k]}/{count['runs']}" for k in ("named", "another"))
+    effect = f"{count['found']}/{count['learned']}" if count["learned"] else "–"
+    return f"| {name} | {named} | {another} | {effect} |"
+
+
+def learned(runs: Sequence[tuple[int, Run]]) -> Counter[str]:
+    """In how many seeds the hidden effect is first among what is learned, of how many."""
     by_seed = defaultdict(list)
     for seed, run in runs:
         by_seed[seed].append(run)
-    right = 0
+    count: Counter[str] = Counter()
     for each in by_seed.values():
         found = diagnosis.diagnose(diagnosis.gather(each)).learned.effects
-        right += bool(found) and "X_u" in (found[0].id, *found[0].alike)
-    return f"{right}/{len(by_seed)}"
+        count["learned"] += 1
+        count["found"] += bool(found) and "X_u" in (found[0].id, *found[0].alike)
+    return count
 
 
 if __name__ == "__main__":

@@ -193,6 +193,56 @@ def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 2
 
 
+def with_acceleration(run, ahead=0.0):
+    """The run with the acceleration of a place ahead, from its true motion."""
+    t = run.time
+    u, v = 0.25 + 0.08 * np.sin(0.21 * t), 0.03 * np.sin(0.37 * t + 1.0)
+    r = 0.12 * np.sin(0.29 * t) + 0.05 * np.sin(0.11 * t)
+    r_dot = 0.12 * 0.29 * np.cos(0.29 * t) + 0.05 * 0.11 * np.cos(0.11 * t)
+    a_x = 0.08 * 0.21 * np.cos(0.21 * t) - v * r - ahead * r**2
+    a_y = 0.03 * 0.37 * np.cos(0.37 * t + 1.0) + u * r + ahead * r_dot
+    noise = 2e-3 * np.random.default_rng(5).standard_normal((2, t.size))
+    return beside(run, a_x=a_x + noise[0], a_y=a_y + noise[1])
+
+
+def test_the_acceleration_is_held_against_the_velocity():
+    run = with_acceleration(made())
+    assert not told(run)
+    a_x, a_y = run.measured["a_x"], run.measured["a_y"]
+    scaled = told(beside(run, a_x=1.1 * a_x, a_y=1.1 * a_y))
+    assert [*scaled] == [("a_x", "scale")]
+    assert scaled["a_x", "scale"].value == pytest.approx(1.1, rel=0.03)
+    offset = examine(beside(run, a_x=a_x + 0.02), REFERENCE)
+    assert [(f.channel, f.kind, f.unit) for f in offset.findings] == [("a_x", "offset", "m/s2")]
+    assert offset.findings[0].value == pytest.approx(0.02, rel=0.1)
+    assert np.mean(offset.run.measured["a_x"] - a_x) == pytest.approx(0.0, abs=2e-3)
+    turned = told(beside(run, a_x=a_x - 0.1 * a_y, a_y=a_y + 0.1 * a_x))
+    assert [(key, f.unit) for key, f in turned.items()] == [(("a_y", "offset"), "rad")]
+    assert abs(turned["a_y", "offset"].value) == pytest.approx(0.1, rel=0.2)
+    place = told(with_acceleration(made(), 1.0))
+    assert [*place] == [("a_x", "place")]
+    assert place["a_x", "place"].value == pytest.approx(1.0, rel=0.2)
+
+
+def test_the_speed_through_water_is_held_against_that_over_ground():
+    run = made()
+    psi = run.pose[:, 2]
+    u, v = run.measured["u"], run.measured["v"]
+    north, east = 0.05, -0.03
+    water = {
+        "u_water": u - north * np.cos(psi) - east * np.sin(psi),
+        "v_water": v + north * np.sin(psi) - east * np.cos(psi),
+    }
+    right = examine(beside(run, **water), REFERENCE)
+    assert not right.findings
+    assert "0.05 m/s to north and -0.03 m/s to east" in " ".join(right.notes)
+    for names in (["u_water"], ["u_water", "v_water"]):
+        wrong = examine(beside(run, **{n: 1.08 * water[n] for n in names}), REFERENCE)
+        assert [(f.channel, f.kind) for f in wrong.findings] == [("u_water", "scale")]
+        assert wrong.findings[0].value == pytest.approx(1.08, rel=0.01)
+        np.testing.assert_allclose(wrong.run.measured["u_water"], water["u_water"], atol=5e-3)
+
+
 def test_of_a_pose_alone_nothing_can_be_said(tmp_path, capsys):
     run = made()
     columns = dict(

@@ -5,14 +5,23 @@ from collections.abc import Callable
 from fmus.scale import Scale
 
 from ..data import Run
+from .accelerations import accelerations
 from .motion import motion
 from .receivers import receivers
 from .sensor_finding import Examined
+from .through_water import through_water
 from .unit_faults import units
 from .wraps import wraps
 
 # Each receives a run and the ship's scale; in the order in which one needs what others repair.
-CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (wraps, units, receivers, motion)
+CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
+    wraps,
+    units,
+    receivers,
+    motion,
+    accelerations,
+    through_water,
+)
 
 
 def examine(run: Run, scale: Scale) -> Examined:

@@ -8,13 +8,11 @@ from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
 from ..data import Run, in_order
-from ..data.cleaning import noise
+from .blocked_fit import SURE, blocked_fit
 from .constants import LEAST_ANGLE, LEAST_DELAY, LEAST_PLACE, Kind
 from .sensor_finding import Z95, Examined, SensorFinding
 
-SURE = 4.0  # standard deviations of what is told; chosen as for all other channels
 FEWEST = 60  # rows that both have; chosen
-BLOCKS = 20  # parts of the run, whose spread gives the standard deviation; chosen
 
 
 def receivers(run: Run, scale: Scale) -> Examined:
@@ -53,7 +51,7 @@ def _places(run: Run, there: np.ndarray, scale: Scale) -> list[SensorFinding]:
     speed = np.concatenate(rotate_to_body(pose[:, 2], *np.gradient(pose[:, :2], time, axis=0).T))
     one, none = np.ones(time.size), np.zeros(time.size)
     columns = np.column_stack([np.concatenate([one, none]), np.concatenate([none, one]), -speed])
-    value, std = _blocked(columns, body, time)
+    value, std = blocked_fit(columns, body, time)
     period = float(np.median(np.diff(time)))
     kinds: list[tuple[str, Kind, str, float]] = [
         ("x_2", "place", "m", LEAST_PLACE * scale.length),
@@ -75,7 +73,7 @@ def _places(run: Run, there: np.ndarray, scale: Scale) -> list[SensorFinding]:
 def _offset(run: Run, apart: np.ndarray, there: np.ndarray) -> SensorFinding | None:
     """Of the second heading."""
     time = run.time[there]
-    (value,), (std,) = _blocked(np.ones((time.size, 1)), apart[there], time)
+    (value,), (std,) = blocked_fit(np.ones((time.size, 1)), apart[there], time)
     if abs(value) <= max(SURE * std, LEAST_ANGLE):
         return None
     text = f"the second heading is {np.degrees(value):.3g}° from the first"
@@ -88,17 +86,3 @@ def _finding(
     interval = value - Z95 * std, value + Z95 * std
     ends = float(time[0]), float(time[-1])
     return SensorFinding(channel, kind, value, unit, interval, *ends, text.format(value))
-
-
-def _blocked(columns: np.ndarray, right: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares, and the standard deviation by the jackknife over blocks of time."""
-    several = right.size // time.size
-    block = np.tile(np.minimum((BLOCKS * np.arange(time.size)) // time.size, BLOCKS - 1), several)
-
-    def solved(keep: np.ndarray) -> np.ndarray:
-        return np.linalg.lstsq(columns[keep], right[keep], rcond=None)[0]
-
-    value = solved(np.ones(right.size, bool))
-    parts = np.array([solved(block != k) for k in range(BLOCKS)])
-    std = np.sqrt((BLOCKS - 1) / BLOCKS * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
-    return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
