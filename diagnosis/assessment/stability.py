@@ -20,6 +20,7 @@ from fmus.vessel import vessel
 from fmus.vessel.vessel_effects import NONE
 
 from ..model import Model
+from ..parallel import for_each
 from ..progress import Advance, silent
 from .closed_loop import REFERENCES, bound_of, largest_distance
 
@@ -281,9 +282,9 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
 def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> bool:
     """Whether the reference controller keeps the ship on every path; adds to the notes how well."""
     bounded, bound = True, bound_of(model)
-    for reference in REFERENCES:
-        advance(f"closed loop on the {reference.name}")
-        distance = largest_distance(reference, model)
+    advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
+    distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
+    for reference, distance in zip(REFERENCES, distances, strict=True):
         if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue

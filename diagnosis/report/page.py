@@ -1,6 +1,7 @@
 """The report: content of a JSON file as text and tables, with figures of the runs, in one HTML page."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -64,18 +65,21 @@ def write_report(
     learned = any(e.after is not e.before for e in evaluations)
     diagnosis = content if isinstance(content, DiagnosisContent) else None
     advance("report: figures")
-    makers: dict[str, Callable[[], Iterator[Drawing]]] = {
-        "tracks": lambda: _tracks(evaluations, learned),
-        "where": lambda: _profiles(evaluations, omega_std, learned),
-        "omega": lambda: _omega(evaluations, omega_std, learned),
-        "growth": lambda: _growth(evaluations, learned),
-        "free": lambda: _free(evaluations, learned),
-        "place": lambda: _places(content, evaluations, learned),
-        "shapes": lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations),
-        "ranking": lambda: iter(()) if diagnosis is None else _ranking(diagnosis),
-    }
+    makers: list[tuple[str, Callable[[], Iterator[Drawing]]]] = [
+        *(("tracks", partial(_tracks, k, e, learned)) for k, e in enumerate(evaluations)),
+        ("where", lambda: _profiles(evaluations, omega_std, learned)),
+        ("omega", lambda: _omega(evaluations, omega_std, learned)),
+        ("free", lambda: _free(evaluations, learned)),
+        ("growth", lambda: _growth(evaluations, learned)),
+        ("place", lambda: _places(content, evaluations, learned)),
+        ("shapes", lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations)),
+        ("ranking", lambda: iter(()) if diagnosis is None else _ranking(diagnosis)),
+    ]
+    drawn: dict[str, list[Drawing]] = {}
     with style():
-        drawn = dict(zip(makers, for_each(lambda m: list(m()), [*makers.values()]), strict=True))
+        made = for_each(lambda maker: list(maker[1]()), makers)
+    for (place, _), drawings in zip(makers, made, strict=True):
+        drawn.setdefault(place, []).extend(drawings)
     advance("report: page")
     text = _template().render(
         content=content,
@@ -141,18 +145,17 @@ def _label(e: Evaluation, learned: bool) -> str:
     return f"{e.name} ({part})" if learned else e.name
 
 
-def _tracks(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
-    for k, e in enumerate(evaluations):
-        name = _label(e, learned)
-        yield _draw(tracks.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
-        worst = tracks.worst_window(e, learned)
-        if worst is not None:
-            caption = f"{name}: the worst window."
-            yield _draw(worst, f"worst-{k}", f"The worst window of {e.name}", caption)
-        heading = tracks.heading_bands(e)
-        if heading is not None:
-            caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
-            yield _draw(heading, f"heading-{k}", f"Heading in the worst window of {e.name}", caption)
+def _tracks(k: int, e: Evaluation, learned: bool) -> Iterator[Drawing]:
+    name = _label(e, learned)
+    yield _draw(tracks.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
+    worst = tracks.worst_window(e, learned)
+    if worst is not None:
+        caption = f"{name}: the worst window."
+        yield _draw(worst, f"worst-{k}", f"The worst window of {e.name}", caption)
+    heading = tracks.heading_bands(e)
+    if heading is not None:
+        caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
+        yield _draw(heading, f"heading-{k}", f"Heading in the worst window of {e.name}", caption)
 
 
 def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
