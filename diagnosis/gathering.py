@@ -156,6 +156,14 @@ def _refuse_rare(track: Track) -> None:
         )
 
 
+def _remedy(s: Smoothed) -> str:
+    """What may be done with a run whose pose is not that of a ship."""
+    if not s.track.run.measured:
+        return "leave the cells of false samples empty"
+    # A part of a log tells less of its clock than the whole.
+    return "repair the whole log by its other channels (cybership repair) and take the part of that"
+
+
 def _refuse_spikes(s: Smoothed) -> None:
     """Refuse a run of which too many samples are far from all others.
 
@@ -167,5 +175,5 @@ def _refuse_spikes(s: Smoothed) -> None:
         raise InputError(
             f"run '{s.track.run.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
             "than five standard deviations from where all others say the ship is: something is wrong "
-            f"with the pose or its time; leave the cells of false samples empty; {GO_ON}"
+            f"with the pose or its time; {_remedy(s)}; {GO_ON}"
         )

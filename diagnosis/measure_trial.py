@@ -15,7 +15,7 @@ import numpy as np
 from cosim import InputError
 from cosim.command import printable, program, run_command
 from cosim.results import read_options
-from cosim.trials import KINDS, Outcome, draw_trial, outcome, sheet, simulated_trial
+from cosim.trials import KINDS, Outcome, draw_trial, executes, outcome, sheet, simulated_trial
 
 from .command_line import Done, out_options, run
 from .progress import Advance
@@ -33,18 +33,19 @@ def trial(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     folder: Path = options.run
     if read_options(folder).trial is not None and options.trial is None:
-        found = simulated_trial(folder, options.start, options.stop)
+        found, notes = simulated_trial(folder, options.start, options.stop), []
     else:
-        found = _measured(options, advance)
+        found, notes = _measured(options, advance)
     with together(options.out, FILES) as new:
         found.write(new)
         draw_trial(found).save(new / FILES[1])
     title = f"Trial: {found.kind}, {folder.name}"
-    return Done(0, [sheet(found, title), printable(f"{' and '.join(FILES)} in {options.out}")])
+    written = f"{' and '.join(FILES)} in {options.out}"
+    return Done(0, [sheet(found, title), *map(printable, [*notes, written])])
 
 
-def _measured(options: argparse.Namespace, advance: Advance) -> Outcome:
-    """A measured trial, smoothed.
+def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, list[str]]:
+    """A measured trial, smoothed, and what its channels say of the measurement.
 
     Raises:
         InputError: it cannot be read, or nobody says which trial it is.
@@ -53,6 +54,7 @@ def _measured(options: argparse.Namespace, advance: Advance) -> Outcome:
     from .data import read
     from .gathering import gather
     from .model import Model, ship_with
+    from .sensors import sensor_lines
 
     craft = ship_with((), options.ship)
     found = read(options.run, of=craft)
@@ -65,7 +67,18 @@ def _measured(options: argparse.Namespace, advance: Advance) -> Outcome:
     low, high = options.start or -np.inf, np.inf if options.stop is None else options.stop
     found = replace(found.rows((found.time >= low) & (found.time <= high)), trial=kind)
     (windows,) = gather([found], advance, options.anyway, Model(ship=craft))
-    return outcome(kind, measured_passage(windows.smoothed, craft), length_of(craft))
+    length = length_of(craft)
+    whole = measured_passage(windows.smoothed, craft)
+    seen = outcome(kind, whole, length)
+    examined = windows.smoothed.sensors
+    notes = [] if examined is None else [*sensor_lines(examined.findings), *examined.notes]
+    way = whole.along(whole.time[0], executes(whole)[0])
+    if way < length:
+        notes.append(
+            f"only {way:.3g} m before the first execute: heading and speed there are of the last ship's "
+            f"length, {length:.3g} m; begin the trial earlier"
+        )
+    return seen, notes
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -74,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Measure a manoeuvring trial by the definitions of IMO and ISO: a turning circle, a "
         "zig-zag, a stop, a spiral; measured, or a run of cosim.",
         epilog="examples:  %(prog)s results/otter_circle\n"
-        "           %(prog)s sea_trial.csv --ship my_ship.toml --trial circle --from 489 --to 684\n"
+        "           %(prog)s sea_trial.csv --ship my_ship.toml --trial circle --from 470 --to 684\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

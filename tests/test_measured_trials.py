@@ -16,6 +16,7 @@ from cosim.trials import executes, measure, passage
 from diagnosis.assessment.trial_errors import trial_errors
 from diagnosis.compare import main as compare_main
 from diagnosis.measure_trial import main as trial_main
+from diagnosis.repair import main as repair_main
 
 ORDERS = ["thrusters.tau_cmd_X", "thrusters.tau_cmd_Y", "thrusters.tau_cmd_N"]
 COLUMNS = ["time", "vessel.x", "vessel.y", "vessel.psi", *ORDERS]
@@ -74,6 +75,16 @@ def test_the_option_says_which_trial_and_which_part(sailed, tmp_path):
     assert told["executes"] == pytest.approx([20.0], abs=0.11)
     assert "tactical_diameter" in told["measures"]
     assert "circle_speed" not in told["measures"]
+
+
+def test_a_part_without_an_approach_says_so(sailed, tmp_path):
+    file = as_file(sailed, "circle", tmp_path)
+    told = []
+    for start in (0, 19.5):
+        done = command(trial_main, file, "--ship", "otter", "--from", start, "--out", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        told.append("before the first execute: heading and speed there are of the" in done.stdout)
+    assert told == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -154,6 +165,45 @@ def test_zigzags_of_the_tanker(name, check, tmp_path):
     assert 3.0 < np.degrees(measured[0]) < 15.0
     assert (before == after).all()
     assert before == pytest.approx(measured, rel=0.6)
+
+
+VESSEL = {"time": "tvec", "x": "N", "y": "E", "psi": {"name": "psi", "unit": "deg"},
+          "r": {"name": "r", "unit": "deg/s"}, "azimuth.alpha": {"name": "Azi", "unit": "deg"},
+          "azimuth.n": {"name": "RPM", "unit": "rpm"}}  # fmt: skip
+
+
+@pytest.mark.slow
+@needs_data
+def test_a_log_with_a_wrong_clock_is_repaired_and_measured(tmp_path):
+    """Of a part of the log the zig-zag is refused with the remedy; of the repaired one it is measured."""
+    raw, repaired = tmp_path / "trial_1.csv", tmp_path / "repaired.csv"
+    raw.write_bytes((DATA / "gunnerus" / raw.name).read_bytes())
+    (tmp_path / f"{raw.name}.json").write_text(json.dumps({"columns": VESSEL}))
+
+    def tried(file, kind, begin, end):
+        part = "--from", begin, "--to", end, "--out", tmp_path / "out"
+        return command(trial_main, file, "--ship", "gunnerus", "--trial", kind, *part)
+
+    refused = tried(raw, "zigzag", 1600.0, 1779.0)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.stderr
+    assert "cybership repair" in refused.stderr
+    done = command(repair_main, raw, "--ship", "gunnerus", "--out", repaired)
+    assert done.returncode == 0, done.stderr
+    before, after = pd.read_csv(raw), pd.read_csv(repaired)
+    rows = np.searchsorted(before.tvec, [1600.0, 1779.0, 470.0, 684.0])
+    times = after.time.to_numpy()[rows]  # the repair leaves out four rows
+    zigzag = tried(repaired, "zigzag", *times[:2])
+    assert zigzag.returncode == 0, zigzag.stderr
+    told = json.loads((tmp_path / "out" / "trial.json").read_text())["measures"]
+    assert np.degrees(told["check_angle"]) == pytest.approx(10.0, abs=2.0)
+    assert 0.0 < np.degrees(told["overshoot_1"]) < 15.0
+    circle = tried(repaired, "circle", *times[2:])
+    assert circle.returncode == 0, circle.stderr
+    told = json.loads((tmp_path / "out" / "trial.json").read_text())["measures"]
+    assert told["tactical_diameter"] == pytest.approx(92.3, abs=1.5)
+    assert told["transfer"] == pytest.approx(40.6, abs=1.5)
+    assert told["advance"] == pytest.approx(104.2, rel=0.06)
+    assert np.degrees(told["circle_rate"]) == pytest.approx(2.83, abs=0.1)
 
 
 @needs_data
