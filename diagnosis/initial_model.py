@@ -16,7 +16,7 @@ from .model import Model, read_model
 
 def initial_model(
     path: str | Path | None,
-    map: str | Path | None,
+    map: str | Path | None,  # noqa: A002
     craft: Ship,
 ) -> tuple[Model, Fmu | None]:
     """The model of a ship by ``--model`` and ``--map``; with an FMU the nominal one, and the FMU.

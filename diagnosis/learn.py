@@ -35,6 +35,7 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.csv",
     "coefficients.tex",
 )
+FOUND = "found.fmu"  # of an FMU with what was found
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
 
 
@@ -46,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from . import session  # only now: it takes a second to import
+    from .foreign import write_wrapper
     from .gathering import gather
     from .identification import shares
     from .initial_model import initial_model, proposing, write_map
@@ -54,7 +56,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
-    with together(options.out, (*FILES, MAP)) as new:
+    with together(options.out, (*FILES, FOUND, MAP)) as new:
         craft = ship_with(options.effects, options.ship)
         model, fmu = initial_model(options.model, options.map, craft)
         if fmu is not None and options.fit:
@@ -69,9 +71,13 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
             diagnosis = session.diagnose(
                 runs[:train], runs[train:], options.prior, fmu or model, advance, by=by
             )
-        refused = ""
-        if diagnosis.comparison.use is not None:
-            write_map(new / MAP, diagnosis.comparison.use.given.content())
+        refused, use, notes = "", diagnosis.comparison.use, []
+        if use is not None:
+            told, map_of_it = write_wrapper(
+                new / FOUND, use, diagnosis.start, diagnosis.learned.model, runs
+            )
+            notes = [told]
+            write_map(new / MAP, (map_of_it or use.given).content())
         elif not (diagnosis.sound or options.allow_unstable):
             refused = UNSOUND
         else:
@@ -80,7 +86,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
                 diagnosis.posterior.write(new / POSTERIOR)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        files = [name for name in (*FILES, MAP) if (new / name).exists() or name in LATER]
+        files = [name for name in (*FILES, FOUND, MAP) if (new / name).exists() or name in LATER]
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
         write_coefficients(content, new / CSV, new / TEX)
@@ -89,7 +95,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         write_report(
             new / REPORT, content, comparison.evaluations, comparison.omega_std, advance, origin
         )
-    shown = [*show_diagnosis(content, str(options.out))]
+    shown = [*show_diagnosis(content, str(options.out)), *notes]
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)

@@ -80,7 +80,7 @@ FMUS_LAYERS = (
     ("controller", "guidance", "observer", "thrusters", "vessel"),
     ("watch",),
     ("ships",),
-    ("ship",),
+    ("ship", "addition"),
     ("fmi",),
     ("native",),
     ("build",),
@@ -102,18 +102,21 @@ PUBLIC = (
     "cosim.scenario",
     "cosim.system",
 )
-# diagnosis reads logs and parameter sets, asks FMUs for their variables, and plays a run to FMUs.
+# diagnosis reads logs and parameter sets, asks FMUs for their variables, plays a run to FMUs, and writes a
+# foreign one together with what was found beside it.
 PUBLIC_TO_DIAGNOSIS = (
     "cosim",
     "cosim.command",
     "cosim.errors",
+    "cosim.export",
     "cosim.fmu",
     "cosim.interrupts",
     "cosim.lazy",
     "cosim.process",
     "cosim.results",
-    "cosim.trials",
     "cosim.supervision",
+    "cosim.system",
+    "cosim.trials",
 )
 # What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
 # components and effects of a user's own. A module without ``__all__`` offers what it defines.

@@ -11,9 +11,9 @@ from support.measured import sail
 import diagnosis
 from cosim import InputError, Unit
 from cosim.fmu import Variable
-from diagnosis import Fmu, compare
+from diagnosis import Fmu, compare, learn
 from diagnosis.data import to_si
-from diagnosis.foreign import UnmatchedError, Use
+from diagnosis.foreign import UnmatchedError, Use, as_model, use_of, write_wrapper
 from diagnosis.foreign.variable_map import completed, propose
 from fmus.build import build, native_targets
 from fmus.build.start_values_file import read_starts
@@ -88,6 +88,8 @@ VELOCITY_MAP = {
     "v": {"name": "b", "unit": "kn"},
     "r": {"name": "c", "unit": "deg/s", "flip": True},
 }
+SAME = {name: name for name in ("x", "y", "psi", "u", "v", "r")}
+BEGUN = {name: f"{name}_0" for name in SAME}
 
 
 @pytest.fixture(scope="module")
@@ -357,3 +359,37 @@ def test_hidden_effects_are_found_beside_an_unknown_ship(
         assert found == pytest.approx(value, rel=0.1)
         held_out = d.comparison.evaluations[1]
         assert held_out.after.position < 0.1 * held_out.before.position
+
+
+def as_csv(path, run):
+    table = np.column_stack([run.time, run.pose, run.tau_cmd])
+    np.savetxt(path, table, delimiter=",", header="time,x,y,psi,tau_X,tau_Y,tau_N", comments="")
+    return str(path)
+
+
+@pytest.mark.slow
+def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
+    """It predicts a run of which nothing was learned; an FMU without an input for it is told which."""
+    hidden = VENDOR | {"delta_X_u": -2.0}
+    runs = [
+        as_csv(tmp_path / f"{k}.csv", sail(s, ship=hidden, seed=k)[0])
+        for k, s in enumerate((120.0, 60.0))
+    ]
+    out = tmp_path / "out"
+    assert learn.main([runs[0], "--model", str(vendor), "--out", str(out)]) == 0
+    content = json.loads((out / "diagnosis.json").read_text())
+    assert [e["id"] for e in content["effects"]] == ["X_u"]
+    assert {"found.fmu", "map.json"} <= {*content["files"]} == {p.name for p in out.iterdir()}
+    found = Fmu(out / "found.fmu", out / "map.json")
+    before, after = (errors(diagnosis.compare(runs[1], model=m)) for m in (vendor, found))
+    assert after[0] < 0.1 * before[0]
+
+
+def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, tmp_path):
+    model = mapped(folder, "vessel.fmu", tmp_path, inputs={"tau_Y": "tau_Y"}, outputs=SAME, start=BEGUN)
+    use = use_of(model, [w.run for w in runs])
+    start = as_model(runs, use, diagnosis.Model())
+    told, none = write_wrapper(tmp_path / "found.fmu", use, start, start.plus({"delta_X_u": -2.0}), runs)
+    assert none is None
+    assert "it needs tau_X or u_dot, which the map tells under 'beside'" in told
+    assert not (tmp_path / "found.fmu").exists()

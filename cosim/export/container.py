@@ -3,7 +3,7 @@ FMUs."""
 
 import logging
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,9 @@ from ..system.system import System
 from .portable import Part
 
 
-def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Path) -> None:
+def write_container(
+    system: System, parts: Sequence[Part], folder: Path, fmu: Path, expose: Collection[str] = ()
+) -> None:
     """Write the container; it keeps the order of stepping.
 
     All outputs are outputs of the container, called ``instance.variable``; so are inputs that nothing
@@ -26,6 +28,7 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
         parts: its instances; their FMUs are in the folder.
         folder: where the FMUs are; also used for scratch.
         fmu: the file to write.
+        expose: parameters that the container has as well.
 
     Raises:
         InputError: the toolbox is not installed, or cannot make the container.
@@ -60,7 +63,7 @@ def write_container(system: System, parts: Sequence[Part], folder: Path, fmu: Pa
                 c.target.variable.name,
             )
         for name in order:
-            _add_ports(container, system, by_name[name], files[name])
+            _add_ports(container, system, by_name[name], files[name], expose)
         container.make_fmu(
             fmu, system.scenario.step, sequential=system.scenario.algorithm == "gauss_seidel"
         )
@@ -95,7 +98,7 @@ def _without_claims(toolbox_container: Any, convention: str) -> Any:
     return Container
 
 
-def _add_ports(container: Any, system: System, part: Part, file: str) -> None:
+def _add_ports(container: Any, system: System, part: Part, file: str, expose: Collection[str]) -> None:
     """Ports of the container, and start values."""
     fed = {c.target.name for c in system.connections}
     given = {v.name for v, _ in system.parameters[part.name]}
@@ -103,7 +106,7 @@ def _add_ports(container: Any, system: System, part: Part, file: str) -> None:
         name = f"{part.name}.{v.name}"
         if v.causality == "output":
             container.add_output(file, v.name, name)
-        elif v.causality == "input" and name not in fed and v.name not in given:
+        elif name in expose or (v.causality == "input" and name not in fed and v.name not in given):
             container.add_input(name, file, v.name)
     for v, value in part.values:
         if v.type == "String" and any(c.isspace() for c in str(value)):

@@ -3,8 +3,9 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from ..errors import InputError
@@ -37,9 +38,21 @@ def export_ssp(system: System, archive: Path, drop: bool = False, overwrite: boo
     return _file(system, portable.SSP, archive, ".ssp", drop, write_ssp, overwrite)
 
 
-def export_fmu(system: System, fmu: Path, drop: bool = False, overwrite: bool = False) -> list[str]:
-    """Write a system as one container FMU; as :func:`export_ssp`."""
-    return _file(system, portable.CONTAINER, fmu, ".fmu", drop, write_container, overwrite)
+def export_fmu(
+    system: System,
+    fmu: Path,
+    drop: bool = False,
+    overwrite: bool = False,
+    expose: Collection[str] = (),
+) -> list[str]:
+    """Write a system as one container FMU; as :func:`export_ssp`.
+
+    Args:
+        system, fmu, drop, overwrite: as there.
+        expose: parameters, ``instance.variable``, that the container has as well.
+    """
+    write = partial(write_container, expose=expose)
+    return _file(system, portable.CONTAINER, fmu, ".fmu", drop, write, overwrite)
 
 
 def export_osp(system: System, folder: Path, drop: bool = False, overwrite: bool = False) -> list[str]:

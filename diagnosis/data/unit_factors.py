@@ -15,4 +15,5 @@ UNITS: dict[str, dict[str, float]] = {
     | dict.fromkeys(("deg/s", "°/s"), math.pi / 180.0)
     | {"deg/min": math.pi / 10800.0},
     "acceleration": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
+    "angular acceleration": {"rad/s2": 1.0, "deg/s2": 0.017453292519943295},
 }

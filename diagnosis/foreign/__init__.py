@@ -3,5 +3,16 @@
 from .fmu_windows import Use, by_fmu, evaluate_fmu, use_of
 from .foreign_fmu import SUFFIX, Fmu, UnmatchedError
 from .inverse import as_model
+from .wrapper import write_wrapper
 
-__all__ = ["SUFFIX", "Fmu", "UnmatchedError", "Use", "as_model", "by_fmu", "evaluate_fmu", "use_of"]
+__all__ = [
+    "SUFFIX",
+    "Fmu",
+    "UnmatchedError",
+    "Use",
+    "as_model",
+    "by_fmu",
+    "evaluate_fmu",
+    "use_of",
+    "write_wrapper",
+]

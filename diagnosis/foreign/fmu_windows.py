@@ -145,7 +145,7 @@ def by_fmu(evaluations: Sequence[Evaluation], use: Use) -> list[Evaluation]:
 def _residuals(smoothed: Smoothed, use: Use, windows: Windows) -> np.ndarray:
     """Measured minus predicted pose (samples, 3) [m, m, rad], heading wrapped."""
     begins = np.searchsorted(smoothed.time, windows.start)
-    h = _step(smoothed)
+    h = step_of(smoothed)
     parts = [begins[k : k + TOGETHER] for k in range(0, begins.size, TOGETHER)]
     steps = int(np.ceil(windows.length / h - 1e-6))
     pose = np.concatenate([_poses(smoothed, use, part, h, steps) for part in parts], axis=-1)
@@ -173,7 +173,7 @@ def free_run(smoothed: Smoothed, use: Use, begin: float) -> tuple[np.ndarray, np
     usable = np.flatnonzero(smoothed.used)
     row = int(usable[max(np.searchsorted(smoothed.time[usable], begin, side="right") - 1, 0)])
     start = 0 if use.whole else row
-    h = _step(smoothed)
+    h = step_of(smoothed)
     steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
     pose = _poses(smoothed, use, np.array([start]), h, steps)
     first = round((smoothed.time[row] - smoothed.time[start]) / h)
@@ -184,7 +184,7 @@ def free_run(smoothed: Smoothed, use: Use, begin: float) -> tuple[np.ndarray, np
 
 def whole_run(smoothed: Smoothed, use: Use) -> tuple[np.ndarray, np.ndarray]:
     """Pose and velocity, each (n, 3) in SI, of an FMU along a run from its own start."""
-    h = _step(smoothed)
+    h = step_of(smoothed)
     steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
     motion = _simulated(smoothed, use, np.array([0]), h, steps)
     pose = _laid(_pose(motion, h), 0, smoothed.eta[:1].T)[:, :, 0]
@@ -198,7 +198,7 @@ def whole_run(smoothed: Smoothed, use: Use) -> tuple[np.ndarray, np.ndarray]:
     return found[:, :3], found[:, 3:]
 
 
-def _step(smoothed: Smoothed) -> float:
+def step_of(smoothed: Smoothed) -> float:
     """Step of predictions [s], which divides the sample period."""
     none = np.zeros(0, int)
     return RunWindows(smoothed, none, none, none).step_and_commands[0]

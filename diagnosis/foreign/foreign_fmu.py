@@ -43,6 +43,12 @@ class Fmu:
         return self.model.sha256
 
     @property
+    def step(self) -> float | None:
+        """The step that it suggests [s]; None: it suggests none."""
+        suggested = self.model.description.defaultExperiment
+        return float(suggested.stepSize) if suggested is not None and suggested.stepSize else None
+
+    @property
     def isolated(self) -> bool:
         """Whether each instance needs a process of its own: where one process may hold only one."""
         told = self.model.description.coSimulation

@@ -22,7 +22,7 @@ from ..model import GivenForce, Model, WeakWindows
 from ..model.weak_form import acceleration, thrust_along
 from .fmu_windows import Use, at_samples, whole_run
 from .foreign_fmu import TAU
-from .short_steps import FIRST, SECOND, STEP, ShortSteps
+from .short_steps import FIRST, LONGEST, SECOND, STEP, ShortSteps
 from .variable_map import MOTION, POSE, VELOCITY
 
 SMALL = 1e-3  # of the ship's speeds; step of the slopes by velocity
@@ -42,7 +42,8 @@ def as_model(runs: Sequence[WeakWindows], use: Use, ship: Model) -> Model:
         InputError: the FMU refuses to be set to a measured state, or fails.
     """
     inputs, outputs = ([c.name for c in use.map.told(g).values()] for g in ("inputs", "outputs"))
-    with closing(ShortSteps(use.fmu.model, inputs, outputs, STEP * ship.ship.scale.time)) as steps:
+    h = min(use.fmu.step or STEP * runs[0].scale.time, LONGEST * runs[0].scale.time)
+    with closing(ShortSteps(use.fmu.model, inputs, outputs, h)) as steps:
         body = Model({**ship.vessel, **_inertia(steps, use, ship)}, ship.thrusters, ship=ship.ship)
         given = {w.run.name: _given(w, use, body, steps) for w in runs}
     return Model(body.vessel, body.thrusters, ship=ship.ship, given=given)
@@ -131,4 +132,5 @@ def _inertia(steps: ShortSteps, use: Use, ship: Model) -> dict[str, float]:
     i = ship.hull.hull.inertia
     heavier = {"X_udot": i.m - M[0, 0], "Y_vdot": i.m - M[1, 1], "N_rdot": i.I_z - M[2, 2]}
     across = i.m * i.x_g
-    return {**heavier, "Y_rdot": across - M[1, 2], "N_vdot": across - M[2, 1]}
+    coupled = {"Y_rdot": across - M[1, 2], "N_vdot": across - M[2, 1]}
+    return {name: float(value) for name, value in {**heavier, **coupled}.items()}

@@ -12,9 +12,10 @@ import numpy as np
 from cosim import InputError, SimulationError
 from cosim.fmu import LocalInstance, Memory, Model, Port
 
-# s, times the scale of the ship; length of a step. Chosen: half of the longest that our own hull takes;
-# of a motion at 1 rad/s the third-order differences are right to 1e-7.
+# s, times the scale of the ship; length of a step where the FMU suggests none. Chosen: half of the
+# longest that our own hull takes; of a motion at 1 rad/s third-order differences are right to 1e-7.
 STEP = 0.01
+LONGEST = 0.1  # s, times the scale; of one that it suggests. Chosen: such differences are right to 1e-4
 STEPS = 3
 # Derivatives at the first of four equally distant points, in units of the step.
 FIRST = np.array([-11.0, 18.0, -9.0, 2.0]) / 6.0

@@ -9,8 +9,9 @@ A map has the form of the file beside a measurement, once for inputs, outputs an
         "run_in": 60.0,
     }
 
-A number in place of an output is one that the FMU lacks, as the sway of what moves ahead alone. A
-variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
+Inputs for a force or an acceleration that acts beside all else stand in ``beside``, by ``tau_X`` or
+``u_dot`` and so on. A number in place of an output is one that the FMU lacks, as the sway of what moves
+ahead alone. A variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
 """
 
 import json
@@ -30,12 +31,17 @@ from ..data import QUANTITY, UNITS, Column, meaning
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
-GROUPS = ("inputs", "outputs", "start")
+PROPOSED = ("inputs", "outputs", "start")
+GROUPS = (*PROPOSED, "beside")
+# Inputs that act beside all else: forces, or accelerations.
+BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
+          "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
 SHOWN = 40  # characters of what a broken file holds that a message shows (chosen)
 # What marks a variable as a start value, before or behind the name of the signal.
 BEFORE, BEHIND = re.compile(r"(initial|init|start)_?"), re.compile(r"_?(0|initial|init|start)")
 SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
-           "moment": "N.m", "shaft speed": "1/s", "command": "1"}  # fmt: skip
+           "moment": "N.m", "shaft speed": "1/s", "command": "1", "acceleration": "m/s2",
+           "angular acceleration": "rad/s2"}  # fmt: skip
 
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
@@ -51,6 +57,9 @@ class VariableMap(BaseModel):
         default_factory=dict, description="pose or velocity; a number [SI] where it stays the same"
     )
     start: dict[str, Column | None] = Field(default_factory=dict, description="start values")
+    beside: dict[str, Column | None] = Field(
+        default_factory=dict, description="forces or accelerations that act beside all else"
+    )
     run_in: float | None = Field(
         default=None, ge=0.0, allow_inf_nan=False, description="time before a whole run counts [s]"
     )
@@ -109,7 +118,8 @@ def read_map(path: Path) -> VariableMap:
 def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Group -> signal -> quantity of all that a map may have, of a run with some commands."""
     motion = {signal: QUANTITY[signal] for signal in MOTION}
-    return {"inputs": dict(commands), "outputs": motion, "start": {**motion, **commands}}
+    start = {**motion, **commands}
+    return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
 
 
 def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
@@ -120,7 +130,8 @@ def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
         commands: of the runs: signal -> quantity.
     """
     found: dict[str, Any] = {}
-    for group, known in quantities(commands).items():
+    every = quantities(commands)
+    for group, known in ((g, every[g]) for g in PROPOSED):
         signals: dict[str, Column | None] = dict.fromkeys(known)
         meant = [(v, *_signal(v.name, group, known)) for v in _candidates(model, group)]
         for v, signal, flip in sorted(meant, key=lambda m: not _same(m[0].name, m[1])):
@@ -186,7 +197,7 @@ def _candidates(model: Model, group: str) -> list[Variable]:
     real = [v for v in model.variables.values() if v.type == "Real"]
     if group == "start":
         return [v for v in real if model.can_be_set(v)]
-    return [v for v in real if v.causality == group.removesuffix("s")]
+    return [v for v in real if v.causality == ("output" if group == "outputs" else "input")]
 
 
 def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]:

@@ -1,0 +1,154 @@
+"""The force that a ship's model has beyond another one's, beside an FMU of neither.
+
+What the diagnosis finds beside a foreign FMU is a change of a ship's model. :func:`addition` makes a
+component of it that lies between the commands and that FMU: it gets the commands and the FMU's motion,
+and gives the FMU its inputs, to which the force of the change is added,
+
+    M' nu_dot'(s, tau') - M nu_dot(s, tau) - (M' - M) nu_dot,
+
+s being the state, the strokes marking the changed model; nu_dot in the last term is that of the FMU
+itself, over its last step. An acceleration input gets M^-1 of that.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from .declare import Component, Variable, bundle, flatten, group_of, packer, variables
+from .frames import rotate_to_body, rotate_to_earth
+from .hull import inertia_force
+from .ops import Number, fmax, where, wrap
+from .ship import Ship
+from .signals import Force
+from .vessel.vessel import State, disturbed
+
+POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
+FORCE, ACCELERATION = ("tau_X", "tau_Y", "tau_N"), ("u_dot", "v_dot", "r_dot")
+LEAST = 1e-9  # s; keeps a division defined in a step of no length
+
+# Part of a ship -> parameter -> value.
+Values = Mapping[str, Mapping[str, float]]
+
+
+class Line(NamedTuple):
+    """A signal in SI as gain times an FMU's variable, and an offset."""
+
+    gain: float
+    offset: float = 0.0
+
+
+class Last(NamedTuple):
+    """The state of the FMU at the last step."""
+
+    t: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    psi: float = 0.0
+    u: float = 0.0
+    v: float = 0.0
+    r: float = 0.0
+    begun: float = 0.0
+
+
+class Params(NamedTuple):
+    """All is fixed."""
+
+
+def addition(
+    of: Ship,
+    before: Values,
+    after: Values,
+    told: Mapping[str, Line | float],
+    given: Mapping[str, Line],
+    beside: Mapping[str, Line],
+) -> Component:
+    """The component.
+
+    Args:
+        of: the ship.
+        before, after: parameters of its vessel and thrusters in the two models.
+        told: pose or velocity -> how the FMU tells it; a number: it stays the same.
+        given: force or command -> how the FMU takes it.
+        beside: force or acceleration -> how the FMU takes what acts beside all else; of an axis that is
+            missing here, the force is added to that which is given.
+    """
+    drive, commands = of.thrusters, variables(of.thrusters.inputs)[: -len(VELOCITY)]
+    hulls = [of.vessel.prepared(_params(of.vessel, v["vessel"])) for v in (before, after)]
+    plants = [_params(drive, v["thrusters"]) for v in (before, after)]
+    drives = [drive.prepared(p) for p in plants]
+    start = packer(drive.inputs)([v.start for v in variables(drive.inputs)])
+    columns = [name for name, line in told.items() if isinstance(line, Line)]
+    inputs = group_of(
+        "Inputs",
+        [*commands, *(Variable(f"from_{name}", "1", f"{name} of the FMU", 0.0) for name in columns)],
+    )
+    wires = [(f"to_{name}", line) for name, line in given.items()]
+    wires += [(f"add_{name}", line) for name, line in beside.items()]
+    outputs = group_of("Outputs", [Variable(n, "1", "to the FMU", 0.0) for n, _ in wires])
+    state = bundle(
+        "State", Last, before=drive.init(start, plants[0]), after=drive.init(start, plants[1])
+    )
+    acts = [v.name for v in variables(drive.outputs)].index("tau_act_X")
+
+    def init(i: Any, p: Any) -> Any:
+        return state()
+
+    def moving(s: Any, i: Any, h: Number) -> tuple[Any, tuple[Any, Any, Any]]:
+        """The FMU's state, and its acceleration over the last step."""
+        raw = dict(zip(columns, flatten(i)[len(commands) :], strict=True))
+        now = {n: x.gain * raw[n] + x.offset if isinstance(x, Line) else x for n, x in told.items()}
+        short, begun = fmax(h, LEAST), (s.begun > 0.5) & (h > LEAST)
+        if not all(n in now for n in POSE):
+            dx, dy = rotate_to_earth(s.psi, now["u"], now["v"])
+            now |= {"x": s.x + h * dx, "y": s.y + h * dy, "psi": s.psi + h * now["r"]}
+        if not all(n in now for n in VELOCITY):
+            u, v = rotate_to_body(now["psi"], (now["x"] - s.x) / short, (now["y"] - s.y) / short)
+            rates = (u, v, wrap(now["psi"] - s.psi) / short)
+            now |= {n: where(begun, x, 0.0) for n, x in zip(VELOCITY, rates, strict=True)}
+        pairs = zip((now[n] for n in VELOCITY), (s.u, s.v, s.r), strict=True)
+        nu_dot = [where(begun, (a - b) / short, 0.0) for a, b in pairs]
+        ship = State(now["x"], now["y"], now["psi"], now["u"], now["v"], now["r"], s.t)
+        return ship, (nu_dot[0], nu_dot[1], nu_dot[2])
+
+    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Any, Any]:
+        ship, nu_dot = moving(s, i, h)
+        given_now = flatten(i)[: len(commands)]
+        asked = packer(drive.inputs)([*given_now, ship.u, ship.v, ship.r])
+        forces, pasts = [], []
+        for hull, b, past in zip(hulls, drives, (s.before, s.after), strict=True):
+            past, out = drive.advance(past, asked, b, h)
+            tau = Force(*flatten(out)[acts : acts + 3])
+            forces.append(inertia_force(*disturbed(ship, tau, hull), hull.hull.inertia))
+            pasts.append(past)
+        heavier = [inertia_force(*nu_dot, hull.hull.inertia) for hull in hulls]
+        more = [b - a - (d - c) for a, b, c, d in zip(*forces, *heavier, strict=True)]
+        i11, i22, i23, i32, i33 = hulls[0].hull.inverse
+        faster = (i11 * more[0], i22 * more[1] + i23 * more[2], i32 * more[1] + i33 * more[2])
+        signals = dict(zip((v.name for v in commands), given_now, strict=True))
+        for axis, name in enumerate(FORCE):
+            if name in signals and not {name, ACCELERATION[axis]} & beside.keys():
+                signals[name] = signals[name] + more[axis]
+        extra = dict(zip((*FORCE, *ACCELERATION), (*more, *faster), strict=True))
+        values = [(signals[n] - x.offset) / x.gain for n, x in given.items()]
+        values += [(extra[n] - x.offset) / x.gain for n, x in beside.items()]
+        x, y, psi, u, v, r, t = ship
+        new = Last(t + h, x, y, psi, u, v, r, 1.0)
+        kept = [where(h > LEAST, a, b) for a, b in zip(new, s, strict=False)]
+        return state(*kept, *pasts), outputs(*values)
+
+    return Component(
+        name="found",
+        description="What was found beside an FMU",
+        params=Params,
+        state=state,
+        inputs=inputs,
+        outputs=outputs,
+        init=init,
+        step=step,
+        hold_nonfinite=False,
+        any_ship=False,
+    )
+
+
+def _params(component: Component, values: Mapping[str, float]) -> Any:
+    declared = variables(component.params)
+    return packer(component.params)([float(values.get(v.name, v.start)) for v in declared])
