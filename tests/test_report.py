@@ -553,9 +553,10 @@ def test_ships_have_their_own_outline_where_it_fits(name):
         spread = lengths * craft.vessel.outline.length
         _, panel = tracks._map(np.array([[0.0, 0.0], [spread, spread]]))
         tracks._ships(panel, np.array([[1.0, 2.0, 0.5]]), craft)
-        assert bool(panel.patches) is fits
-        for drawn in panel.patches:
-            corners = drawn.get_xy()[:-1]  # closed
+        drawn = [path for each in panel.collections for path in each.get_paths()]
+        assert bool(drawn) is fits
+        for path in drawn:
+            corners = path.vertices[:-1]  # closed
             apart = [np.linalg.norm(c[:, None] - c, axis=2) for c in (corners, outline)]
             assert apart[0] == pytest.approx(apart[1])
 

@@ -1,7 +1,7 @@
 """Panels, legends and axes that the figures of the report share."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,6 +55,13 @@ def legend(figure: "Figure", panel: "Axes", columns: int = 2) -> None:
     """A legend of one panel above the figure of :func:`panels_of`."""
     handles, labels = panel.get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper center", ncols=columns, columnspacing=1.4, borderpad=0.2)
+
+
+def polygons(panel: "Axes", corners: "Sequence[np.ndarray]", **look: Any) -> None:
+    """Closed lines, (m, 2) each, over the horizontal and the vertical axis; limits stay as they are."""
+    from matplotlib.collections import PolyCollection
+
+    panel.add_collection(PolyCollection(corners, **look), autolim=False)
 
 
 def plain_numbers(axis: "Axis") -> None:

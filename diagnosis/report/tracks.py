@@ -11,7 +11,7 @@ from fmus.ship import Ship
 
 from ..assessment.bands import LEVELS
 from ..assessment.evaluation import Evaluation, PredictionError
-from .panels import ABOVE, BELOW, LEFT, RIGHT, breaks, legend, panels_of, plain_numbers
+from .panels import ABOVE, BELOW, LEFT, RIGHT, breaks, legend, panels_of, plain_numbers, polygons
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
 
@@ -149,9 +149,8 @@ def worst_window(e: Evaluation, learned: bool) -> "Figure | None":
     figure, panel = _map(np.concatenate([measured, *near])[:, :2])
     panel.plot(measured[:, 1], measured[:, 0], color=INK, lw=3.4, alpha=0.3, label="measured")
     if e.bands is not None:
-        for level in LEVELS:
-            for ellipse in e.bands.ellipses(worst, level):
-                panel.fill(ellipse[:, 1], ellipse[:, 0], color=paths[-1][1], alpha=0.08, lw=0.0)
+        ellipses = [at for level in LEVELS for at in e.bands.ellipses(worst, level)[..., ::-1]]
+        polygons(panel, ellipses, facecolors=paths[-1][1], alpha=0.08, linewidths=0.0)
     for predicted, colour, label in paths:
         panel.plot(predicted[:, 1], predicted[:, 0], color=colour, lw=1.5, label=label)
         panel.plot(predicted[-1:, 1], predicted[-1:, 0], "o", color=colour, ms=4.5)
@@ -204,9 +203,9 @@ def _ships(panel: "Axes", poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(np.ptp(panel.get_xlim()), np.ptp(panel.get_ylim()))
     outline = of.vessel.outline
-    for corners in () if outline is None else hulls(poses, outline.corners):
-        if np.ptp(corners, axis=0).max() < SHIP * room:
-            panel.fill(*corners.T, fc="none", ec=INK, lw=0.5, alpha=0.4)
+    drawn = [] if outline is None else hulls(poses, outline.corners)
+    fitting = [corners for corners in drawn if np.ptp(corners, axis=0).max() < SHIP * room]
+    polygons(panel, fitting, facecolors="none", edgecolors=INK, linewidths=0.5, alpha=0.4)
 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
