@@ -87,6 +87,13 @@ def test_a_part_without_an_approach_says_so(sailed, tmp_path):
     assert told == [False, True]
 
 
+@pytest.mark.parametrize(("stop", "said"), [(45.0, False), (21.0, True)])
+def test_a_trial_that_measures_nothing_says_so(sailed, tmp_path, stop, said):
+    done = command(trial_main, sailed / "zigzag", "--to", stop, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert ("nothing more to measure" in done.stdout) == said
+
+
 @pytest.mark.parametrize(
     ("trial", "others", "arguments", "message"),
     [

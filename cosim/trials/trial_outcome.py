@@ -17,6 +17,8 @@ from ..scenario.roles import Roles
 from .measures import MEASURES, limits, measure
 from .ship_passage import Passage, executes, passage
 
+APPROACH = {"approach_speed"}  # what is measured before the order does anything
+NOTHING = "nothing more to measure: the run is too short, or the order does not do what the trial is of"
 DEGREES = {"rad": "°", "rad/s": "°/s"}  # how angles are shown
 
 
@@ -120,6 +122,8 @@ def simulated_trial(folder: Path, start: float | None = None, stop: float | None
 def sheet(found: Outcome, title: str = "") -> Table:
     """A trial for the terminal, as in a trial report: angles in degrees, distances also in lengths."""
     shown = Table(title=title or f"Trial: {found.kind}", title_justify="left", box=None, pad_edge=False)
+    if found.measures.keys() <= APPROACH:
+        shown.caption, shown.caption_justify = NOTHING, "left"
     shown.add_column("measure", style="bold", no_wrap=True)
     for name in ("value", "unit", "in L", "limit"):
         shown.add_column(name, justify="left" if name == "unit" else "right", no_wrap=True)
