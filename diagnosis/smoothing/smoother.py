@@ -230,13 +230,17 @@ def _smooth(track: Track, rows: np.ndarray, agreeing: Agreeing) -> Smoothed:
     derivatives = [basis(grid, time[inside], k) for k in range(3)]
     known = zip(derivatives, response[:3], strict=True)
     motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
-    std = [spread(np.sqrt(variance(b, inverse)), inside) for b in derivatives]
+    eta_std, eta_dot_std, eta_ddot_std = (
+        spread(np.sqrt(variance(b, inverse)), inside) for b in derivatives
+    )
     return Smoothed(
         track,
         spikes,
         *motion,
-        *std,
-        _body_std(motion.eta, *motion.nu.T[:2], *std[:2]),
+        eta_std,
+        eta_dot_std,
+        eta_ddot_std,
+        _body_std(motion, eta_std, eta_dot_std),
         sigma,
         sigma**2 / (smoothness * grid.spacing**5),
         response.delay,
@@ -278,11 +282,10 @@ def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     return found
 
 
-def _body_std(
-    eta: np.ndarray, u: np.ndarray, v: np.ndarray, eta_std: np.ndarray, eta_dot_std: np.ndarray
-) -> np.ndarray:
+def _body_std(motion: Motion, eta_std: np.ndarray, eta_dot_std: np.ndarray) -> np.ndarray:
     """Standard deviation of nu (n, 3), the heading's included; the channels are independent."""
-    c2, s2 = np.cos(eta[:, 2]) ** 2, np.sin(eta[:, 2]) ** 2
+    psi, (u, v) = motion.eta[:, 2], motion.nu.T[:2]
+    c2, s2 = np.cos(psi) ** 2, np.sin(psi) ** 2
     x, y = eta_dot_std[:, 0] ** 2, eta_dot_std[:, 1] ** 2
     turn = eta_std[:, 2] ** 2
     ahead, aside = c2 * x + s2 * y + v**2 * turn, s2 * x + c2 * y + u**2 * turn
