@@ -16,6 +16,7 @@ OURS = ("error: ", "interrupted")
 
 # Wall time in which an interrupt has to end a command [s], on a machine with a core to spare.
 PROMPT = 2.0
+TOLD = 2000  # characters of what a command that broke has printed last
 
 
 def line_faults(code: int, stderr: str, expected: set[int], late: float) -> list[str]:
@@ -31,7 +32,7 @@ def line_faults(code: int, stderr: str, expected: set[int], late: float) -> list
     if code not in expected:
         wrong.append(f"exit code {code}, not {sorted(expected)}")
     if "Traceback" in stderr or "should not have happened" in stderr:
-        wrong.append("a traceback")
+        wrong.append(f"a traceback: {stderr.strip()[-TOLD:]}")
     lines = [line for line in stderr.splitlines() if line.startswith(OURS)]
     if code and len(lines) != 1:
         wrong.append(f"{len(lines)} lines that say why")
