@@ -23,7 +23,7 @@ from ..sensors import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
-from .likelihood import adapt, likeliest
+from .likelihood import adapt
 from .measured_rates import ALONE, Agreeing, measured_rates
 from .outliers import TooFewError, robust
 from .penalised import Problem, solve
@@ -142,18 +142,12 @@ def smooth(track: Track, agreeing: Agreeing = ALONE) -> Smoothed:
     Raises:
         InputError: no stretch of it is dense enough, or its samples do not determine a motion.
     """
-    rows = np.flatnonzero(track.valid)
-    while True:
-        try:
-            found = _smooth(track, rows, agreeing)
-        except TooFewError as stretch:
-            rows = np.setdiff1d(rows, stretch.rows)
-        except LinAlgError as error:
-            raise InputError(
-                f"run '{track.run.name}': its samples do not determine a smooth motion ({error})"
-            ) from None
-        else:
-            return found
+    try:
+        return _smooth(track, agreeing)
+    except LinAlgError as error:
+        raise InputError(
+            f"run '{track.run.name}': its samples do not determine a smooth motion ({error})"
+        ) from None
 
 
 def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
@@ -161,16 +155,14 @@ def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
 
     Args:
         run: a smoothed run.
-        pose: (n, 3), that of the run by default; of another one with as much noise the smoothness is
-            found anew, and no sample is judged again.
+        pose: (n, 3), that of the run by default; another one is judged anew.
     """
-    rows, weights, stiffness, smoothness = run.pose_only
-    track = run.track if pose is None else replace(run.track, pose=pose)
-    p, origin = _problem(track, rows)
     if pose is None:
+        rows, weights, stiffness, smoothness = run.pose_only
+        p, origin = _problem(run.track, rows)
         p = p._replace(stiffness=stiffness)
     else:
-        p, smoothness = adapt(p, likeliest(p, weights, smoothness), weights)
+        _, _, origin, (p, smoothness, weights) = _judged(replace(run.track, pose=pose))
     time = run.time - run.time[0]
     where = within(p.grid, time)
     coefficients = solve(p, smoothness, weights).coefficients
@@ -200,14 +192,25 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     return Problem(dense, z, b, grid, roughness(grid), stiffness, sigma, average), origin
 
 
-def _smooth(track: Track, rows: np.ndarray, agreeing: Agreeing) -> Smoothed:
-    """Smooth a run by some of its rows."""
+def _judged(
+    track: Track,
+) -> tuple[np.ndarray, Problem, np.ndarray, tuple[Problem, np.ndarray, np.ndarray]]:
+    """Rows of a run in stretches that agree, their problem and origin, and :func:`.outliers.robust`."""
+    rows = np.flatnonzero(track.valid)
+    while True:
+        even, origin = _problem(track, rows)
+        local = np.full(3, LOCAL * (track.period / even.grid.spacing) ** 5)
+        try:
+            return rows, even, origin, robust(even, local)
+        except TooFewError as stretch:
+            rows = np.setdiff1d(rows, stretch.rows)
+
+
+def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     time, scale = track.run.time - track.run.time[0], track.scale
-    even, origin = _problem(track, rows)
+    rows, even, origin, (adapted, smoothness, weights) = _judged(track)
     grid, dense, sigma = even.grid, even.rows, even.sigma
     inside = within(grid, time)
-    local = np.full(3, LOCAL * (track.period / grid.spacing) ** 5)
-    adapted, smoothness, weights = robust(even, local)
     pose_only = PoseOnly(rows, weights, adapted.stiffness, smoothness)
     fit = solve(adapted, smoothness, weights)
     psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
