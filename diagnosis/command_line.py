@@ -67,7 +67,8 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--model",
         type=Path,
         metavar="FILE",
-        help="model to begin with, a parameter set .ssv or an .fmu (the nominal one)",
+        help="model to begin with: a parameter set .ssv, an .fmu, or a system, .ssp or scenario .json "
+        "(the nominal one)",
     )
     made.add_argument(
         "--effects",

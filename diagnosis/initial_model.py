@@ -10,7 +10,7 @@ from cosim import InputError
 from fmus.ship import Ship
 
 from .command_line import MAP
-from .foreign import SUFFIX, Fmu, UnmatchedError
+from .foreign import SUFFIXES, Fmu, UnmatchedError
 from .model import Model, read_model
 
 
@@ -25,10 +25,10 @@ def initial_model(
         InputError: no such file, or not what its name says.
     """
     path = None if path is None else Path(path)
-    if path is not None and path.suffix == SUFFIX:
+    if path is not None and path.suffix in SUFFIXES:
         return Model(ship=craft), Fmu(path, map)
     if map is not None:
-        raise InputError(f"--map tells the variables of an FMU: --model NAME{SUFFIX} is missing")
+        raise InputError(f"--map tells the variables of an FMU: --model NAME{SUFFIXES[0]} is missing")
     return Model(ship=craft) if path is None else read_model(path, craft), None
 
 

@@ -1,17 +1,22 @@
 """FMUs that are held against measured runs: ours as a foreign one, others by a map, and what is refused."""
 
 import json
+import os
+import re
+from pathlib import Path
 from types import SimpleNamespace
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from support.foreign import needs_compiler
 from support.measured import sail
 
 import diagnosis
 from cosim import InputError, Unit
 from cosim.fmu import Variable
-from diagnosis import Fmu, compare, learn
+from diagnosis import Fmu, Run, compare, learn
 from diagnosis.data import to_si
 from diagnosis.foreign import UnmatchedError, Use, as_model, use_of, write_wrapper
 from diagnosis.foreign.variable_map import completed, propose
@@ -393,3 +398,90 @@ def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, t
     assert none is None
     assert "it needs tau_X or u_dot, which the map tells under 'beside'" in told
     assert not (tmp_path / "found.fmu").exists()
+
+
+def test_a_system_is_held_against_a_run_as_one_fmu(runs, plain, nominal, tmp_path):
+    """Its thrusters act a step later than those of one model."""
+    pytest.importorskip("fmu_manipulation_toolbox")
+    axes = [(f"thrusters.tau_act_{a}", f"vessel.tau_{a}") for a in "XYN"]
+    content = {
+        "name": "ship", "step": 0.02, "stop": 40.0,
+        "fmus": {"thrusters": {"path": "thrusters.fmu"}, "vessel": {"path": "vessel.fmu"}},
+        "connections": [*axes, *((f"vessel.{v}", f"thrusters.{v}") for v in "uvr")],
+    }  # fmt: skip
+    (tmp_path / "ship.json").write_text(json.dumps(content))
+    found = diagnosis.compare(runs, model=tmp_path / "ship.json")
+    assert np.abs(lacking(found) - lacking(plain)).max() < 1e-4
+    assert errors(found) == pytest.approx(nominal, rel=0.1)
+    assert found.use.given.content()["start"]["u"] == "vessel.u_0"
+
+
+DESCRIPTION = "modelDescription.xml"
+UGLY = {
+    "model exchange only": ((r"<CoSimulation.*?/>", "<ModelExchange modelIdentifier='x'/>"), "", "model exchange"),
+    "FMI 3": (('fmiVersion="2.0"', 'fmiVersion="3.0"'), "", "for FMI 3.0"),
+    "other platform": (("^", ""), "binaries/", "cannot be loaded"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UGLY)
+@pytest.mark.parametrize("command", [compare, learn])
+def test_an_fmu_that_cannot_run_here_is_refused_in_one_line(
+    folder, csv, tmp_path, capsys, name, command
+):
+    (old, new), without, message = UGLY[name]
+    with ZipFile(folder / "vessel.fmu") as given, ZipFile(tmp_path / "ugly.fmu", "w") as made:
+        for entry in given.namelist():
+            content = given.read(entry)
+            if entry == DESCRIPTION:
+                content = re.sub(old, new, content.decode(), count=1, flags=re.S).encode()
+            if not (without and entry.startswith(without)):
+                made.writestr(entry, content)
+    assert command.main([csv, "--model", "ugly.fmu", "--out", "out"]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert message in line
+    assert not (tmp_path / "out").exists()
+
+
+OSCILLATOR = Path(os.environ.get("CYBERSHIP_FMUS", "")) / "damped_oscillator.fmu"
+# Of Dymola: a mass of 2 kg on a spring of 10 N/m and a damper of 1 N s/m, by its force and its states.
+MASS_MAP = {
+    "inputs": {"tau_X": "f"},
+    "outputs": {"x": "s", "u": "v", "y": 0.0, "psi": 0.0, "v": 0.0, "r": 0.0},
+    "start": {"x": "springDamper.s_rel", "u": "springDamper.v_rel"},
+}
+
+
+def swung(damper, seconds, seed):
+    """The mass as it was measured with another damper [N s/m], exact between commands."""
+    h, rng = 0.02, np.random.default_rng(seed)
+    t = h * np.arange(round(seconds / h))
+    force = 2.0 * np.sin(0.7 * t + seed) + 1.5 * rng.uniform(-1.0, 1.0, t.size)[(t / 3.0).astype(int)]
+    motion = np.zeros((3, 3))
+    motion[0, 1], motion[1] = 1.0, (-5.0, -0.5 * damper, 0.5)
+    step = expm(h * motion)[:2]
+    x = np.zeros((t.size, 2))
+    for k in range(t.size - 1):
+        x[k + 1] = step @ [*x[k], force[k]]
+    pose = np.column_stack([x[:, 0], 0.0 * t, 0.0 * t])
+    pose += [5e-4, 5e-4, 9e-4] * rng.standard_normal(pose.shape)
+    return Run(f"swung {seed}", t, pose, np.column_stack([force, 0.0 * t, 0.0 * t]))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not OSCILLATOR.is_file(), reason="no damped_oscillator.fmu: CYBERSHIP_FMUS names no folder"
+)
+@pytest.mark.parametrize(("damper", "verdict"), [(3.0, "found"), (1.0, "none")])
+def test_what_an_fmu_of_another_tool_lacks_is_found(tmp_path, damper, verdict):
+    """Its mass is seen in how it answers a force, its damper is too weak by 2 N s/m, or right."""
+    (tmp_path / "map.json").write_text(json.dumps(MASS_MAP))
+    runs = diagnosis.gather([swung(damper, 100.0, 1), swung(damper, 60.0, 2)], anyway=True)
+    d = diagnosis.diagnose(runs[:1], runs[1:], model=Fmu(OSCILLATOR, tmp_path / "map.json"))
+    assert d.verdict == verdict
+    assert d.start.mass[0, 0] == pytest.approx(2.0, rel=1e-3)
+    if verdict == "found":
+        (found,) = d.learned.effects
+        assert found.values == {"delta_X_u": pytest.approx(1.0 - damper, rel=0.05)}
+        held_out = d.comparison.evaluations[1]
+        assert held_out.after.position < 0.2 * held_out.before.position

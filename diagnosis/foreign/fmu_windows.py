@@ -52,7 +52,7 @@ class Use:
     @property
     def whole(self) -> bool:
         """Whether runs are predicted as a whole, for a velocity cannot be set."""
-        return not set(VELOCITY) <= self.map.told("start").keys()
+        return not set(VELOCITY) <= {*self.map.told("start"), *self.map.fixed}
 
     @property
     def placed(self) -> bool:

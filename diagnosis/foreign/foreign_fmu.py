@@ -1,17 +1,22 @@
 """An FMU that is to be held against measured runs, and which of its variables are what."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cosim
+from cosim.export import export_fmu
 from cosim.fmu import Model
+from cosim.system import prepare
 from fmus.ship import ship
 
 from ..data import OF_UNIT, QUANTITY, Run
 from .variable_map import VariableMap, completed, propose, read_map, unmatched
 
-SUFFIX = ".fmu"
+SYSTEMS = (".ssp", ".json")
+SUFFIXES = (".fmu", *SYSTEMS)
 TAU = ("tau_X", "tau_Y", "tau_N")
 
 
@@ -19,15 +24,19 @@ class Fmu:
     """An FMI 2.0 FMU for co-simulation that moves as a ship does.
 
     Args:
-        path: of the file.
+        path: of the file; a system, as an SSP archive or a scenario, is made one FMU, with what no
+            connection feeds as its inputs, and variables called ``instance.variable``.
         map: which of its variables is which signal, a file; None: as names and units tell.
 
     Raises:
-        InputError: no such FMU, or none for co-simulation by FMI 2.0.
+        InputError: no such FMU, or none for co-simulation by FMI 2.0; a system that one FMU cannot hold.
     """
 
     def __init__(self, path: str | Path, map: str | Path | None = None) -> None:  # noqa: A002
-        self.path = Path(path).absolute()
+        self._given = self.path = Path(path).absolute()
+        if self.path.suffix in SYSTEMS:
+            self._made = TemporaryDirectory(prefix="cosim_")
+            self.path = _as_one(self._given, Path(self._made.name))
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = Model(self.path)
@@ -35,12 +44,12 @@ class Fmu:
     @property
     def name(self) -> str:
         """Of the file."""
-        return self.path.name
+        return self._given.name
 
     @property
     def sha256(self) -> str:
         """Of the file."""
-        return self.model.sha256
+        return hashlib.sha256(self._given.read_bytes()).hexdigest()
 
     @property
     def step(self) -> float | None:
@@ -72,6 +81,24 @@ class Fmu:
         if lacking:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found
+
+
+def _as_one(path: Path, folder: Path) -> Path:
+    """A system as one FMU, whose parameters are all that the system leaves open."""
+    system = prepare(cosim.load_scenario(path))
+    try:
+        given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
+        every = {
+            f"{name}.{v.name}"
+            for name, model in system.models.items()
+            for v in model.variables.values()
+            if v.causality == "parameter" and v.type == "Real"
+        }
+        made = folder / f"{path.stem}.fmu"
+        export_fmu(system, made, expose=every - given)
+        return made
+    finally:
+        system.close()
 
 
 class UnmatchedError(cosim.InputError):

@@ -1,11 +1,11 @@
 """The force of an FMU beyond that of a ship's model, along measured runs, by inverse use.
 
 In the measured state and with the command of each sample, the FMU accelerates by nu_dot, and the model
-of the ship by another nu_dot. The difference, times the inertia, is a force over time, linear in the
-velocity about the measured one, that makes the model what the FMU is along the run. With it as a given
-force (:class:`diagnosis.model.GivenForce`) all that is done with a model can be done with the FMU: its
-model error, and the library's effects beside it. An FMU whose velocity cannot be set is asked along its
-own prediction of the run, in place of the measured one.
+of the ship by another nu_dot. The difference, times the inertia, is a force over time, linear in pose
+and velocity about the measured ones, that makes the model what the FMU is along the run. With it as a
+given force (:class:`diagnosis.model.GivenForce`) all that is done with a model can be done with the FMU:
+its model error, and the library's effects beside it. An FMU whose velocity cannot be set is asked along
+its own prediction of the run, in place of the measured one.
 
 Where the FMU takes forces, its inertia is that by which it answers them, and the model has the same, so
 that forces are the FMU's own; else that of the ship.
@@ -52,41 +52,43 @@ def as_model(runs: Sequence[WeakWindows], use: Use, ship: Model) -> Model:
 def _given(w: WeakWindows, use: Use, body: Model, steps: ShortSteps) -> GivenForce:
     """Force of an FMU beyond that of a model, along a run."""
     time = w.run.time
+    slope = np.zeros((time.size, 3, len(MOTION)))
     if use.whole:
         eta, nu = whole_run(w.smoothed, use)
-        return GivenForce(
-            _beyond(w, body, eta, nu, np.gradient(nu, time, axis=0)), np.zeros((time.size, 3, 3))
-        )
+        motion = np.concatenate([eta, nu], axis=1)
+        return GivenForce(_beyond(w, body, motion, np.gradient(nu, time, axis=0)), slope)
     known = np.flatnonzero(w.known)
-    eta, nu = (np.where(w.known[:, None], x, 0.0) for x in (w.smoothed.eta, w.smoothed.nu))
+    motion = np.concatenate([w.smoothed.eta, w.smoothed.nu], axis=1)
+    motion[~w.known] = 0.0
     signals = at_samples(w.smoothed)
 
-    def accelerations(rows: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """nu_dot (n, 3) of the FMU in some rows, else by interpolation."""
-        moving = {**signals, **dict(zip(VELOCITY, velocity.T, strict=True))}
-        found = [_acceleration(steps, use, {s: x[k] for s, x in moving.items()}) for k in rows]
-        return np.column_stack([np.interp(time, time[rows], x) for x in np.transpose(found)])
+    def beyond(rows: np.ndarray, moving: np.ndarray) -> np.ndarray:
+        """(n, 3), by accelerations of the FMU in some rows, and between them by interpolation."""
+        at = {**signals, **dict(zip(MOTION, moving.T, strict=True))}
+        found = [_acceleration(steps, use, {s: x[k] for s, x in at.items()}) for k in rows]
+        columns = [np.interp(time, time[rows], x) for x in np.transpose(found)]
+        return _beyond(w, body, moving, np.column_stack(columns))
 
-    force = _beyond(w, body, eta, nu, accelerations(known, nu))
+    force = beyond(known, motion)
     places = np.searchsorted(time[known], np.arange(time[known].min(), time[known].max(), w.every))
     sparse = known[np.unique(places)]
-    plain = _beyond(w, body, eta, nu, accelerations(sparse, nu))
-    slope = np.zeros((time.size, 3, 3))
-    for axis, speed in enumerate(w.scale.speeds):
-        faster = nu.copy()
-        faster[:, axis] += SMALL * speed
-        change = _beyond(w, body, eta, faster, accelerations(sparse, faster)) - plain
-        smooth = [np.interp(time, time[sparse], x) for x in change[sparse].T]
-        slope[:, :, axis] = np.column_stack(smooth) / (SMALL * speed)
+    plain = beyond(sparse, motion)
+    sizes = (w.scale.length, w.scale.length, 1.0, *w.scale.speeds)
+    for k, (name, size) in enumerate(zip(MOTION, sizes, strict=True)):
+        if name not in use.map.told("start"):
+            continue
+        moved = motion.copy()
+        moved[:, k] += SMALL * size
+        change = (beyond(sparse, moved) - plain)[sparse] / (SMALL * size)
+        slope[:, :, k] = np.column_stack([np.interp(time, time[sparse], x) for x in change.T])
     gone = ~w.known
     force[gone], slope[gone] = 0.0, 0.0
-    return GivenForce(force - np.einsum("nij,nj->ni", slope, nu), slope)
+    return GivenForce(force - np.einsum("nij,nj->ni", slope, motion), slope)
 
 
-def _beyond(
-    w: WeakWindows, body: Model, eta: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray
-) -> np.ndarray:
-    """Force (n, 3) that a model of a ship lacks in a motion."""
+def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
+    """Force (n, 3) that a model of a ship lacks in a motion (n, 6)."""
+    eta, nu = motion[:, :3], motion[:, 3:]
     free = acceleration(body, w.run.time, eta, nu)
     return (nu_dot - free) @ body.mass.T - thrust_along(w, body, nu)
 

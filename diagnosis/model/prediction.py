@@ -84,19 +84,19 @@ class Starts:
         """What is given beside all else, mean over each step; None: nothing is.
 
         Returns:
-            Force at rest (steps, 3, 1, w), and what velocities add (steps, 3, 3, 1, w).
+            Force (steps, 3, 1, w), and its slopes by pose and velocity (steps, 3, 6, 1, w).
         """
         if not model.given:
             return None
         found = []
         for smoothed, rows in self.runs:
             t, given = smoothed.time, model.given[smoothed.track.run.name]
-            table = np.concatenate([given.still[:, None], given.slope], axis=1)
+            table = np.concatenate([given.still[..., None], given.slope], axis=2)
             edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
             time = t[rows] + self.h * np.arange(self.steps + 1)[:, None]
             found.append(np.diff(Integral(edges, table, table[0])(time), axis=0) / self.h)
         together = np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
-        return together[:, 0], together[:, 1:]
+        return together[:, :, 0], together[:, :, 1:]
 
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
@@ -193,12 +193,11 @@ def propagate(
 
 
 def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
-    """Law of the motion with a force (3, 1, w) beside all else, and its slopes (3, 3, 1, w)."""
+    """Law of the motion with a force (3, 1, w) beside all else, and its slopes (3, 6, 1, w)."""
 
     def law(s: vessel.State, tau: Force, b: Any) -> Any:
-        pairs = zip(tau, still, slope, strict=True)
-        total = [f + g + row[0] * s.u + row[1] * s.v + row[2] * s.r for f, g, row in pairs]
-        return vessel.disturbed(s, Force(*total), b)
+        beside = still + sum(slope[:, k] * x for k, x in enumerate(s[:6]))
+        return vessel.disturbed(s, Force(*(f + g for f, g in zip(tau, beside, strict=True))), b)
 
     return law
 

@@ -21,19 +21,19 @@ OF_RUN = "@"  # between a parameter and the run in which alone a value of it hol
 
 
 class GivenForce(NamedTuple):
-    """A force on the hull over the samples of a run, linear in the velocity over ground.
+    """A force on the hull over the samples of a run, linear in pose and velocity over ground.
 
     Attributes:
-        still: (n, 3) [N, N, N m], at rest.
-        slope: (n, 3, 3), what one unit of u, v, r adds.
+        still: (n, 3) [N, N, N m], where these are zero.
+        slope: (n, 3, 6), what one unit of x, y, psi, u, v, r adds.
     """
 
     still: np.ndarray
     slope: np.ndarray
 
-    def at(self, nu: np.ndarray) -> np.ndarray:
-        """(n, 3) [N, N, N m], at velocities (n, 3)."""
-        return self.still + np.einsum("nij,nj->ni", self.slope, nu)
+    def at(self, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+        """(n, 3) [N, N, N m], at poses and velocities (n, 3)."""
+        return self.still + np.einsum("nij,nj->ni", self.slope, np.concatenate([eta, nu], axis=1))
 
 
 def of_run(parameter: str, run: str) -> str:

@@ -238,7 +238,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, nu))
     driven = driven @ model.effective_thrust.T
     if w.run.name in model.given:
-        driven = driven + w.smooth @ model.given[w.run.name].at(nu)
+        driven = driven + w.smooth @ model.given[w.run.name].at(eta, nu)
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 
