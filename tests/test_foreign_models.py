@@ -424,8 +424,7 @@ UGLY = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", UGLY)
-@pytest.mark.parametrize("command", [compare, learn])
+@pytest.mark.parametrize(("name", "command"), [*((name, compare) for name in UGLY), ("FMI 3", learn)])
 def test_an_fmu_that_cannot_run_here_is_refused_in_one_line(
     folder, csv, tmp_path, capsys, name, command
 ):
