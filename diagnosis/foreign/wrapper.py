@@ -92,7 +92,9 @@ def _scenario(
         (made,) = build(source, folder)
     wires = [(f"{FOREIGN}.{c.name}", f"{ADDED}.from_{s}") for s, c in groups["outputs"].items()]
     for group, mark in (("inputs", "to"), ("beside", "add")):
-        wires += [(f"{ADDED}.{mark}_{s}", f"{FOREIGN}.{c.name}") for s, c in groups[group].items()]
+        wires += [
+            (f"{ADDED}.{mark}_{_plain(s)}", f"{FOREIGN}.{c.name}") for s, c in groups[group].items()
+        ]
     h = step_of(runs[0].smoothed)
     return {
         "name": "wrapper",
@@ -104,12 +106,17 @@ def _scenario(
     }
 
 
+def _plain(signal: str) -> str:
+    """A signal's name as that of a variable: ``rudder_delta`` of ``rudder.delta``."""
+    return signal.replace(".", "_")
+
+
 def _lines(use: Use, columns: Mapping[str, Column]) -> dict[str, Line]:
     """Signal in SI by an FMU's variable."""
     found = {}
     for signal, c in columns.items():
         unit = UNITS[{**use.quantity, **BESIDE}[signal]].get(c.unit or "", 1.0)
-        found[signal] = Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
+        found[_plain(signal)] = Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
     return found
 
 
@@ -127,7 +134,7 @@ def _map(use: Use) -> VariableMap:
     exposed = _start_values(use)
     start = inside(use.map.told("start"))
     return VariableMap(
-        inputs={s: Column(name=f"{ADDED}.{s.replace('.', '_')}") for s in use.map.told("inputs")},
+        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in use.map.told("inputs")},
         outputs={**inside(use.map.told("outputs")), **use.map.fixed},
         start={s: c for s, c in start.items() if c.name in exposed},
         run_in=use.map.run_in,
