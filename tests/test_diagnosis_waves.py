@@ -2,22 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.signal import find_peaks, spectrogram
 from support.cases import in_part
 from support.measured import sail, smoothed
 
-from diagnosis.identification.waves import (
-    AROUND,
-    PEAK,
-    RATE,
-    SEGMENT,
-    find_waves,
-    followed,
-    inside,
-    peak,
-    segments_of,
-    stands_out,
-)
+from diagnosis.identification.waves import AROUND, PEAK, find_waves, followed, inside, peak
 from diagnosis.model import Model
 
 MASS = Model().reference_mass
@@ -71,19 +59,3 @@ def test_the_flank_of_a_slow_motion_is_no_peak(line, found):
     assert (highest.height > PEAK) == found
     if found:
         assert frequency[highest.row] == pytest.approx(0.5, abs=0.05)
-
-
-def test_spectra_are_those_of_scipy():
-    signal = np.random.default_rng(3).standard_normal((2400, 3)).cumsum(axis=0)
-    length = round(SEGMENT * RATE)
-    expected = spectrogram(signal, RATE / 2.0, nperseg=length, axis=0, detrend="linear")
-    frequency, power = segments_of([signal], 2.0)
-    np.testing.assert_allclose(frequency, expected[0])
-    np.testing.assert_allclose(power, expected[2], rtol=1e-9)
-
-
-def test_what_stands_out_is_a_prominent_peak():
-    for seed in range(20):
-        power = np.exp(np.random.default_rng(seed).standard_normal(60))
-        expected = find_peaks(np.log(power), prominence=np.log(PEAK))[0]
-        assert [k for k in range(60) if stands_out(power, k)] == expected.tolist()

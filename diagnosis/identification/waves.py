@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 
@@ -29,7 +30,6 @@ FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes 
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
 AROUND = 0.9  # Hz, width of the spectrum around
 SEGMENT = 25.0  # s; six periods of the slowest wave
-TAPER = 0.25  # share of a segment over which it fades in and out; chosen
 NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
 REPLICATES = 200  # of the bootstrap over segments
 DRAWINGS = 3  # of noise; chosen: of one, false waves stand out in a twelfth where much is unexplained
@@ -137,20 +137,9 @@ def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, n
         parts: (n, 3), of each signal.
         time: scale of the ship.
     """
-    length, rate = round(SEGMENT * RATE), RATE / time
-    count = np.arange(length)
-    ramp = np.minimum(count, length - count) / (0.5 * TAPER * length)
-    window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(ramp, 1.0))
-    line = np.linalg.qr(np.vander(count, 2))[0]
-    found = []
-    for x in parts:
-        first = np.arange(0, len(x) - length + 1, length - length // 8)
-        pieces = x[first[:, None] + count].transpose(1, 2, 0)
-        bent = pieces - np.tensordot(line, np.tensordot(line, pieces, (0, 0)), 1)
-        power = np.abs(np.fft.rfft(window[:, None, None] * bent, axis=0)) ** 2
-        power[1 : (length + 1) // 2] *= 2.0
-        found.append(power / (rate * np.sum(window**2)))
-    return np.fft.rfftfreq(length, 1.0 / rate), np.concatenate(found, axis=-1)
+    length = round(SEGMENT * RATE)
+    found = [spectrogram(x, RATE / time, nperseg=length, axis=0, detrend="linear") for x in parts]
+    return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
 
 
 def followed(
@@ -193,25 +182,12 @@ def peak(
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
-    height = np.where(band, power / np.maximum(level, 1e-12), 0.0)
-    for place in np.argsort(-height, axis=None):
-        row, axis = divmod(int(place), 3)
-        if height[row, axis] > 0.0 and stands_out(power[:, axis], row):
-            return level, Peak(row, axis, float(height[row, axis]))
-    return level, Peak(0, 0, 0.0)
-
-
-def stands_out(power: np.ndarray, row: int) -> bool:
-    """Whether a spectrum (m,) falls to a PEAK-th on both sides of a place before it rises above that."""
-    higher = power > power[row]
-    sides = zip(
-        (power[:row][::-1], power[row + 1 :]), (higher[:row][::-1], higher[row + 1 :]), strict=True
-    )
-    return all(
-        side.size
-        and side[: int(above.argmax()) if above.any() else None].min(initial=np.inf) * PEAK <= power[row]
-        for side, above in sides
-    )
+    above = np.zeros_like(band)
+    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
+        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
+    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
+    row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
+    return level, Peak(int(row), int(axis), float(height[row, axis]))
 
 
 def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:

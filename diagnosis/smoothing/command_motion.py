@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
+from scipy.signal import lfilter
 
 from fmus.scale import Scale
 
@@ -142,14 +142,8 @@ class Commands:
 
     def _recursion(self, x: np.ndarray, kept: float) -> np.ndarray:
         """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch."""
-        later = np.zeros_like(x)
-        later[1:] = x[:-1]
-        later[self.first] = 0.0
-        bands = np.ones((2, len(x)), x.dtype)
-        bands[1] = -kept
-        bands[1, self.first - 1] = 0.0
-        solve: Any = get_lapack_funcs("tbtrs", (bands,))
-        return np.asarray(solve(bands, later, uplo="L", diag="U")[0])
+        parts = [lfilter([0.0, 1.0], [1.0, -kept], part, axis=0) for part in np.split(x, self.first)]
+        return np.concatenate(parts)
 
     def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
         """The motion by gains (3, 3), body-fixed acceleration by a unit of each, and a delay [s]."""
