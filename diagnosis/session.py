@@ -34,7 +34,7 @@ from .prediction_error.refit import to_predictions
 from .prediction_error.unrecorded import Unrecorded
 from .progress import Advance, silent
 from .unseen import harm
-from .withdrawal import Unseen, Withdrawn, withdraw
+from .withdrawal import Unseen, Withdrawn, unique_shares, withdraw
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
@@ -79,6 +79,7 @@ class Diagnosis:
         refitted: whether the learned model has other nominal coefficients and no effect.
         dropped: effects that were accepted, where the learned model has other coefficients instead.
         shares: for each finding the share of the error's sum of squares that it explains.
+        unique: for each the share that nothing else explains; None where that cannot be told.
         comparison: errors before and after, on the training runs and then on those held out.
         start: the initial model.
         stability: of the learned model.
@@ -95,6 +96,7 @@ class Diagnosis:
     refitted: bool
     dropped: Sequence[Finding]
     shares: Sequence[float]
+    unique: Sequence[float | None]
     comparison: Comparison
     start: Model
     stability: Stability
@@ -274,6 +276,7 @@ def diagnose(
         refitted,
         dropped,
         shares,
+        unique_shares(learned, start, comparison.evaluations),
         comparison,
         start,
         stability,

@@ -1,4 +1,4 @@
-"""Withdrawal of effects with which unseen data fit worse, or are predicted worse, after the search.
+"""Effects taken out after the search: those with which unseen data fit or are predicted worse.
 
 They only veto: what is withdrawn is replaced by nothing. How sure an effect is does not count: what
 makes predictions better stays in the model.
@@ -9,12 +9,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
+from .assessment.evaluation import Evaluation
 from .identification.acceptance import worse
 from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
 from .identification.refinement import at_limit
-from .model import Model, WeakWindows
+from .model import Model, WeakWindows, omega
 from .unseen import Losses, Part, gain, harm, losses
 
 ALONE = "with it {harm}"
@@ -184,3 +186,46 @@ def added(found: Findings, effects: Sequence[Finding], start: Model) -> Findings
         model = model.plus(f.values)
         on_top.append(replace(f, model=model))
     return replace(found, effects=on_top, model=model, suspects=[], moved={})
+
+
+def unique_shares(
+    learned: Findings, start: Model, evaluations: Sequence[Evaluation]
+) -> list[float | None]:
+    """Share of the first sum of squares that comes back without one finding.
+
+    The other findings and the nominal coefficients are fitted anew, and so explain what they can in its
+    place; coefficients that would be further than MOST_MOVED from what is believed of them stay as they
+    are. Of two findings that explain the same, neither has a share of its own.
+
+    Args:
+        learned: the findings and the model with them.
+        start: the initial model.
+        evaluations: of the runs; those held out count if there are any, but for what holds in others
+            alone, such as times of failures.
+
+    Returns:
+        For each finding, in their order, a share [1], axes weighted by noise; None where the method
+        cannot fit without it.
+    """
+    held_out = [e.weak_windows for e in evaluations if e.held_out]
+    trained = [e.weak_windows for e in evaluations if not e.held_out]
+    if learned.refit is None or not learned.effects:
+        return [None] * len(learned.effects)
+    found: list[float | None] = []
+    for finding in learned.effects:
+        runs = trained if finding.of_runs else held_out or trained
+
+        def squares(model: Model, runs: Sequence[WeakWindows] = runs) -> float:
+            return sum(float(np.sum((omega(w, model) / learned.sigma) ** 2)) for w in runs)
+
+        try:
+            others = learned.refit([f.id for f in learned.effects if f.id != finding.id])
+        except LinAlgError:  # these data do not determine the others alone
+            found.append(None)
+            continue
+        without = others.model if others.effects else others.refitted or start
+        fitted = learned.model.ship.effects[finding.id].search.by == "regression"
+        if fitted and not others.plausible:
+            without = learned.model.plus({name: -value for name, value in finding.values.items()})
+        found.append(min(1.0, max(0.0, (squares(without) - squares(learned.model)) / squares(start))))
+    return found

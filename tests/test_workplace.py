@@ -29,8 +29,7 @@ from cosim.system import prepare
 from cybership import completion
 from cybership.__main__ import main, usage
 from cybership.subcommands import SUBCOMMANDS
-from diagnosis import command_line, result_folder
-from diagnosis.report import unique_share
+from diagnosis import command_line, result_folder, withdrawal
 from fmus import interruption
 from fmus.build import BuildError
 
@@ -328,7 +327,7 @@ def test_pictures_have_the_format_and_size_that_is_asked_for(tmp_path):
 
 def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
     """Here a model is the size of the error that it leaves, and no coefficient moves."""
-    monkeypatch.setattr(unique_share, "omega", lambda w, model: np.full((4, 3), model.error))
+    monkeypatch.setattr(withdrawal, "omega", lambda w, model: np.full((4, 3), model.error))
     left = {"a": 0.9, "b": 0.1}  # without it, all else fitted anew; 0.1 with both
     fitted = SimpleNamespace(search=SimpleNamespace(by="regression"))
 
@@ -344,7 +343,7 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
         model=model(0.1), sigma=np.ones(3), refit=keep,
     )  # fmt: skip
     runs = [SimpleNamespace(held_out=False, weak_windows=None)]
-    assert unique_share.unique_shares(found, model(1.0), runs) == pytest.approx([0.8, 0.0])
+    assert withdrawal.unique_shares(found, model(1.0), runs) == pytest.approx([0.8, 0.0])
 
 
 def test_the_version_is_the_same_everywhere():

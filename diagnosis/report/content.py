@@ -18,7 +18,6 @@ from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit
 from .headline import headline
-from .unique_share import unique_shares
 
 T = TypeVar("T")
 Z95 = 1.96  # standard deviations, 95 % of a normal distribution
@@ -236,10 +235,9 @@ def _effects(
 ) -> tuple[list[result_keys.EffectResult], list[result_keys.PossibilityResult]]:
     """The findings, and what is only possible."""
     learned, ship = diagnosis.learned, diagnosis.start.ship
-    unique = unique_shares(learned, diagnosis.start, diagnosis.comparison.evaluations)
     found, possible = [], []
     for f, share, alone, told in zip(
-        learned.effects, diagnosis.shares, unique, diagnosis.believed, strict=True
+        learned.effects, diagnosis.shares, diagnosis.unique, diagnosis.believed, strict=True
     ):
         result = _effect(diagnosis, f, share, alone)
         if told:
