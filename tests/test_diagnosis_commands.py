@@ -378,7 +378,7 @@ def written(monkeypatch, tmp_path):
         sound=True,
         learned=SimpleNamespace(model=diagnosis.Model().plus({"delta_X_u": -1.0})),
         posterior=SimpleNamespace(write=lambda path: path.write_text("{}")),
-        comparison=SimpleNamespace(evaluations=[], omega_std=[]),
+        comparison=SimpleNamespace(evaluations=[], omega_std=[], use=None),
         files=None,
     )
 
