@@ -12,7 +12,7 @@ POINTS = 41  # of an ellipse that is drawn; chosen
 
 
 def quantile(level: float, dof: int) -> float:
-    """That of chi^2; `scipy.stats` takes a while to import."""
+    """Quantile of the chi-squared distribution; `scipy.stats` takes a while to import."""
     return 2.0 * float(gammaincinv(0.5 * dof, level))
 
 

@@ -9,14 +9,16 @@ it gives is laid onto the measured pose where the comparison begins, in place an
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 import cosim
 from cosim.process import scratch_folder
-from fmus.frames import rotate_to_body
+from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.ops import wrap
 
 from ..assessment.evaluation import Evaluation, PredictionError
@@ -307,19 +309,15 @@ def _write(path: Path, time: np.ndarray, columns: dict[str, np.ndarray]) -> None
 
 def _track(motion: np.ndarray, h: float) -> np.ndarray:
     """Pose (steps + 1, 3, w) from the origin on, by the velocities (steps + 1, 6, w) of the body."""
-
-    def sums(rate: np.ndarray) -> np.ndarray:
-        return np.vstack([0.0 * rate[:1], np.cumsum(0.5 * h * (rate[1:] + rate[:-1]), axis=0)])
-
+    sums = partial(cumulative_trapezoid, dx=h, axis=0, initial=0.0)
     u, v, r = motion[:, 3:].transpose(1, 0, 2)
     psi = sums(r)
-    north, east = np.cos(psi) * u - np.sin(psi) * v, np.sin(psi) * u + np.cos(psi) * v
+    north, east = rotate_to_earth(psi, u, v)
     return np.stack([sums(north), sums(east), psi], axis=1)
 
 
 def _laid(pose: np.ndarray, first: int, onto: np.ndarray) -> np.ndarray:
     """Tracks (steps + 1, 3, w), moved and turned so that at a step they are where others (3, w) are."""
     x, y, psi = (pose - pose[first]).transpose(1, 0, 2)
-    turn = onto[2] - pose[first, 2]
-    c, s = np.cos(turn), np.sin(turn)
-    return np.stack([onto[0] + c * x - s * y, onto[1] + s * x + c * y, onto[2] + psi], axis=1)
+    north, east = rotate_to_earth(onto[2] - pose[first, 2], x, y)
+    return np.stack([onto[0] + north, onto[1] + east, onto[2] + psi], axis=1)

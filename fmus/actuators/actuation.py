@@ -314,15 +314,19 @@ def largest(ship: Description, values: Any) -> Triple:
     return found[0], found[1], found[2]
 
 
+def limits(ship: Description, values: Any) -> tuple[tuple[Any, Any], ...]:
+    """The lowest and the highest value of each command, by the parameters of each actuator."""
+    return tuple([span for a in ordered(ship) for span in a.law.limits(law_of(a, values[a.k])[0])])
+
+
 def working(
     ship: Description, t: Number, u: Number, v: Number, r: Number, commands: Any, values: Any
 ) -> Running:
     """What the force of a ship's actuators may depend on."""
-    part: list[Any] = []
-    for a in ordered(ship):
-        p, _, _ = law_of(a, values[a.k])
-        for c, (low, high) in zip(commands[a.commands], a.law.limits(p), strict=True):
-            part.append(clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0))
+    part = [
+        clip(c / fmax(fmax(high, -low), TINY), -1.0, 1.0)
+        for c, (low, high) in zip(commands, limits(ship, values), strict=True)
+    ]
     return Running(t, u, v, r, tuple(commands), tuple(part), (1.0,) * len(ship.actuators))
 
 
@@ -344,9 +348,7 @@ def layout(ship: Description) -> Layout:
         believed=lambda c, p: total(forces(ship, c, at_rest, p.allocation)),
         allocate=lambda tau, p: allocate(ship, tau, at_rest, p.allocation),
         full=lambda p: largest(ship, p.allocation),
-        limits=lambda p: tuple(
-            [span for a in ordered(ship) for span in a.law.limits(law_of(a, p.plant[a.k])[0])]
-        ),
+        limits=lambda p: limits(ship, p.plant),
         curved=True,
         round=tuple([angle for a in ordered(ship) for angle in a.round]),
     )

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ..hull import Triple
 from ..ops import Number, clip, fmax, fmin, where
 from ..ship_description import Description
-from .actuation import actuators, forces, law_of, ordered, parameters
+from .actuation import actuators, forces, limits, ordered, parameters
 from .response import total
 
 HALVINGS = 10  # of the shares; a straight line through the last two leaves 1e-6 of the full force
@@ -39,11 +39,6 @@ class Roles(NamedTuple):
 def believed(ship: Description) -> tuple[Any, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(a, "", False)() for a in actuators(ship)])
-
-
-def limits(ship: Description, values: Any) -> list[tuple[Any, Any]]:
-    """The lowest and the highest value of each command."""
-    return [span for a in ordered(ship) for span in a.law.limits(law_of(a, values[a.k])[0])]
 
 
 @cache
