@@ -92,7 +92,7 @@ def addition(
     def init(i: Any, p: Any) -> Any:
         return state()
 
-    def moving(s: Any, i: Any, h: Number) -> tuple[Any, tuple[Any, Any, Any]]:
+    def moving(s: Any, i: Any, h: Number) -> tuple[Any, tuple[Number, Number, Number]]:
         """The FMU's state, and its acceleration over the last step."""
         raw = dict(zip(columns, flatten(i)[len(commands) :], strict=True))
         now = {n: x.gain * raw[n] + x.offset if isinstance(x, Line) else x for n, x in told.items()}
@@ -109,7 +109,7 @@ def addition(
         ship = State(now["x"], now["y"], now["psi"], now["u"], now["v"], now["r"], s.t)
         return ship, (nu_dot[0], nu_dot[1], nu_dot[2])
 
-    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Any, Any]:
+    def step(s: Any, i: Any, p: Any, h: Number) -> tuple[Number, Number]:
         ship, nu_dot = moving(s, i, h)
         given_now = flatten(i)[: len(commands)]
         asked = packer(drive.inputs)([*given_now, ship.u, ship.v, ship.r])

@@ -1,18 +1,21 @@
-"""Between the earth-fixed frame (north, east) and the body-fixed one (ahead, to starboard)."""
+"""Between the earth-fixed frame (north, east) and the body-fixed one (ahead, to starboard).
+
+Of numbers at an instant, or of whole time series.
+"""
 
 from typing import Any
 
-from .ops import Number, cos, sin
+from .ops import cos, sin
 
 
-def rotate_to_body(psi: Number, x: Number, y: Number) -> tuple[Any, Any]:
+def rotate_to_body(psi: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """R^T(psi) of an earth-fixed vector."""
     c = cos(psi)
     s = sin(psi)
     return c * x + s * y, c * y - s * x
 
 
-def rotate_to_earth(psi: Number, x: Number, y: Number) -> tuple[Any, Any]:
+def rotate_to_earth(psi: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """R(psi) of a body-fixed vector, (2.1)."""
     c = cos(psi)
     s = sin(psi)

@@ -14,7 +14,7 @@ from .hull_functions import FUNCTIONS
 from .ops import Number
 from .signals import Force
 
-Triple = tuple[Any, Any, Any]
+Triple = tuple[Number, Number, Number]
 
 # How well the values of Table 2.1 are known. A model of 15 kg is weighed to some ten grams, and what
 # lies on it from one day to the next adds a little.
@@ -119,7 +119,7 @@ def inertia_force(u_dot: Number, v_dot: Number, r_dot: Number, p: Inertia) -> Tr
     return m11 * u_dot, m22 * v_dot + m23 * r_dot, m32 * v_dot + m33 * r_dot
 
 
-def inverse_mass(p: Inertia) -> tuple[Any, Any, Any, Any, Any]:
+def inverse_mass(p: Inertia) -> tuple[Number, Number, Number, Number, Number]:
     """The five entries of the inverse of M that are not zero: 11, 22, 23, 32, 33."""
     (m11, _, _), (_, m22, m23), (_, m32, m33) = mass_matrix(p)
     det = m22 * m33 - m23 * m32
@@ -147,7 +147,7 @@ def towed_damping_force(u: Number, v: Number, c: TowedDamping) -> Triple:
     )
 
 
-def rotational_regressors(v: Number, r: Number) -> tuple[Any, Any, Any, Any]:
+def rotational_regressors(v: Number, r: Number) -> tuple[Number, Number, Number, Number]:
     """|r|v, r, |v|r, |r|r: minus the nonzero entries of a row of Phi(nu), (2.32)."""
     ar = abs(r)
     return ar * v, r, abs(v) * r, ar * r
@@ -236,7 +236,7 @@ def described_damping_force(u: Number, v: Number, r: Number, further: Any, funct
     return X, Y, N
 
 
-def damping_force(u: Number, v: Number, r: Number, c: Any) -> Triple:
+def damping_force(u: Any, v: Any, r: Any, c: Any) -> Triple:
     """-D(nu) nu [N, N, N m]: all velocity-dependent force on the hull, (2.8)-(2.9), corrected.
 
     The coefficients c are a Damping, or a tuple of groups in the same order.
@@ -256,7 +256,7 @@ class Hull(NamedTuple):
     """Inertia, its inverse and damping: what does not change during a step, computed once."""
 
     inertia: Inertia
-    inverse: tuple[Any, Any, Any, Any, Any]
+    inverse: tuple[Number, Number, Number, Number, Number]
     damping: Damping
 
 

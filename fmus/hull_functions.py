@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from .declare import POSITIVE
 from .ops import Number, atan2, fmax, sqrt, where
 
-Function = Callable[..., tuple[Any, Any, Any]]
+Function = Callable[..., tuple[Number, Number, Number]]
 
 
 class Change(NamedTuple):
@@ -60,7 +60,7 @@ def cross_flow(
     ] = 1.0,
     cross_flow_draft: Annotated[float, "m", "draft in the cross-flow", POSITIVE] = 0.1,
     cross_flow_drag: Annotated[float, "1", "drag coefficient of a section", POSITIVE] = 0.7,
-) -> tuple[Any, Any, Any]:
+) -> tuple[Number, Number, Number]:
     """Drag of the cross-flow by strips along the hull (Faltinsen 1990; Fossen 2021, ch. 6)."""
     dx = cross_flow_length / STRIPS
     scale = -0.5 * water_density * cross_flow_drag * cross_flow_draft * dx
@@ -87,7 +87,7 @@ def cross_flow_along(
     section_drag: Annotated[float, "1", "drag coefficient of a section"] = 1.0,
     section_tilt: Annotated[float, "1", "share by which it is more at the bow, less at the stern"] = 0.0,
     section_ends: Annotated[float, "1", "share by which it is more at both ends, less amidships"] = 0.0,
-) -> tuple[Any, Any, Any]:
+) -> tuple[Number, Number, Number]:
     """Drag of the cross-flow at points from end to end, unevenly spread along the hull.
 
     The coefficient at xi = 2 x / L is C (1 + tilt xi + ends (xi^2 - 1/3)).
@@ -117,7 +117,7 @@ def resistance(
     drag_area: Annotated[float, "m2", "draft times beam", POSITIVE] = 1.0,
     drag_ahead: Annotated[float, "1", "coefficient of the resistance"] = 0.1,
     drag_in_drift: Annotated[float, "1/rad", "its growth with the angle of drift"] = 0.0,
-) -> tuple[Any, Any, Any]:
+) -> tuple[Number, Number, Number]:
     """Resistance that grows with the angle of drift, 1/2 rho (C + C_b |atan2(v, u)|) A |u| u."""
     coefficient = drag_ahead + drag_in_drift * abs(atan2(v, u))
     return -0.5 * drag_density * drag_area * coefficient * abs(u) * u, 0.0 * v, 0.0 * v
@@ -158,7 +158,7 @@ def drift_polynomial(
     N_vvr_prime: Annotated[float, "1", "yaw moment, v'^2 r'"] = 0.0,
     N_vrr_prime: Annotated[float, "1", "yaw moment, v' r'^2"] = 0.0,
     N_rrr_prime: Annotated[float, "1", "yaw moment, r'^3"] = 0.0,
-) -> tuple[Any, Any, Any]:
+) -> tuple[Number, Number, Number]:
     """Hull of the MMG standard method (Yasukawa and Yoshimura 2015), in prime units.
 
     Forces over 1/2 rho L d U^2, the moment over 1/2 rho L^2 d U^2, v' = v / U, r' = r L / U. The powers

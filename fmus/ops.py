@@ -11,15 +11,17 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
-# Any: float, numpy array or symbol. The dispatch is by type, which Python's typing cannot express.
-Number = Any
+# What floats, arrays and traced symbols share: checkers hold physics to floats and bools, whose places
+# arrays and symbols take at run time.
+Number = float
+Condition = bool
 
 TWO_PI = 2.0 * math.pi
 TINY = 1e-300  # in place of zero, of which there is no logarithm
 _SCALARS = (float, int, bool)
 
 
-def _call(name: str, *args: Number) -> Number:
+def _call(name: str, *args: Any) -> Any:
     """Apply ``name`` to arguments of which at least one is not a float."""
     for arg in args:
         apply = getattr(arg, "apply_operation", None)
@@ -69,14 +71,14 @@ def atan2(y: Number, x: Number) -> Number:
     return _call("atan2", y, x)
 
 
-def where(condition: Number, a: Number, b: Number) -> Number:
+def where(condition: Condition, a: Number, b: Number) -> Number:
     """``a`` where the condition holds, else ``b``. Both are evaluated: guard denominators."""
     if condition.__class__ is bool:
         return a if condition else b
     return _call("where", condition, a, b)
 
 
-def choose(condition: Number, a: Any, b: Any) -> Any:
+def choose(condition: Condition, a: Any, b: Any) -> Any:
     """:func:`where` for two numbers, or two nested tuples of numbers of the same shape."""
     if condition.__class__ is bool:
         return a if condition else b
@@ -86,7 +88,7 @@ def choose(condition: Number, a: Any, b: Any) -> Any:
     return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
 
 
-def when(condition: Number, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
+def when(condition: Condition, a: Callable[[], Any], b: Callable[[], Any]) -> Any:
     """What ``a`` gives where the condition holds, else what ``b`` gives: for rare, costly work.
 
     Both give numbers in the same nested tuples. On a bool only the one that counts is called, and so it
@@ -175,14 +177,14 @@ def power(x: Number, exponent: Number) -> Number:
     return exp(exponent * log(fmax(x, TINY)))
 
 
-def not_(condition: Number) -> Number:
+def not_(condition: Condition) -> Condition:
     """Negation of a condition (``~True`` is -2 on a Python bool)."""
     if condition.__class__ is bool:
         return not condition
     return _call("logical_not", condition)
 
 
-def is_finite(x: Number) -> Number:
+def is_finite(x: Number) -> Condition:
     """True where x is neither NaN nor infinite."""
     return x - x == 0.0
 
@@ -192,6 +194,6 @@ def finite(x: Number, otherwise: Number) -> Number:
     return where(x - x == 0.0, x, otherwise)
 
 
-def wrap(angle: Number) -> Number:
+def wrap(angle: Any) -> Any:
     """The angle [rad] brought to (-pi, pi]."""
     return angle + TWO_PI * floor((math.pi - angle) / TWO_PI)

@@ -91,13 +91,13 @@ def parameters(a: Actuator, prefix: str, known: bool) -> type[Any]:
     return group_of(f"{prefix}{name}", found)
 
 
-def law_of(a: Actuator, values: Any) -> tuple[Any, Any, Any]:
+def law_of(a: Actuator, values: Any) -> tuple[Number, Number, Number]:
     """Parameters of an actuator's law, and its place x, y [m, m]."""
     *own, x, y = values
     return a.law.Parameters._make(own), x, y
 
 
-def within(a: Actuator, commands: Sequence[Any], p: Any) -> tuple[Any, ...]:
+def within(a: Actuator, commands: Sequence[Number], p: Any) -> tuple[Number, ...]:
     """Commands brought within their limits."""
     each = zip(commands, a.law.limits(p), a.round, strict=True)
     return tuple([clip(wrap(c) if angle else c, low, high) for c, (low, high), angle in each])
@@ -109,7 +109,11 @@ def flow_at(u: Number, v: Number, r: Number, x: Number, y: Number) -> Flow:
 
 
 def water_at(
-    ship: Description, a: Actuator, every: Sequence[Any], commands: Sequence[Any], nu: Triple
+    ship: Description,
+    a: Actuator,
+    every: Sequence[tuple[Any, Number, Number]],
+    commands: Sequence[Number],
+    nu: Triple,
 ) -> Flow:
     """What an actuator meets: the velocity of its place, and the race that it works in.
 
@@ -130,7 +134,7 @@ def water_at(
     return flow._replace(race=b.law.race(given, flow_at(*nu, x, y), p))
 
 
-def forces(ship: Description, commands: Sequence[Any], nu: Triple, values: Any) -> Thrust:
+def forces(ship: Description, commands: Sequence[Number], nu: Triple, values: Any) -> Thrust:
     """The force of each actuator, nothing wrong with it.
 
     Args:
@@ -161,7 +165,7 @@ def measurable(ship: Description) -> dict[str, str]:
     }
 
 
-def output(ship: Description, name: str, commands: Sequence[Any], nu: Triple, values: Any) -> Number:
+def output(ship: Description, name: str, commands: Sequence[Number], nu: Triple, values: Any) -> Number:
     """What is measured of an actuator beside its commands.
 
     Args:
@@ -223,7 +227,7 @@ def _column(c: Component, x: Number, y: Number) -> Triple:
     return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
 
 
-def allocate(ship: Description, tau: Triple, nu: Triple, values: Any) -> tuple[Any, ...]:
+def allocate(ship: Description, tau: Sequence[Number], nu: Triple, values: Any) -> tuple[Number, ...]:
     """Commands that give a force as nearly as the actuators can: weighted least squares within limits.
 
     Each force is weighed by what its actuator can give; what a limit cuts off is asked of the others
@@ -273,7 +277,9 @@ def allocate(ship: Description, tau: Triple, nu: Triple, values: Any) -> tuple[A
     return tuple(commands)
 
 
-def _least(columns: Sequence[Sequence[Any]], weights: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+def _least(
+    columns: Sequence[Sequence[Number]], weights: Sequence[Number], wanted: Sequence[Number]
+) -> list[Any]:
     """f = W B' (B W B' + e I)^-1 tau for the columns of B, by elimination."""
     n = range(len(wanted))
     rows = [
@@ -295,9 +301,9 @@ def _least(columns: Sequence[Sequence[Any]], weights: Sequence[Any], wanted: Seq
     return [w * sum_of([b[i] * right[i] for i in n]) for w, b in zip(weights, columns, strict=True)]
 
 
-def sum_of(values: Sequence[Any]) -> Any:
+def sum_of(values: Sequence[Number]) -> Any:
     """The sum of some numbers, one after the other: ``sum`` compensates floats from Python 3.12 on."""
-    found: Any = 0.0
+    found: Number = 0.0
     for x in values:
         found = found + x
     return found
@@ -314,7 +320,7 @@ def largest(ship: Description, values: Any) -> Triple:
     return found[0], found[1], found[2]
 
 
-def limits(ship: Description, values: Any) -> tuple[tuple[Any, Any], ...]:
+def limits(ship: Description, values: Any) -> tuple[tuple[Number, Number], ...]:
     """The lowest and the highest value of each command, by the parameters of each actuator."""
     return tuple([span for a in ordered(ship) for span in a.law.limits(law_of(a, values[a.k])[0])])
 

@@ -43,7 +43,7 @@ class AzimuthLeg(Law):
         return AzimuthThruster.limits(p)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         alpha, n = commands
         angle = alpha + p.bias
         X, Y = AzimuthThruster.force((angle, n), flow, p)

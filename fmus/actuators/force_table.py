@@ -36,7 +36,7 @@ class ForceTableAhead(Law):
         return ((-1.0, 1.0),)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         f = interpolate(commands[0], -1.0, 1.0, p)
         return f, 0.0 * f
 
@@ -45,7 +45,7 @@ class ForceTableAhead(Law):
         return ((p[0], p[-1]),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         # Each stretch between two nodes is gone as far as the force asks for.
         c: Number = -1.0
         for low, high in pairwise(p):
@@ -62,6 +62,6 @@ class ForceTableAside(ForceTableAhead):
     Parameters: ClassVar[type[Any]] = _forces("to starboard")
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         f = interpolate(commands[0], -1.0, 1.0, p)
         return 0.0 * f, f

@@ -12,7 +12,7 @@ from ..hull_functions import Change
 from ..ops import Number
 from ..ship_description import Part
 
-Span = tuple[Any, Any]
+Span = tuple[Number, Number]
 
 
 class Command(NamedTuple):
@@ -38,7 +38,7 @@ class Race(NamedTuple):
 
     inflow: Any
     jet: Any
-    diameter: Any
+    diameter: Number
 
 
 class Flow(NamedTuple):
@@ -48,11 +48,11 @@ class Flow(NamedTuple):
     drift, ``r`` [rad/s] is the yaw rate; ``race`` is that of the propeller in front, where there is one.
     """
 
-    u: Any = 0.0
-    v: Any = 0.0
-    hull_u: Any = 0.0
-    hull_v: Any = 0.0
-    r: Any = 0.0
+    u: Number = 0.0
+    v: Number = 0.0
+    hull_u: Number = 0.0
+    hull_v: Number = 0.0
+    r: Number = 0.0
     race: Race | None = None
 
 
@@ -95,7 +95,7 @@ class Law:
         raise NotImplementedError
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         """Force on the hull (X, Y) [N, N], for commands within their limits."""
         raise NotImplementedError
 
@@ -105,7 +105,7 @@ class Law:
         return x
 
     @classmethod
-    def race(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> Race | None:
+    def race(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> Race | None:
         """Its race; None: it has none that others could work in."""
         return None
 
@@ -115,7 +115,7 @@ class Law:
         return cls.measurable
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
         """One of ``measurable``, in its unit."""
         raise NotImplementedError
 
@@ -125,6 +125,6 @@ class Law:
         return ()
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         """The commands that give a force on each of ``components`` [N], within their reach."""
         raise NotImplementedError

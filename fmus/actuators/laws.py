@@ -48,7 +48,7 @@ class FixedPropeller(Law):
         return ((p.n_min, p.n_max),)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (n,) = commands
         return bollard_thrust(n, p), 0.0 * n
 
@@ -57,7 +57,7 @@ class FixedPropeller(Law):
         return ((bollard_thrust(p.n_min, p), bollard_thrust(p.n_max, p)),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         return (bollard_speed(forces[0], p),)
 
 
@@ -105,19 +105,19 @@ class OpenWaterPropeller(FixedPropeller):
         return (1.0 - p.wake) * flow.u
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (n,) = commands
         thrust = square_by_coefficient(n, cls.advance(flow, p), p)
         return (1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0) * thrust, 0.0 * n
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
         (n,) = commands
         coefficient = square_by_coefficient(n, cls.advance(flow, p), p)
         return p.water_density * power(p.diameter, 4.0) * coefficient
 
     @classmethod
-    def race(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> Race:
+    def race(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> Race:
         """By momentum theory, V sqrt(1 + 8 K_T / (pi J^2)), multiplied out."""
         (n,) = commands
         inflow = cls.advance(flow, p)
@@ -133,7 +133,7 @@ class OpenWaterPropeller(FixedPropeller):
         return ((fmin(0.0, low), fmax(0.0, high)),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         wanted = forces[0] / ((1.0 - p.thrust_deduction) * p.water_density * power(p.diameter, 4.0))
         advance = cls.advance(flow, p)
         slope = p.K_T1 * advance / p.diameter
@@ -161,7 +161,7 @@ class TunnelThruster(Law):
         return ((-1.0, 1.0),)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (u,) = commands
         return 0.0 * u, p.F * u
 
@@ -170,7 +170,7 @@ class TunnelThruster(Law):
         return ((-p.F, p.F),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         return (forces[0] / p.F,)
 
 
@@ -201,7 +201,7 @@ class VoithSchneider(Law):
         return ((-1.0, 1.0), (-1.0, 1.0))
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         surge, sway = commands
         return p.F * surge, p.F * sway
 
@@ -210,7 +210,7 @@ class VoithSchneider(Law):
         return ((-p.F, p.F), (-p.F, p.F))
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         return forces[0] / p.F, forces[1] / p.F
 
     @classmethod
@@ -218,7 +218,7 @@ class VoithSchneider(Law):
         return cls.measurable if part.number("P_full") > 0.0 else {}
 
     @classmethod
-    def output(cls, name: str, commands: tuple[Any, ...], flow: Flow, p: Any) -> Number:
+    def output(cls, name: str, commands: tuple[Number, ...], flow: Flow, p: Any) -> Number:
         surge, sway = commands
         share = fmin(1.0, sqrt(surge * surge + sway * sway))
         return p.P_idle + (p.P_full - p.P_idle) * share * sqrt(share)
@@ -249,7 +249,7 @@ class AzimuthThruster(Law):
         return ((-p.alpha_max, p.alpha_max), (p.n_min, p.n_max))
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         alpha, n = commands
         thrust = bollard_thrust(n, p)
         return thrust * cos(alpha), thrust * sin(alpha)
@@ -261,7 +261,7 @@ class AzimuthThruster(Law):
         return ((where(p.alpha_max > QUARTER, -most, least), most), (-aside, aside))
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         # One that cannot turn round runs backwards; beyond its angles it gives what it can of the force.
         X, Y = forces
         way = where((p.alpha_max <= QUARTER) & (X < 0.0), -1.0, 1.0)
@@ -300,7 +300,7 @@ class Rudder(Law):
         return ((-p.delta_max, p.delta_max),)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (delta,) = commands
         u = (1.0 - p.wake) * flow.u
         # U sin(delta + arctan(v / u)), the speed across the rudder, which holds astern as well.
@@ -321,7 +321,7 @@ class Rudder(Law):
         return ((-most, most),)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         # The force goes with sin(2 delta).
         full = Rudder._full(flow, p)
         sine = clip(forces[0] / where(abs(full) > SMALL, full, SMALL), -1.0, 1.0)
@@ -346,7 +346,7 @@ class GivenForce(Law):
         return ((-p.F_X, p.F_X), (-p.F_Y, p.F_Y))
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         return commands[0], commands[1]
 
     @classmethod
@@ -354,5 +354,5 @@ class GivenForce(Law):
         return GivenForce.limits(p)
 
     @classmethod
-    def commanded(cls, forces: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Any, ...]:
+    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
         return forces

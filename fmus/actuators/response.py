@@ -14,7 +14,7 @@ from ..effects import EffectSet, Memory, Running, Thrust
 from ..effects.all_thrusters import way
 from ..effects.group import Group, Member, group
 from ..hull import Triple
-from ..ops import Number, clip, when
+from ..ops import Condition, Number, clip, when
 
 
 def total(f: Thrust) -> Triple:
@@ -48,15 +48,15 @@ class Layout(NamedTuple):
     running: Callable[..., Any]
     thrust: Callable[[Any, Any, Any], Thrust]
     believed: Callable[[Any, Any], Triple]
-    allocate: Callable[[Triple, Any], tuple[Any, ...]]
+    allocate: Callable[[Triple, Any], tuple[Number, ...]]
     full: Callable[[Any], Triple]
-    limits: Callable[[Any], tuple[tuple[Any, Any], ...]]
+    limits: Callable[[Any], tuple[tuple[Number, Number], ...]]
     powered: Callable[[Any, Any], Any] = lambda b, settings: b
     shared: tuple[int, ...] = ()
     curved: bool = False
     round: tuple[bool, ...] = ()
 
-    def act(self, shares: Any, now: Running, b: Any) -> Triple:
+    def act(self, shares: Sequence[Number], now: Running, b: Any) -> Triple:
         """tau [N, N, N m], effects included, of :attr:`thrust`."""
         return total(self.thrust(shares, now, b))
 
@@ -100,9 +100,9 @@ def thruster_effects(effects: EffectSet, layout: Layout) -> ThrusterEffects:
 class Past(NamedTuple):
     """What the thrusters remember: time [s], the memory of each slow effect, the last command."""
 
-    t: Any
-    memories: tuple[Any, ...]
-    limited: tuple[Any, ...]
+    t: Number
+    memories: tuple[Number, ...]
+    limited: tuple[Number, ...]
 
 
 def at_rest(effects: ThrusterEffects) -> Past:
@@ -125,9 +125,9 @@ class Prepared(NamedTuple):
 
     params: Any
     effects: ThrusterEffects
-    slow: tuple[Any, ...]
-    acting: tuple[Any, ...]
-    any_acts: Any
+    slow: tuple[Condition, ...]
+    acting: tuple[Condition, ...]
+    any_acts: Condition
 
 
 def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
@@ -142,8 +142,8 @@ def prepared(p: Any, effects: ThrusterEffects) -> Prepared:
 
 
 def remember(
-    memories: tuple[Any, ...], signals: tuple[Any, ...], of: str, b: Prepared, h: Number
-) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    memories: tuple[Number, ...], signals: tuple[Number, ...], of: str, b: Prepared, h: Number
+) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
     """The memories a step later, and what they make of commands or of shares of full force.
 
     Args:
@@ -171,8 +171,8 @@ def rate_limited(before: Number, wanted: Number, rate: Number, h: Number, angle:
 
 
 def command_response(
-    s: Past, commands: tuple[Any, ...], b: Prepared, h: Number
-) -> tuple[Past, tuple[Any, ...]]:
+    s: Past, commands: tuple[Number, ...], b: Prepared, h: Number
+) -> tuple[Past, tuple[Number, ...]]:
     """The commands that reach the thrusters in a step of h [s]: delayed, and limited in their rate."""
     memories, given = remember(s.memories, commands, "command", b, h)
     rates = b.params.rate if len(b.params.rate) == len(given) else (b.params.rate[0],) * len(given)
@@ -191,8 +191,8 @@ def command_response(
 
 
 def force_response(
-    s: Past, shares: tuple[Any, ...], b: Prepared, h: Number
-) -> tuple[Past, tuple[Any, ...]]:
+    s: Past, shares: tuple[Number, ...], b: Prepared, h: Number
+) -> tuple[Past, tuple[Number, ...]]:
     """The shares of full force that act after a step of h [s], for those of the characteristic."""
     memories, shares = remember(s.memories, shares, "force", b, h)
     return s._replace(memories=memories), shares

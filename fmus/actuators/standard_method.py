@@ -101,7 +101,7 @@ class RudderInRace(Law):
         return (x + p.hull_force * p.hull_force_place) / (1.0 + p.hull_force)
 
     @classmethod
-    def force(cls, commands: tuple[Any, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
         (delta,) = commands
         angle = delta + p.bias
         u, v = RudderInRace.met(flow, p)

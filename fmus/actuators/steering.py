@@ -36,7 +36,7 @@ class Roles(NamedTuple):
     steers: tuple[float, ...]
 
 
-def believed(ship: Description) -> tuple[Any, ...]:
+def believed(ship: Description) -> tuple[Number, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(a, "", False)() for a in actuators(ship)])
 
@@ -72,7 +72,7 @@ def steerable(ship: Description) -> bool:
 
 def commands_at(
     ship: Description, drive: Number, helm: Number, angle_max: Number, values: Any
-) -> tuple[Any, ...]:
+) -> tuple[Number, ...]:
     """The commands of two shares.
 
     Args:
@@ -114,8 +114,8 @@ def share(of: Callable[[Number], Number], wanted: Number) -> Number:
 class Given(NamedTuple):
     """What becomes of a request: the commands, the share of the largest angle, and tau [N, N, N m]."""
 
-    commands: tuple[Any, ...]
-    helm: Any
+    commands: tuple[Number, ...]
+    helm: Number
     tau: Triple
 
 
@@ -139,7 +139,7 @@ def steer(
         values: parameters of each actuator.
     """
 
-    def given(drive: Number, helm: Number) -> tuple[tuple[Any, ...], Triple]:
+    def given(drive: Number, helm: Number) -> tuple[tuple[Number, ...], Triple]:
         commands = commands_at(ship, drive, helm, angle_max, values)
         return commands, total(forces(ship, commands, nu, values))
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import FIXED, Component, Range, bundle
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple
-from ..ops import Number, choose, not_, where
+from ..ops import Condition, Number, choose, not_, where
 from ..signals import Estimate, Force
 from .backstepping import (
     HELD,
@@ -75,33 +75,33 @@ def parameters(model: Parametrisation, **more: Any) -> type[Any]:
     return bundle("Params", Learner, **groups, truth=model.truth(), **more)
 
 
-def attentive(e: Estimate, hold_frozen: Number) -> Number:
+def attentive(e: Estimate, hold_frozen: Number) -> Condition:
     """True unless the observer is frozen and that is a reason not to learn."""
     return not_((e.frozen > 0.5) & (hold_frozen > 0.5))
 
 
-def to_earth(psi: Number, force: Sequence[Any]) -> Triple:
+def to_earth(psi: Number, force: Sequence[Number]) -> Triple:
     """R(psi) of a body-fixed force."""
     return (*rotate_to_earth(psi, force[0], force[1]), force[2])
 
 
-def to_body(psi: Number, force: Sequence[Any]) -> Triple:
+def to_body(psi: Number, force: Sequence[Number]) -> Triple:
     """R^T(psi) of an earth-fixed force."""
     return (*rotate_to_body(psi, force[0], force[1]), force[2])
 
 
-def climb(values: Any, gains: Any, slopes: Any, dt: Number) -> tuple[Any, ...]:
+def climb(values: Any, gains: Any, slopes: Any, dt: Number) -> tuple[Number, ...]:
     """An explicit Euler step of dt [s] along gains times slopes."""
     return tuple([x + dt * (g * f) for x, g, f in zip(values, gains, slopes, strict=True)])
 
 
-def energy(z: Errors, p: Any, phi: Any, omega: Triple) -> Energy:
+def energy(z: Errors, p: Any, phi: Sequence[Number], omega: Triple) -> Energy:
     """V3 of (4.14), corrected; an estimate whose gain is 0 is left out."""
     known = weighted(p.truth, phi, p.gamma) + weighted(p.omega_true, omega, p.disturbance)
     return Energy(tracking_energy(z, p.belief.inertia) + 0.5 * known)
 
 
-def weighted(truth: Sequence[Any], estimates: Sequence[Any], gains: Sequence[Any]) -> Any:
+def weighted(truth: Sequence[Number], estimates: Sequence[Number], gains: Sequence[Number]) -> Any:
     """Sum of error^2 / gain; a gain of 0 counts as no error."""
     total = 0.0
     for true, estimate, gain in zip(truth, estimates, gains, strict=True):

@@ -5,13 +5,13 @@ omega_hat is what the law compensates for. Every heading difference is wrapped.
 """
 
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import bundle
 from ..frames import rotate_to_body
 from ..hull import Inertia, Triple, inertia_force
-from ..ops import choose, wrap
+from ..ops import Number, choose, wrap
 from ..signals import Estimate, Force, Nothing, Target
 from .parametrisation import GAIN, Parametrisation, Regressors
 
@@ -146,7 +146,7 @@ def control(
     k: Gains,
     belief: Any,
     F: Regressors,
-    phi: Any,
+    phi: Sequence[Number],
     w: Triple,
 ) -> Demand:
     """The force of Table 4.2, split into its linear and nonlinear part, (5.1).

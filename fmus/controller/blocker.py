@@ -1,10 +1,10 @@
 """Algorithm 4, corrected: a gate that keeps spikes out of what is learned."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import POSITIVE
 from ..hull import Triple
-from ..ops import Number, choose, where
+from ..ops import Condition, Number, choose, where
 from .eigen import dot
 
 OFF = 1e6
@@ -27,11 +27,11 @@ class BlockerOptions(NamedTuple):
 class Blocker(NamedTuple):
     """beta = 1 lets learning happen; the timer [s] counts quiet time while it does not."""
 
-    beta: Any = 1.0
-    timer: Any = 0.0
+    beta: Number = 1.0
+    timer: Number = 0.0
 
 
-def exceeds(nu: Triple, nu_dot: Triple, tau: Triple, p: BlockerOptions) -> Number:
+def exceeds(nu: Triple, nu_dot: Triple, tau: Triple, p: BlockerOptions) -> Condition:
     """True where one of the three norms is above its threshold."""
     return (
         (dot(nu_dot, nu_dot) > p.nu_dot_max * p.nu_dot_max)
@@ -40,7 +40,7 @@ def exceeds(nu: Triple, nu_dot: Triple, tau: Triple, p: BlockerOptions) -> Numbe
     )
 
 
-def blocked(s: Blocker, spike: Number, block_time: Number, h: Number) -> Blocker:
+def blocked(s: Blocker, spike: Condition, block_time: Number, h: Number) -> Blocker:
     """The gate after a step of h [s]: shut by a spike, open again when ``block_time`` was quiet."""
     waited = s.timer > block_time
     quiet = Blocker(

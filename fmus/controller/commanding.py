@@ -54,7 +54,7 @@ def commanding(controller: Component, ship: Description) -> Component:
     """
     commands = commands_of(ship)
     names = [a.part.name for a in actuators(ship)]
-    parts = bundle("Believed", **dict(zip(names, believed(ship), strict=True)))
+    parts = bundle("Believed", None, **dict(zip(names, believed(ship), strict=True)))
     params = bundle("Params", own=controller.params(), believed=parts(), helm=Helm())
     outputs: Any = bundle("Outputs", own=controller.outputs(), commands=commands(), force=Commanded())
     untold = controller.inputs().applied

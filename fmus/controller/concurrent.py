@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Component, DeclarationError
 from ..hull import Triple
-from ..ops import Number, choose, not_, sqrt, when, where
+from ..ops import Condition, Number, choose, not_, sqrt, when, where
 from ..signals import Force
 from .adaptive import Disturbance, DisturbanceByError, attentive, energy, parameters, to_body
 from .backstepping import HELD, Inputs, acting, control, control_errors, outputs, starting
@@ -49,7 +49,7 @@ class State(NamedTuple):
     phi_hat: Any
     omega: Triple
     tau: Force
-    time: Any
+    time: Number
     store: Store
     blocker: Blocker
     register: Register
@@ -62,11 +62,11 @@ class Present(NamedTuple):
 
     register: Register
     sample: Sample
-    counts: Any
-    fresh: Any
+    counts: Number
+    fresh: Condition
 
 
-def present(register: Register, now: Sample, span: Number, learns: Number) -> Present:
+def present(register: Register, now: Sample, span: Number, learns: Condition) -> Present:
     """The sample of this instant, or the smoothed one."""
 
     def delayed() -> Present:

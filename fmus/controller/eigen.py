@@ -7,9 +7,9 @@ exceeds a bound, at a fraction of the cost of an eigenvalue, and twenty paramete
 from collections.abc import Sequence
 from typing import Any
 
-from ..ops import Number, fmax, fmin, kernel, sqrt, where
+from ..ops import Condition, Number, fmax, fmin, kernel, sqrt, where
 
-Matrix = Sequence[Sequence[Any]]
+Matrix = Sequence[Sequence[Number]]
 # Diagonal and squared off-diagonal of a tridiagonal matrix.
 Tridiagonal = tuple[list[Any], list[Any]]
 
@@ -18,7 +18,7 @@ HALVINGS = 50
 TINY = 1e-150
 
 
-def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+def dot(a: Sequence[Number], b: Sequence[Number]) -> Any:
     """Sum of products; ``sum`` would round differently from one Python to the next."""
     total = 0.0
     for x, y in zip(a, b, strict=True):
@@ -52,7 +52,7 @@ def tridiagonal(matrix: Matrix) -> Tridiagonal:
     return diagonal, squares
 
 
-def exceed(matrices: Sequence[Tridiagonal], bound: Number) -> Number:
+def exceed(matrices: Sequence[Tridiagonal], bound: Number) -> Condition:
     """True where all eigenvalues of all matrices are above the bound: all pivots are positive."""
     least = 1.0
     for diagonal, squares in matrices:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Triple, inverse_mass
-from ..ops import Number, choose, fmax, when
+from ..ops import Condition, Number, choose, fmax, when
 from .parametrisation import Parametrisation
 from .smoothing import Sample
 
@@ -34,18 +34,18 @@ SOON = 1e-9  # s; a time or an age that has begun
 class Axis(NamedTuple):
     """Position, velocity and disturbance of one axis."""
 
-    p: Any = 0.0
-    v: Any = 0.0
-    d: Any = 0.0
+    p: Number = 0.0
+    v: Number = 0.0
+    d: Number = 0.0
 
 
 class FixedPoint(NamedTuple):
     """The filter, how long it has run [s], and the sample that is being smoothed, of age ``age`` [s]."""
 
     axes: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
-    ran: Any = 0.0
-    age: Any = 0.0
-    time: Any = 0.0
+    ran: Number = 0.0
+    age: Number = 0.0
+    time: Number = 0.0
     tau: Triple = STILL
     driven: Triple = STILL
     smooth: tuple[Axis, Axis, Axis] = (Axis(), Axis(), Axis())
@@ -55,7 +55,7 @@ class FixedPoint(NamedTuple):
 class Now(NamedTuple):
     """What a step brings: time [s], estimated pose and velocity, force that acted."""
 
-    time: Any
+    time: Number
     pose: Triple
     nu: Triple
     tau: Triple
@@ -78,7 +78,7 @@ def later(sigma: Any, K: Triple, h: Number) -> Any:
     return tuple([(x + h * (y - a * x), y + h * (z - b * x), z - h * c * x) for x, y, z in sigma])
 
 
-def driving(model: Parametrisation, psi: Any, nu: Triple, tau: Triple, belief: Any) -> Triple:
+def driving(model: Parametrisation, psi: Number, nu: Triple, tau: Triple, belief: Any) -> Triple:
     """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
     u, v, r = nu
     kX, kY, kN = model.known(u, v, r, belief)
@@ -105,7 +105,13 @@ def begun(now: Now) -> FixedPoint:
 
 
 def advanced(
-    model: Parametrisation, belief: Any, s: FixedPoint, now: Now, span: Number, h: Number, usable: Number
+    model: Parametrisation,
+    belief: Any,
+    s: FixedPoint,
+    now: Now,
+    span: Number,
+    h: Number,
+    usable: Condition,
 ) -> tuple[FixedPoint, Sample, Number]:
     """The smoother after a step of h [s].
 

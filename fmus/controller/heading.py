@@ -93,25 +93,25 @@ class Tuning(NamedTuple):
 class Reference(NamedTuple):
     """Heading [rad], yaw rate [rad/s], yaw acceleration, and speed [m/s] to be held."""
 
-    psi: Any = 0.0
-    r: Any = 0.0
-    r_dot: Any = 0.0
-    u: Any = 0.0
+    psi: Number = 0.0
+    r: Number = 0.0
+    r_dot: Number = 0.0
+    u: Number = 0.0
 
 
 class Notch(NamedTuple):
     """The feedback through one low pass and through two [N.m.s, N.m.s2]."""
 
-    once: Any = 0.0
-    twice: Any = 0.0
+    once: Number = 0.0
+    twice: Number = 0.0
 
 
 class State(NamedTuple):
     """Reference, integral parts of surge force and yaw moment [N, N m], last force, wave filter."""
 
     reference: Reference = Reference()
-    surge: Any = 0.0
-    yaw: Any = 0.0
+    surge: Number = 0.0
+    yaw: Number = 0.0
     tau: Force = Force()
     notch: Notch = Notch()
 

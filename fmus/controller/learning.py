@@ -12,10 +12,11 @@ Q counts the stored samples with their weight.
 With rho > 0, where the matrix is not symmetric, this holds for phi and omega_n each.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..hull import Triple
-from ..ops import Number, fmax, sqrt, when, where
+from ..ops import Condition, Number, fmax, sqrt, when, where
 from .adaptive import Disturbance, DisturbanceByError, climb, to_earth
 from .eigen import dot
 from .parametrisation import Parametrisation, Regressors
@@ -25,7 +26,7 @@ from .store import Row, StoreOptions, Sums, plus, times
 class Memory(NamedTuple):
     """Sum or integral over samples: weight, R target, and F^T R^T."""
 
-    weight: Any
+    weight: Number
     turned: Triple
     cross: tuple[Triple, ...]
 
@@ -40,11 +41,16 @@ def remembered(sums: Sums, integral: Memory, rho: Number, weight: Number) -> Mem
 
 
 def stored_slopes(
-    model: Parametrisation, sums: Sums, phi: Any, omega: Triple, omega_on: Number, stale: Number
-) -> tuple[Any, ...]:
+    model: Parametrisation,
+    sums: Sums,
+    phi: Sequence[Number],
+    omega: Triple,
+    omega_on: Condition,
+    stale: Number,
+) -> tuple[Number, ...]:
     """sum_j F_j^T eps_j, from the sums over the store."""
 
-    def explained() -> tuple[Any, ...]:
+    def explained() -> tuple[Number, ...]:
         parts = list(
             when(
                 omega_on,
@@ -61,7 +67,7 @@ def stored_slopes(
     return when(stale > 0.5, lambda: sums.projected, explained)
 
 
-def earth_slopes(memory: Memory, phi: Any, omega: Triple, stale: Number) -> Triple:
+def earth_slopes(memory: Memory, phi: Sequence[Number], omega: Triple, stale: Number) -> Triple:
     """sum_j R_j eps_j, or its integral."""
     fresh = where(stale > 0.5, 0.0, 1.0)
     a, b, c = (
@@ -93,7 +99,7 @@ class Drive(NamedTuple):
     """An instantaneous error, z2 or eps, with its regressors and heading."""
 
     F: Regressors
-    psi: Any
+    psi: Number
     error: Triple
 
 
@@ -107,7 +113,7 @@ def learned(
     memory: Memory,
     options: StoreOptions,
     dt: Number,
-) -> tuple[Any, Triple, tuple[Any, Any]]:
+) -> tuple[Any, Triple, tuple[Number, Number]]:
     """The estimates after dt [s].
 
     Args:

@@ -17,7 +17,7 @@ GAIN = Range(0.0, 1000.0)
 LOSS = (-1.0, 0.8)
 
 # One tuple of regressors for each axis, aligned with the pattern.
-Regressors = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+Regressors = tuple[tuple[Number, ...], tuple[Number, ...], tuple[Number, ...]]
 
 
 class Coefficient(NamedTuple):
@@ -115,7 +115,7 @@ class Parametrisation:
         return vector("Gamma", fields, [GAIN])
 
     @cached_property
-    def force(self) -> Callable[[Regressors, Sequence[Any]], Triple]:
+    def force(self) -> Callable[[Regressors, Sequence[Number]], Triple]:
         """(F, phi) -> F phi [N, N, N m]."""
         return _written_out(
             "F, phi",
@@ -126,7 +126,7 @@ class Parametrisation:
         )
 
     @cached_property
-    def project(self) -> Callable[[Regressors, Triple], tuple[Any, ...]]:
+    def project(self) -> Callable[[Regressors, Triple], tuple[Number, ...]]:
         """(F, e) -> F^T e, one entry for each parameter."""
         sums: list[list[str]] = [[] for _ in self.coefficients]
         for axis, indices in enumerate(self.pattern):
@@ -146,19 +146,19 @@ class Parametrisation:
         X, Y, N = self.known(*nu, belief)
         return MX - X - tau[0], MY - Y - tau[1], MN - N - tau[2]
 
-    def losses(self, phi: Sequence[Any]) -> Triple | None:
+    def losses(self, phi: Sequence[Number]) -> Triple | None:
         """The limited thruster losses, tau_act = (1 - delta) tau, (7.6); None where not learned."""
         if self.loss is None:
             return None
         a, b, c = (clip(phi[k], *LOSS) for k in self.loss)
         return a, b, c
 
-    def without_loss(self, phi: Sequence[Any]) -> Sequence[Any]:
+    def without_loss(self, phi: Sequence[Number]) -> Sequence[Number]:
         """The parameters with thruster losses of zero."""
         lost = self.loss or ()
         return [0.0 if k in lost else x for k, x in enumerate(phi)] if lost else phi
 
-    def matrices(self, grams: Sequence[Any]) -> list[list[list[Any]]]:
+    def matrices(self, grams: Sequence[Sequence[Sequence[Number]]]) -> list[list[list[Any]]]:
         """The information matrix (F^T F summed up) of each block, from that of each axis."""
         found = []
         for axes in self.blocks:

@@ -8,7 +8,7 @@ There is no feed-forward.
 An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import component
 from ..frames import rotate_to_body
@@ -63,9 +63,9 @@ class Params(NamedTuple):
 class State(NamedTuple):
     """Integrals of the errors north, east and in heading [m s, m s, rad s]."""
 
-    north: Any = 0.0
-    east: Any = 0.0
-    heading: Any = 0.0
+    north: Number = 0.0
+    east: Number = 0.0
+    heading: Number = 0.0
 
 
 def init(i: Inputs, p: Params) -> State:

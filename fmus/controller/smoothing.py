@@ -7,7 +7,7 @@ acceleration the weighted slope of the velocity: the observer's acceleration is 
 from typing import Any, NamedTuple
 
 from ..hull import Triple
-from ..ops import Number, choose, when
+from ..ops import Condition, Number, choose, when
 from .eigen import dot
 
 TAPS = 11
@@ -18,16 +18,16 @@ KERNEL = tuple((1.0 - ((k - 5) / 6.0) ** 2) ** 2 for k in range(TAPS))
 class Sample(NamedTuple):
     """A time [s], heading, velocity, acceleration and force that belong together."""
 
-    time: Any = 0.0
-    psi: Any = 0.0
+    time: Number = 0.0
+    psi: Number = 0.0
     nu: Triple = (0.0, 0.0, 0.0)
     nu_dot: Triple = (0.0, 0.0, 0.0)
     tau: Triple = (0.0, 0.0, 0.0)
 
 
 class Tap(NamedTuple):
-    time: Any = 0.0
-    psi: Any = 0.0
+    time: Number = 0.0
+    psi: Number = 0.0
     nu: Triple = (0.0, 0.0, 0.0)
     tau: Triple = (0.0, 0.0, 0.0)
 
@@ -63,7 +63,9 @@ def smoothed(taps: tuple[Tap, ...]) -> Sample:
     )
 
 
-def shifted(s: Register, now: Tap, span: Number, usable: Number) -> tuple[Register, Number, Number]:
+def shifted(
+    s: Register, now: Tap, span: Number, usable: Condition
+) -> tuple[Register, Condition, Condition]:
     """The register after an instant; emptied where that is not usable.
 
     Returns:

@@ -11,9 +11,11 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import FIXED, POSITIVE, Range
 from ..frames import rotate_to_earth
 from ..hull import Triple
-from ..ops import Number, choose, fmax, fmin, kernel, put, when, where
+from ..ops import Condition, Number, choose, fmax, fmin, kernel, put, when, where
 from .eigen import dot, exceed, smallest, tridiagonal
 from .parametrisation import Parametrisation, Regressors
+
+Grams = tuple[tuple[tuple[Number, ...], ...], ...]  # of each axis, a symmetric matrix
 
 SIZE = 20
 NEVER = 1e300
@@ -34,8 +36,8 @@ class Row(NamedTuple):
     """A stored sample; ``target`` is y, or eps as it was with ``stale`` = 1."""
 
     filled: Any
-    time: Any
-    psi: Any
+    time: Number
+    psi: Number
     target: Triple
     F: Regressors
 
@@ -48,8 +50,8 @@ class Sums(NamedTuple):
     least: Any
     oldest: Any
     newest: Any
-    projected: tuple[Any, ...]
-    grams: tuple[Any, ...]
+    projected: tuple[Number, ...]
+    grams: Grams
     turned: Triple
     cross: tuple[Triple, ...]
 
@@ -72,7 +74,7 @@ def window(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) 
 def singular(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) -> tuple[Row, ...]:
     """Algorithm 2, corrected: fill up, then exchange the row that raises the smallest singular value of
     the stacked regressors most, on strict increase."""
-    free: Any = -1.0
+    free: Number = -1.0
     for k in reversed(range(SIZE)):
         free = where(rows[k].filled < 0.5, float(k), free)
     return when(
@@ -98,7 +100,7 @@ def _worst(model: Parametrisation, rows: tuple[Row, ...], sums: Sums, row: Row) 
     return index
 
 
-def _added(grams: tuple[Any, ...], F: Regressors, sign: float) -> tuple[Any, ...]:
+def _added(grams: Grams, F: Regressors, sign: float) -> Grams:
     """The information of each axis with that of a sample added or taken away."""
     return plus(grams, [[[sign * a * b for b in f] for a in f] for f in F])
 
@@ -114,10 +116,10 @@ def empty_store(model: Parametrisation) -> Store:
 
 
 @kernel
-def summed(omega_on: Number, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
+def summed(omega_on: Condition, rows: tuple[Row, ...], model: Parametrisation) -> Sums:
     """All sums anew; an empty row is zero and adds nothing."""
     count, oldest, newest = 0.0, NEVER, 0.0
-    projected: tuple[Any, ...] = (0.0,) * len(model.coefficients)
+    projected: tuple[Number, ...] = (0.0,) * len(model.coefficients)
     for row in rows:
         count = count + row.filled
         oldest = fmin(oldest, where(row.filled > 0.5, row.time, NEVER))
@@ -149,7 +151,7 @@ def times(factor: Number, a: Any) -> Any:
     return type(a)._make(items) if hasattr(a, "_make") else tuple(items)  # pyright: ignore
 
 
-def _gram(samples: list[tuple[Any, ...]]) -> tuple[Any, ...]:
+def _gram(samples: list[tuple[Number, ...]]) -> tuple[tuple[Number, ...], ...]:
     """Sum of f f^T, symmetric."""
     columns = list(zip(*samples, strict=True))
     half = [[dot(a, columns[j]) for j in range(i + 1)] for i, a in enumerate(columns)]
@@ -168,7 +170,7 @@ def _earth_fixed(model: Parametrisation, rows: tuple[Row, ...]) -> tuple[Triple,
     return turned, cross
 
 
-def moved(F: Regressors, last: Regressors, change: Number) -> Number:
+def moved(F: Regressors, last: Regressors, change: Number) -> Condition:
     """True where the regressors differ by at least ``change`` in the Frobenius norm."""
     square = 0.0
     for a, b in zip(F, last, strict=True):
@@ -182,10 +184,10 @@ def offer(
     storage: Storage,
     store: Store,
     row: Row,
-    usable: Number,
+    usable: Condition,
     now: Number,
     p: StoreOptions,
-    omega_on: Number,
+    omega_on: Condition,
 ) -> Store:
     """The store after a step.
 

@@ -69,8 +69,8 @@ def slow(
         **more,
     )
     def function(
-        before: tuple[Any, ...], wanted: tuple[Any, ...], h: Number, lag: Number
-    ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        before: tuple[Number, ...], wanted: tuple[Number, ...], h: Number, lag: Number
+    ) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
         share = share_reached(h, lag)
         angles = turns or (False,) * len(before[own])
         moved = [
@@ -186,7 +186,7 @@ class Kept(NamedTuple):
     """Commands that a delay remembers, the latest first, and the time since the latest [s]."""
 
     since: Any
-    commands: tuple[tuple[Any, ...], ...]
+    commands: tuple[tuple[Number, ...], ...]
 
 
 @effect(
@@ -211,10 +211,10 @@ class Kept(NamedTuple):
 )
 def delay(
     kept: Kept,
-    command: tuple[Any, ...],
+    command: tuple[Number, ...],
     h: Number,
     delay: Annotated[float, "s", "pure delay of all thrusters", LONGEST] = 0.0,
-) -> tuple[Kept, tuple[Any, ...]]:
+) -> tuple[Kept, tuple[Number, ...]]:
     """Pure delay: the mean over the step of held commands of some time ago."""
     since = kept.since + h
     # Time between two remembered commands: a step, or more where the delay is long.

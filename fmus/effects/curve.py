@@ -15,7 +15,7 @@ def hats(x: Number, low: Number, high: Number, count: int) -> list[Any]:
     return [fmax(0.0, 1.0 - abs(place - k)) for k in range(count)]
 
 
-def interpolate(x: Number, low: Number, high: Number, values: Sequence[Any]) -> Any:
+def interpolate(x: Number, low: Number, high: Number, values: Sequence[Number]) -> Any:
     """The piecewise linear curve through ``values`` at equally spaced nodes from low to high, at x."""
     if is_series(x) and not any(map(is_series, values)):
         return series_between(x, low, high, values)

@@ -1,7 +1,7 @@
 """Wind, waves and current: what acts on the ship from outside."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 from ..declare import POSITIVE, Range
 from ..frames import rotate_to_body
@@ -140,6 +140,6 @@ def current(
     ship: Motion,
     V_n: Annotated[float, "m/s", "the water's velocity to the north", Range(-2.0, 2.0)] = 0.0,
     V_e: Annotated[float, "m/s", "the water's velocity to the east", Range(-2.0, 2.0)] = 0.0,
-) -> tuple[Any, Any]:
+) -> tuple[Number, Number]:
     """Irrotational current; gives the water's body-fixed velocity [m/s, m/s]."""
     return rotate_to_body(ship.psi, V_n, V_e)

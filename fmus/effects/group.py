@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..declare import Variable, group_of
-from ..ops import Number, when
+from ..ops import Condition, when
 from .effect import Effect
 
 
@@ -15,11 +15,11 @@ class Member(NamedTuple):
     parameters: slice
     coefficients: tuple[int, ...]
 
-    def acting(self, values: Any) -> Number:
+    def acting(self, values: Any) -> Condition:
         """Whether any coefficient is not zero, for the group's parameters."""
         return _any(self.coefficients, values)
 
-    def apply(self, acts: Number, values: Any, otherwise: Any, *at: Any) -> Any:
+    def apply(self, acts: Condition, values: Any, otherwise: Any, *at: Any) -> Any:
         """What the effect makes of its leading arguments.
 
         Args:
@@ -41,11 +41,11 @@ class Group(NamedTuple):
     params: type[Any]
     members: tuple[Member, ...]
 
-    def acting(self, values: Any) -> tuple[Number, ...]:
+    def acting(self, values: Any) -> tuple[Condition, ...]:
         """For each effect whether it acts, for the group's parameters."""
         return tuple([member.acting(values) for member in self.members])
 
-    def any_acts(self, values: Any) -> Number:
+    def any_acts(self, values: Any) -> Condition:
         """Whether any effect acts, for the group's parameters."""
         return _any([k for member in self.members for k in member.coefficients], values)
 
@@ -62,7 +62,7 @@ def group(typename: str, chosen: Iterable[Effect]) -> Group:
     return Group(group_of(typename, found), tuple(members))
 
 
-def _any(coefficients: Iterable[int], values: Any) -> Number:
+def _any(coefficients: Iterable[int], values: Any) -> Condition:
     """Whether any of some values is not zero."""
     total = 0.0
     for k in coefficients:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..declare import POSITIVE, Variable
-from ..ops import Number, clip, fmax, where
+from ..ops import Condition, Number, clip, fmax, where
 from .devices import SHARE, Devices, added, changed, declared, parameter
 from .effect import Effect, Running, Search, Thrust, Values
 from .text import Found, capital, lost, number, percent
@@ -99,7 +99,7 @@ def failure(d: Devices) -> Effect:
     return function
 
 
-def inside(t: Number, times: Sequence[Number]) -> Number:
+def inside(t: Number, times: Sequence[Number]) -> Condition:
     """Whether a time lies in any of some intervals [start, end), given one after the other [s]."""
     pairs = zip(times[::2], times[1::2], strict=True)
     found, *others = [(t >= start - INSTANT) & (t < end - INSTANT) for start, end in pairs]

@@ -1,15 +1,16 @@
 """Faults of the measurement chain that pass for physics."""
 
 from math import degrees
-from typing import Annotated, Any
+from typing import Annotated
 
 from ..declare import Range, Variable
 from ..frames import rotate_to_earth
+from ..ops import Number
 from .effect import Effect, Search, Wording, effect
 from .families import CLOCK, MEASUREMENT
 from .text import Found, number, offset, towards
 
-Pose = tuple[Any, Any, Any]
+Pose = tuple[Number, Number, Number]
 ABOARD = Range(-0.6, 0.6)  # the ship is 1.1 m long
 # Offsets of the clock to try [s]: some samples, and what a slow network gives.
 OFFSETS = (-0.5, -0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.5)

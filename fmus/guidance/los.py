@@ -54,9 +54,9 @@ class Params(NamedTuple):
 class State(NamedTuple):
     """The leg, from 0; whether the route is at its end; y_int [s]."""
 
-    leg: Any = 0.0
-    arrived: Any = 0.0
-    y_int: Any = 0.0
+    leg: Number = 0.0
+    arrived: Number = 0.0
+    y_int: Number = 0.0
 
 
 class Outputs(NamedTuple):
@@ -70,9 +70,9 @@ class Outputs(NamedTuple):
 class Line(NamedTuple):
     """A leg: where it begins [m], its direction [rad] and length [m]; the ship along and off it [m]."""
 
-    x: Any
-    y: Any
-    course: Any
+    x: Number
+    y: Number
+    course: Number
     length: Any
     ahead: Any
     aside: Any

@@ -5,7 +5,7 @@ common period within an hour, so that velocities, accelerations and their signs 
 combinations, crabbing and turning on the spot among them. The motion starts from rest.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import FIXED, Range, component
 from ..ops import Number, cos, sin, wrap
@@ -29,12 +29,12 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    t: Any = 0.0
+    t: Number = 0.0
 
 
 def swing(
     slow: Number, quick: Number, frequencies: tuple[float, float], rate: Number, t: Number
-) -> tuple[Any, Any, Any]:
+) -> tuple[Number, Number, Number]:
     """Deviation of one axis from its start at time t [s], and its first two derivatives."""
     w1, w2 = rate * frequencies[0], rate * frequencies[1]
     a, b = 0.5 * slow, 0.5 * quick

@@ -48,7 +48,7 @@ class Beat(NamedTuple):
     factor: Any
     slope: Any
 
-    def rates(self, rate: Number, acceleration: Number) -> tuple[Any, Any]:
+    def rates(self, rate: Number, acceleration: Number) -> tuple[Number, Number]:
         """First two derivatives in time of a path parameter, from those of the steady run."""
         return rate * self.factor, acceleration * self.factor * self.factor + rate * self.slope
 

@@ -18,8 +18,8 @@ class Course(NamedTuple):
 class PathPoint(NamedTuple):
     """A point of a path and its first three derivatives by theta, north and east."""
 
-    x: Any
-    y: Any
+    x: Number
+    y: Number
     x1: Any
     y1: Any
     x2: Any

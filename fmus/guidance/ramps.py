@@ -10,7 +10,7 @@ class Shape(NamedTuple):
 
     integral: Any
     value: Any
-    rate: Any
+    rate: Number
     curvature: Any
 
 

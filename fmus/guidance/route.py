@@ -13,7 +13,7 @@ smoothly over to the other.
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..ops import Number, atan2, choose, clip, cos, fmax, fmin, not_, sin, sqrt, where, wrap
+from ..ops import Condition, Number, atan2, choose, clip, cos, fmax, fmin, not_, sin, sqrt, where, wrap
 from .ramps import ramp, smooth
 
 # Further than anything goes [m]: where a leg starts that the route does not have.
@@ -40,10 +40,10 @@ class Waypoint(NamedTuple):
         speed: relative to the common speed [1].
     """
 
-    x: Any
-    y: Any
-    psi: Any
-    speed: Any
+    x: Number
+    y: Number
+    psi: Number
+    speed: Number
 
 
 class Leg(NamedTuple):
@@ -59,15 +59,15 @@ class Leg(NamedTuple):
     """
 
     start: Any
-    x: Any
-    y: Any
-    course: Any
+    x: Number
+    y: Number
+    course: Number
     turn: Any
     heading: Any
-    swing: Any
+    swing: Number
     straight: Any
     bend: Any
-    speed: Any
+    speed: Number
     gain: Any
 
     def span(self) -> Any:
@@ -82,12 +82,12 @@ class Leg(NamedTuple):
 class Place(NamedTuple):
     """Position [m] and heading [rad] on a route, with their first two derivatives by w."""
 
-    pose: tuple[Any, Any, Any]
-    first: tuple[Any, Any, Any]
-    second: tuple[Any, Any, Any]
+    pose: tuple[Number, Number, Number]
+    first: tuple[Number, Number, Number]
+    second: tuple[Number, Number, Number]
 
 
-def displacement(turn: Number, part: Number) -> tuple[Any, Any]:
+def displacement(turn: Number, part: Number) -> tuple[Number, Number]:
     """Ahead and aside along the first ``part`` (0 to 1) of a bend of length 1."""
     ahead = aside = 0.0
     for place, weight in RULE:
@@ -104,7 +104,11 @@ def bend_length(turn: Number, reach: Number) -> Number:
 
 
 def lay_out(
-    points: Sequence[Waypoint], inside: Sequence[Number], loop: Number, along: Number, corner: Number
+    points: Sequence[Waypoint],
+    inside: Sequence[Condition],
+    loop: Condition,
+    along: Condition,
+    corner: Number,
 ) -> tuple[Leg, ...]:
     """Legs from each way point to the next.
 
@@ -121,7 +125,7 @@ def lay_out(
     size = len(points)
     last = [inside[k] & not_(inside[k + 1]) for k in range(size - 1)] + [inside[size - 1]]
 
-    def following(values: Sequence[Any], k: int) -> Any:
+    def following(values: Sequence[Number], k: int) -> Any:
         """What belongs to the way point behind k."""
         return where(last[k], values[0], values[min(k + 1, size - 1)])
 

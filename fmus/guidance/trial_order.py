@@ -10,7 +10,7 @@ execute.
 from typing import Annotated, Any, NamedTuple
 
 from ..declare import POSITIVE, Range
-from ..ops import Number, where
+from ..ops import Condition, Number, where
 
 START = Annotated[float, "s", "time of the first execute", POSITIVE]
 ANGLE = Annotated[
@@ -40,10 +40,10 @@ class Order(NamedTuple):
 class Clock(NamedTuple):
     """State of a trial that goes by time alone [s]."""
 
-    t: Any = 0.0
+    t: Number = 0.0
 
 
-def begun(t: Number, start: Number, h: Number) -> Number:
+def begun(t: Number, start: Number, h: Number) -> Condition:
     """Whether the instant t [s] is the first execute's or later, at steps of h [s]."""
     return t > start - 0.5 * h
 

@@ -7,7 +7,7 @@ After a steady approach the order is put over to one side (first execute); when 
 An input that is NaN or infinite keeps its last finite value.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range, component
 from ..ops import Number, where
@@ -29,9 +29,9 @@ class Params(NamedTuple):
 class State(NamedTuple):
     """Time [s], original heading [rad], the order."""
 
-    t: Any = 0.0
-    psi_0: Any = 0.0
-    order: Any = 0.0
+    t: Number = 0.0
+    psi_0: Number = 0.0
+    order: Number = 0.0
 
 
 def init(i: Inputs, p: Params) -> State:

@@ -50,26 +50,26 @@ class Rates(NamedTuple):
 class Covariance(NamedTuple):
     """Entries of the symmetric matrix; its start is what is believed before anything is measured."""
 
-    pp: Any = 1.0
-    pv: Any = 0.0
-    pd: Any = 0.0
-    ps: Any = 0.0
-    vv: Any = 0.01
-    vd: Any = 0.0
-    vs: Any = 0.0
-    dd: Any = 0.0025
-    ds: Any = 0.0
-    ss: Any = 0.0
+    pp: Number = 1.0
+    pv: Number = 0.0
+    pd: Number = 0.0
+    ps: Number = 0.0
+    vv: Number = 0.01
+    vd: Number = 0.0
+    vs: Number = 0.0
+    dd: Number = 0.0025
+    ds: Number = 0.0
+    ss: Number = 0.0
 
 
 class Axis(NamedTuple):
     """Disturbance [m/s2 or rad/s2], its slope and the learnt variance of that; mean innovation in
     standard deviations; covariance."""
 
-    d: Any = 0.0
-    slope: Any = 0.0
-    variance: Any = 0.0
-    bias: Any = 0.0
+    d: Number = 0.0
+    slope: Number = 0.0
+    variance: Number = 0.0
+    bias: Number = 0.0
     covariance: Covariance = Covariance()
 
 

@@ -1,10 +1,10 @@
 """Observers that predict and correct, 4.3.3 and 4.3.4: what the two of the thesis share."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range
 from ..frames import rotate_to_body, rotate_to_earth
-from ..ops import Number, clip, where
+from ..ops import Condition, Number, clip, where
 from ..signals import Estimate
 from .derivative import FRACTION, Acceleration, accelerated, weight
 from .screen import Inputs, Sample, Seen, first_look
@@ -30,12 +30,12 @@ class Gains(NamedTuple):
 class MotionState(NamedTuple):
     """Pose, heading continuous over turns, and body-fixed velocity."""
 
-    x: Any = 0.0
-    y: Any = 0.0
-    psi: Any = 0.0
-    u: Any = 0.0
-    v: Any = 0.0
-    r: Any = 0.0
+    x: Number = 0.0
+    y: Number = 0.0
+    psi: Number = 0.0
+    u: Number = 0.0
+    v: Number = 0.0
+    r: Number = 0.0
 
 
 class State(NamedTuple):
@@ -83,7 +83,7 @@ def corrected(m: MotionState, s: Sample, k: Gains, h: Number) -> MotionState:
 
 
 def estimated(
-    s: State, seen: Seen, after: MotionState, good: Number, k: Gains, h: Number
+    s: State, seen: Seen, after: MotionState, good: Condition, k: Gains, h: Number
 ) -> tuple[State, Estimate]:
     """State and outputs after a step that ends in ``after``."""
     nu = (after.u, after.v, after.r)

@@ -1,6 +1,6 @@
 """The derivative filter, (4.45): pose filtered, differentiated, and the rates filtered again."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range
 from ..frames import rotate_to_body
@@ -20,20 +20,20 @@ class Weights(NamedTuple):
 class Filtered(NamedTuple):
     """Filtered pose and earth-fixed rates."""
 
-    x: Any = 0.0
-    y: Any = 0.0
-    psi: Any = 0.0
-    x_dot: Any = 0.0
-    y_dot: Any = 0.0
-    psi_dot: Any = 0.0
+    x: Number = 0.0
+    y: Number = 0.0
+    psi: Number = 0.0
+    x_dot: Number = 0.0
+    y_dot: Number = 0.0
+    psi_dot: Number = 0.0
 
 
 class Acceleration(NamedTuple):
     """Body-fixed acceleration: the differenced velocity estimate, low-passed."""
 
-    u_dot: Any = 0.0
-    v_dot: Any = 0.0
-    r_dot: Any = 0.0
+    u_dot: Number = 0.0
+    v_dot: Number = 0.0
+    r_dot: Number = 0.0
 
 
 def weight(a: Number, h: Number, period: Number) -> Number:
@@ -60,13 +60,17 @@ def filtered(f: Filtered, x: Number, y: Number, psi: Number, w: Weights, h: Numb
     )
 
 
-def body_velocity(f: Filtered) -> tuple[Any, Any, Any]:
+def body_velocity(f: Filtered) -> tuple[Number, Number, Number]:
     """nu_hat = R^T(psi) eta_dot [m/s, m/s, rad/s], (4.45)."""
     return *rotate_to_body(f.psi, f.x_dot, f.y_dot), f.psi_dot
 
 
 def accelerated(
-    s: Acceleration, before: tuple[Any, Any, Any], after: tuple[Any, Any, Any], b: Number, h: Number
+    s: Acceleration,
+    before: tuple[Number, Number, Number],
+    after: tuple[Number, Number, Number],
+    b: Number,
+    h: Number,
 ) -> Acceleration:
     """The acceleration estimate after the velocity went from ``before`` to ``after`` in h [s].
 

@@ -4,7 +4,7 @@ A freeze looks like a ship that stands still, its end like a jump, and a heading
 turn. Only a sample that is NaN or infinite is left out, and the last one taken in its place.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..declare import component
 from ..ops import Number, choose, is_finite, where
@@ -22,10 +22,10 @@ from .screen import Inputs
 
 
 class State(NamedTuple):
-    started: Any = 0.0
-    x_m: Any = 0.0
-    y_m: Any = 0.0
-    psi_m: Any = 0.0
+    started: Number = 0.0
+    x_m: Number = 0.0
+    y_m: Number = 0.0
+    psi_m: Number = 0.0
     filter: Filtered = Filtered()
     acceleration: Acceleration = Acceleration()
 

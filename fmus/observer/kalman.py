@@ -11,12 +11,12 @@ for longer than ``rest_time``, the model is left too and the velocity fades, bec
 unstable above 0.04 m/s. A force that is NaN or infinite counts as zero.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range, component
 from ..frames import rotate_to_body, rotate_to_earth
 from ..hull import Damping, Hull, Inertia, inverse_mass, motion
-from ..ops import Number, choose, clip, exp, finite, fmax, when, where
+from ..ops import Condition, Number, choose, clip, exp, finite, fmax, when, where
 from ..signals import Estimate, Force
 from .axis import MOST, Axis, Learning, Rates, later, rates, taken
 from .correction import MotionState
@@ -68,7 +68,7 @@ class State(NamedTuple):
     seen: Seen = Seen()
     belief: Belief = Belief()
     acceleration: Acceleration = Acceleration()
-    refused: Any = 0.0
+    refused: Number = 0.0
 
 
 def predicted(
@@ -113,7 +113,7 @@ def believed(s: State, ahead: MotionState, keep: Number, p: Params, k: Rates, h:
     )
 
 
-def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Number]:
+def corrected(b: Belief, s: Sample, p: Params, k: Rates) -> tuple[Belief, Condition]:
     """The belief after a sample, and whether the sample fits to what was believed."""
     m, n, rejection = b.motion, p.noise, p.rejection
     ahead, aside = rotate_to_body(m.psi, s.x - m.x, s.y - m.y)

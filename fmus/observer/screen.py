@@ -5,10 +5,10 @@ or exactly zero in all three channels. A pose that stays identical for longer th
 taken to be true: the ship lies still.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from ..declare import Range
-from ..ops import TWO_PI, Number, clip, finite, floor, is_finite, not_, where
+from ..ops import TWO_PI, Condition, Number, clip, finite, floor, is_finite, not_, where
 from ..signals import Force, Measurement
 
 MOST_FORCE = 1e3  # N, N m; beyond, arithmetic may overflow
@@ -40,15 +40,15 @@ class Sample(NamedTuple):
     """A screened sample: whether it is good, and the first one; whether there has been none for long;
     its pose with continuous heading, which is finite even if the sample is not."""
 
-    good: Any
-    first: Any
-    overdue: Any
-    x: Any
-    y: Any
-    psi: Any
+    good: Condition
+    first: Condition
+    overdue: Condition
+    x: Number
+    y: Number
+    psi: Number
 
 
-def present(m: Measurement) -> Number:
+def present(m: Measurement) -> Condition:
     """Whether a sample is a measurement at all: finite and not (0, 0, 0)."""
     zero = (m.x_m == 0.0) & (m.y_m == 0.0) & (m.psi_m == 0.0)
     return is_finite(m.x_m + m.y_m + m.psi_m) & not_(zero)

@@ -8,7 +8,7 @@ characteristic, the effects with a memory of forces (a lag), all in :mod:`fmus.a
 then the effects without a memory.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple
 
 from ..actuators.response import (
@@ -82,7 +82,9 @@ class Outputs(NamedTuple):
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
 
 
-def running(t: Number, u: Number, v: Number, r: Number, commands: Triple, b: Prepared) -> Running:
+def running(
+    t: Number, u: Number, v: Number, r: Number, commands: tuple[Number, ...], b: Prepared
+) -> Running:
     """What the force of this ship's thrusters may depend on, one set of commands for both VSP."""
     vsp, bow = b.params.power
     return Running(t, u, v, r, commands, tuple([commands[k] for k in BOTH]), (vsp, vsp, bow))
@@ -107,7 +109,7 @@ def acting(shares: Triple, now: Running, b: Prepared) -> Thrust:
     return _forces((ahead, ahead), (aside, aside), shares[2], 0.5, now, b)
 
 
-def acting_apart(shares: Any, now: Running, b: Prepared) -> Thrust:
+def acting_apart(shares: Sequence[Number], now: Running, b: Prepared) -> Thrust:
     """The same for shares of surge and sway force of VSP 1, of VSP 2, and of the bow thruster."""
     port, port_aside, starboard, starboard_aside, across = shares
     F_vsp = b.params.plant.plant_F_vsp
@@ -116,7 +118,12 @@ def acting_apart(shares: Any, now: Running, b: Prepared) -> Thrust:
 
 
 def _forces(
-    ahead: tuple[Any, Any], aside: tuple[Any, Any], across: Any, each: float, now: Running, b: Prepared
+    ahead: tuple[Number, Number],
+    aside: tuple[Number, Number],
+    across: Any,
+    each: float,
+    now: Running,
+    b: Prepared,
 ) -> Thrust:
     """The forces of both VSP [N], ``each`` of which counts so often, and of the bow thruster."""
     p = b.params

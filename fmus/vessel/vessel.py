@@ -38,7 +38,7 @@ from ..hull import (
     term_variable,
 )
 from ..hull_functions import FUNCTIONS
-from ..ops import Number, finite, when, wrap
+from ..ops import Condition, Number, finite, when, wrap
 from ..scale import REFERENCE_LENGTH
 from ..ship_description import Description, Part, Value
 from ..signals import Force, Measurement, Velocity
@@ -126,12 +126,12 @@ class Prepared(NamedTuple):
     params: Any
     effects: VesselEffects
     hull: Hull
-    changes: tuple[Any, ...]
-    outside: tuple[Any, ...]
-    measurement: tuple[Any, ...]
-    changed: Any
-    disturbed: Any
-    heavier: Any
+    changes: tuple[Condition, ...]
+    outside: tuple[Condition, ...]
+    measurement: tuple[Condition, ...]
+    changed: Condition
+    disturbed: Condition
+    heavier: Condition
 
 
 def prepared(p: Any, effects: VesselEffects) -> Prepared:
@@ -151,8 +151,8 @@ def prepared(p: Any, effects: VesselEffects) -> Prepared:
 
 def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
     """The ship as the water sees it, and the water's body-fixed velocity [m/s, m/s]."""
-    u_c: Any = 0.0
-    v_c: Any = 0.0
+    u_c: Number = 0.0
+    v_c: Number = 0.0
     for member in b.effects.water.members:
         du, dv = member.effect(s, *b.params.water[member.parameters])
         u_c, v_c = u_c + du, v_c + dv
@@ -246,7 +246,7 @@ def moved(s: State, tau: Force, b: Any, h: Number, law: Any) -> tuple[State, Tri
     return after, law(after, tau, b)
 
 
-def described(ship: Description) -> tuple[Any, Any, Any]:
+def described(ship: Description) -> tuple[Number, Number, Number]:
     """Inertia, damping and start of a described ship, with where their values come from."""
     given = ship.values()
 

@@ -22,7 +22,7 @@ from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
 from ..signals import Force
 from ..thrusters.allocation import Allocation, allocate
 
-Triple = tuple[Any, Any, Any]
+Triple = tuple[Number, Number, Number]
 
 ROWS = 20  # of the window
 LEAST_ROWS = 4  # since the failure, before it is told
@@ -65,36 +65,36 @@ class Row(NamedTuple):
     usual is not sure where the ship has never been), the likelihood ratios then, and whether enough had
     been learned for these to count."""
 
-    filled: Any = 0.0
-    time: Any = 0.0
+    filled: Number = 0.0
+    time: Number = 0.0
     nu: Triple = STILL
     f: Triple = STILL
     g: Triple = STILL
     error: Triple = STILL
-    unsure: Any = 1.0
-    ratios: tuple[Any, Any] = (1.0, 1.0)
-    fair: Any = 0.0
+    unsure: Number = 1.0
+    ratios: tuple[Number, Number] = (1.0, 1.0)
+    fair: Number = 0.0
 
 
 class Usual(NamedTuple):
     """What is usual: covariance of the regressors' weights over the noise, weights of each g, mean
     square error of the prediction, mean likelihood ratios, how long was learned, and judged [s]."""
 
-    P: tuple[tuple[Any, ...], ...] = tuple(
+    P: tuple[tuple[Number, ...], ...] = tuple(
         [
             tuple([(SPREAD[i] / NOISE) ** 2 if i == j else 0.0 for j in range(COUNT)])
             for i in range(COUNT)
         ]
     )
-    weights: tuple[tuple[Any, ...], ...] = ((0.0,) * COUNT,) * 3
+    weights: tuple[tuple[Number, ...], ...] = ((0.0,) * COUNT,) * 3
     square: Triple = (NOISE * NOISE, NOISE * NOISE, NOISE * NOISE)
-    ratios: tuple[Any, Any] = (1.0, 1.0)
-    learned: Any = 0.0
-    judged: Any = 0.0
+    ratios: tuple[Number, Number] = (1.0, 1.0)
+    learned: Number = 0.0
+    judged: Number = 0.0
 
 
 class State(NamedTuple):
-    time: Any
+    time: Number
     quiet: Any  # s since the last frozen measurement
     waited: Any  # s since the last sample
     nu: Triple
@@ -122,7 +122,7 @@ def low_pass(before: Triple, now: Triple, share: Number) -> Triple:
     return a, b, c
 
 
-def regressors(nu: Triple, f: Triple) -> tuple[Any, ...]:
+def regressors(nu: Triple, f: Triple) -> tuple[Number, ...]:
     return (1.0, *nu, *f)
 
 
@@ -185,7 +185,7 @@ def evidence(rows: tuple[Row, ...], usual: Usual, axes: tuple[int, ...], least: 
     return up * up / down, best, share, since
 
 
-def judged(rows: tuple[Row, ...], usual: Usual, p: Params) -> tuple[tuple[Any, Any], Outputs]:
+def judged(rows: tuple[Row, ...], usual: Usual, p: Params) -> tuple[tuple[Number, Number], Outputs]:
     """The likelihood ratios of the window, and what is told."""
     whole_v, best_v, lost_v, since_v = evidence(rows, usual, (0, 1), p.least_loss)
     whole_b, best_b, lost_b, since_b = evidence(rows, usual, (2,), p.least_loss)

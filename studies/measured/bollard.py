@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -70,7 +70,7 @@ def surge_force(model: Model, command: np.ndarray) -> np.ndarray:
         (n,) [N].
     """
     none = np.zeros_like(command)
-    commands = (command, none, none)
+    commands: Any = (command, none, none)
     now = chain.running(0.0, 0.0, 0.0, 0.0, commands, model.drive)
     X, _, _ = chain.act(commands, now, model.drive)
     return np.broadcast_to(X, command.shape)
