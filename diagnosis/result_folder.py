@@ -1,5 +1,6 @@
 """Files that appear in a folder together, when all of them are whole, and which folder that is."""
 
+import errno
 import hashlib
 import json
 import os
@@ -17,6 +18,7 @@ from cosim.process import STATE
 # In a folder that nobody chose: the hashes of what the result there was made of.
 MADE_OF = ".inputs.json"
 LOGS = ("log.csv", "log.parquet")
+TRIES = 10  # to make a folder that other commands, which end without a result, remove again; chosen
 
 
 @contextmanager
@@ -39,8 +41,7 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
         scratch = None
         try:
             try:
-                out.mkdir(parents=True, exist_ok=True)
-                scratch = Path(mkdtemp(prefix=".new-", dir=out))
+                scratch = _scratch(out)
                 STATE.unfinished(*(folder.absolute() for folder in (scratch, *made)))
             except OSError as error:
                 raise InputError(f"cannot write to '{out}': {error.strerror or error}") from None
@@ -63,6 +64,15 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
                 for folder in made:
                     folder.rmdir()
             STATE.unfinished()
+
+
+def _scratch(out: Path) -> Path:
+    """A new folder in one that is made if it is not there, though another command may take that away."""
+    for _ in range(TRIES):
+        out.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):
+            return Path(mkdtemp(prefix=".new-", dir=out))
+    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
 
 
 def sha256(path: Path) -> str:

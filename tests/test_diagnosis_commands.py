@@ -24,7 +24,7 @@ from support.shared import once
 
 import diagnosis
 from cosim import InputError
-from diagnosis import compare, learn, session
+from diagnosis import compare, learn, result_folder, session
 from diagnosis.report import result_keys
 from diagnosis.result_folder import together
 from fmus.effects import STANDARD
@@ -467,6 +467,20 @@ def write(out, text, error=None, names=("a", "b")):
         assert not error or new.parent == out
         if error:
             raise error
+
+
+def test_folder_that_another_command_takes_away_is_made_again(tmp_path, monkeypatch):
+    out, made = tmp_path / "a" / "b", result_folder.mkdtemp
+
+    def taken_away(**options):
+        monkeypatch.setattr(result_folder, "mkdtemp", made)
+        out.rmdir()
+        return made(**options)
+
+    monkeypatch.setattr(result_folder, "mkdtemp", taken_away)
+    with together(out, ["x"]) as new:
+        (new / "x").write_text("x")
+    assert [f.name for f in out.iterdir()] == ["x"]
 
 
 def test_files_appear_together_or_not_at_all(tmp_path):

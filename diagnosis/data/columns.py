@@ -282,7 +282,7 @@ def signals(
             CyberShip Enterprise 1.
 
     Raises:
-        InputError: a column is missing.
+        InputError: a column is missing, or there twice.
     """
     every = COMMANDS if commands is None else (tuple(commands), TAU)
     groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
@@ -309,6 +309,8 @@ def signals(
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):
         name = layout.column(signal).name
+        if names.count(name) > 1:
+            raise InputError(f"{where} has the column '{name}' more than once")
         if name not in names and signal in TAU and signal not in named and not _named_so(signal, others):
             del wanted[signal]
         elif name not in names:

@@ -24,18 +24,20 @@ def _options(layout: Layout) -> dict[str, Any]:
 
 
 def csv_names(path: Path, layout: Layout) -> list[str]:
-    """The names of the columns.
+    """The names of the columns as they stand there, one that is there twice included.
 
     Raises:
         InputError: the text is in another encoding.
         OSError, ValueError: it cannot be read.
     """
     try:
-        first = pd.read_csv(path, nrows=0, **_options(layout))
+        first = pd.read_csv(
+            path, nrows=1, header=None, dtype=str, keep_default_na=False, **_options(layout)
+        )
     except UnicodeDecodeError:
         refuse_encoding(path, layout)
         raise
-    return [str(name).strip() for name in first.columns]
+    return [name.strip() for name in first.iloc[0]]
 
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:

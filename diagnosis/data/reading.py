@@ -259,8 +259,6 @@ def _signals(
     quantities = QUANTITY | outputs(commands) | {s: OF_UNIT[unit] for s, unit in commands.items()}
     for signal in wanted:
         column = layout.column(signal)
-        if table.columns.tolist().count(column.name) > 1:
-            raise InputError(f"'{path}' has the column '{column.name}' more than once")
         cells = table[column.name]
         stamps = date_stamps(cells, f"'{path}'") if signal == "time" else None
         if stamps is None:
