@@ -239,7 +239,7 @@ def test_column_that_is_there_twice_is_refused(tmp_path):
     twice.to_csv(path, index=False)
     for measurement in (path, twice):
         with pytest.raises(InputError, match="has the column 'x' more than once"):
-            diagnosis.gather([measurement])
+            diagnosis.load([measurement])
 
 
 def test_singular_equations_are_told_as_a_matter_of_the_data(tmp_path, monkeypatch):
