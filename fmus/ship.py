@@ -7,7 +7,8 @@ from inspect import signature
 from types import ModuleType
 from typing import Any, get_args
 
-from .actuators.actuation import axes, command_units
+from .actuators.actuation import command_units
+from .actuators.allocation import axes
 from .actuators.response import Layout, Prepared
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet

@@ -24,7 +24,8 @@ from support.ships import (
 )
 
 from fmus import hull_functions
-from fmus.actuators.actuation import actuators, allocate, axes, command_names, forces, ordered
+from fmus.actuators.actuation import actuators, command_names, forces, ordered
+from fmus.actuators.allocation import allocate, axes
 from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total

@@ -3,19 +3,10 @@
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
-from ..actuators.actuation import (
-    actuators,
-    allocate,
-    forces,
-    layout,
-    measurable,
-    ordered,
-    output,
-    parameters,
-    total,
-    variable,
-)
+from ..actuators.actuation import actuators, forces, measurable, ordered, output, parameters, variable
+from ..actuators.allocation import allocate
 from ..actuators.command_variables import commands_of, rates_of
+from ..actuators.layout import layout
 from ..actuators.response import (
     Past,
     Prepared,
@@ -24,6 +15,7 @@ from ..actuators.response import (
     force_response,
     prepared,
     thruster_effects,
+    total,
 )
 from ..declare import Component, Variable, bundle, group_of, redeclared, variables
 from ..effects import EffectSet

@@ -1,0 +1,153 @@
+"""Allocation: commands of a described ship's actuators that give a force, and what they can give."""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+from ..hull import Triple
+from ..ops import Number, clip, where
+from ..ship_description import Description
+from .actuation import actuators, flow_at, law_of, ordered, within
+from .failings import Actuator
+from .law import Flow
+
+PASSES = 2  # of the allocation: what the first one clips is asked of the others
+TINY = 1e-9  # share by which a matrix that has no inverse gets one
+NOTHING = 1e-30  # N2, in place of zero where no actuator can push
+
+
+class Component(NamedTuple):
+    """A force that an actuator can be asked for: whose it is, and along which axis of the ship."""
+
+    actuator: Actuator
+    along: str
+
+
+@cache
+def components(ship: Description) -> tuple[Component, ...]:
+    """The forces that a ship's actuators can be asked for."""
+    return tuple([Component(a, axis) for a in actuators(ship) for axis in a.law.components])
+
+
+@cache
+def axes(ship: Description) -> tuple[int, ...]:
+    """The axes of tau (0: X, 1: Y, 2: N) that a ship can be asked for.
+
+    An axis that comes with others, as sway does with the turn of a single rudder, is left out.
+    """
+    columns = [
+        _column(c, c.actuator.part.number("x"), c.actuator.part.number("y")) for c in components(ship)
+    ]
+    found: list[int] = []
+    apart: list[list[float]] = []  # rows of the axes found, each without its part along those before
+    for k in (0, 2, 1):
+        row = rest = [float(column[k]) for column in columns]
+        for other in apart:
+            share = _dot(rest, other) / _dot(other, other)
+            rest = [x - share * y for x, y in zip(rest, other, strict=True)]
+        if _dot(rest, rest) > TINY * _dot(row, row):
+            found.append(k)
+            apart.append(rest)
+    return tuple(sorted(found))
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _column(c: Component, x: Number, y: Number) -> Triple:
+    """tau [N, N, N m] of one newton along a component."""
+    return (1.0, 0.0, -y) if c.along == "X" else (0.0, 1.0, x)
+
+
+def allocate(ship: Description, tau: Sequence[Number], nu: Triple, values: Any) -> tuple[Number, ...]:
+    """Commands that give a force as nearly as the actuators can: weighted least squares within limits.
+
+    Each force is weighed by what its actuator can give; what a limit cuts off is asked of the others
+    (redistributed pseudo-inverse: Johansen and Fossen 2013, Automatica 49, section 2.2). An axis that
+    the ship cannot give is not asked for.
+
+    Args:
+        ship: its actuators.
+        tau: force to give [N, N, N m].
+        nu: u, v, r [m/s, m/s, rad/s], by which a rudder's force goes.
+        values: what the allocation believes of each actuator.
+
+    Returns:
+        The commands, within their limits.
+    """
+    asked, parts = axes(ship), components(ship)
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    columns, spans = [], []
+    for c in parts:
+        p, x, y = every[c.actuator.k]
+        column = _column(c, x, y)
+        columns.append([column[k] for k in asked])
+        span = c.actuator.law.reach(flow_at(*nu, x, y), p)
+        spans.append(span[c.actuator.law.components.index(c.along)])
+    weights = [0.25 * (high - low) * (high - low) for low, high in spans]
+    found: list[Any] = [0.0 * tau[0]] * len(parts)
+    for _ in range(PASSES):
+        left = [tau[k] for k in asked]
+        for f, column in zip(found, columns, strict=True):
+            left = [rest - f * b for rest, b in zip(left, column, strict=True)]
+        more = _least(columns, weights, left)
+        wanted = [f + g for f, g in zip(found, more, strict=True)]
+        found = [clip(w, low, high) for w, (low, high) in zip(wanted, spans, strict=True)]
+        weights = [
+            where(abs(w - f) > 0.0, 0.0, weight)
+            for w, f, weight in zip(wanted, found, weights, strict=True)
+        ]
+    commands: list[Any] = []
+    for a in ordered(ship):
+        p, x, y = every[a.k]
+        own = tuple([f for f, c in zip(found, parts, strict=True) if c.actuator is a])
+        if own:
+            given = a.law.commanded(own, flow_at(*nu, x, y), p)
+        else:
+            given = tuple([0.0 * tau[0]] * len(a.law.commands))
+        commands += within(a, given, p)
+    return tuple(commands)
+
+
+def _least(
+    columns: Sequence[Sequence[Number]], weights: Sequence[Number], wanted: Sequence[Number]
+) -> list[Any]:
+    """f = W B' (B W B' + e I)^-1 tau for the columns of B, by elimination."""
+    n = range(len(wanted))
+    rows = [
+        [sum_of([w * b[i] * b[j] for w, b in zip(weights, columns, strict=True)]) for j in n] for i in n
+    ]
+    rows = [
+        [x * (1.0 + TINY) + NOTHING if i == j else x for j, x in enumerate(row)]
+        for i, row in enumerate(rows)
+    ]
+    right = list(wanted)
+    for k in n:
+        for i in range(k + 1, len(wanted)):
+            share = rows[i][k] / rows[k][k]
+            rows[i] = [x - share * y for x, y in zip(rows[i], rows[k], strict=True)]
+            right[i] = right[i] - share * right[k]
+    for k in reversed(n):
+        known = sum_of([rows[k][j] * right[j] for j in range(k + 1, len(wanted))])
+        right[k] = (right[k] - known) / rows[k][k]
+    return [w * sum_of([b[i] * right[i] for i in n]) for w, b in zip(weights, columns, strict=True)]
+
+
+def sum_of(values: Sequence[Number]) -> Any:
+    """The sum of some numbers, one after the other: ``sum`` compensates floats from Python 3.12 on."""
+    found: Number = 0.0
+    for x in values:
+        found = found + x
+    return found
+
+
+def largest(ship: Description, values: Any) -> Triple:
+    """The largest force and moment on each axis [N, N, N m], of all actuators at rest together."""
+    found = [0.0, 0.0, 0.0]
+    for c in components(ship):
+        p, x, y = law_of(c.actuator, values[c.actuator.k])
+        low, high = c.actuator.law.reach(Flow(), p)[c.actuator.law.components.index(c.along)]
+        for axis, part in enumerate(_column(c, x, y)):
+            found[axis] += abs(part) * max(-low, high)
+    return found[0], found[1], found[2]
