@@ -1,5 +1,7 @@
 """The studies of KVLCC2 and R/V Gunnerus: their files, the nominal models on them, folds and tables."""
 
+import json
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +13,7 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Model
 from diagnosis.assessment import free_runs
+from diagnosis.data import Run
 from diagnosis.model import ship_with
 from diagnosis.sensors import examine
 from studies import research_vessel, ship_folds, tanker
@@ -115,3 +118,273 @@ def test_sensors_are_told_in_a_few_lines(tmp_path):
     assert "miss the position by 0 m (median) as logged, by 0 m as repaired" in text
     assert "1.10 to 1.10 s pass in a second of the log, in 2 stretches" in text
     assert "- u and v read too little\n- a note" in text
+
+
+# Files
+
+
+def test_a_rudder_of_the_tanker_has_the_other_sign(tmp_path):
+    t = np.arange(0.0, 20.0, 0.1)
+    columns = {
+        "t": t,
+        "x": t,
+        "y": 2.0 * t,
+        "psi_deg": 90.0,
+        "rudder_deg": 10.0,
+        "rps": 11.0,
+        "thrust": 40.0,
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "z_10_10.csv", index=False)
+    run = tanker.read(tmp_path / "z_10_10.csv", Model(ship=ship_with((), "kvlcc2")))
+    assert (run.name, run.signals) == ("z_10_10", ("propeller.n", "rudder.delta"))
+    assert run.commands[0] == pytest.approx([11.0, -np.radians(10.0)])
+    assert run.pose[10] == pytest.approx([1.0, 2.0, np.pi / 2.0])
+    assert run.measured["propeller.thrust"][0] == 40.0
+
+
+def test_a_sea_trial_comes_in_degrees_and_revolutions_a_minute(tmp_path):
+    t = np.arange(0.0, 20.0)
+    columns = {
+        "tvec": t,
+        "N": 4.0 * t,
+        "E": t,
+        "psi": 30.0,
+        "u": 4.0,
+        "v": 0.5,
+        "r": 2.0,
+        "Azi": 5.0,
+        "RPM": 90.0,
+    }
+    pd.DataFrame(columns).to_csv(tmp_path / "trial_1.csv", index=False)
+    run = research_vessel.read(tmp_path / "trial_1.csv", Model(ship=ship_with((), "gunnerus")))
+    assert run.pose[5] == pytest.approx([20.0, 5.0, np.radians(30.0)])
+    assert dict(zip(run.signals, run.commands[0], strict=True)) == pytest.approx(
+        {"azimuth.alpha": np.radians(5.0), "azimuth.n": 1.5}
+    )
+    assert [run.measured[n][0] for n in "uvr"] == pytest.approx([4.0, 0.5, np.radians(2.0)])
+
+
+def logged(t, u=4.0, v=0.0, r=0.0, speed=4.0):
+    """A run of a log on a circle, or straight ahead, and what its log says its velocity is."""
+    psi = 1.0 + r * t
+    turned = (
+        np.column_stack([np.sin(psi), -np.cos(psi)]) / r
+        if r
+        else t[:, None] * [np.cos(1.0), np.sin(1.0)]
+    )
+    pose = np.column_stack([speed * turned, np.angle(np.exp(1j * psi))])
+    return Run("trial", t, pose, np.zeros((t.size, 3)), measured={"u": u + 0.0 * t, "v": v + 0.0 * t})
+
+
+def test_a_log_closes_where_speed_and_heading_make_the_way():
+    t = np.arange(0.0, 400.0)
+    assert closure(logged(t)) == pytest.approx(0.0, abs=1e-9)
+    assert closure(logged(t, u=4.1)) == pytest.approx(0.1 * research_vessel.HORIZON)
+    assert closure(logged(t, v=0.2)) == pytest.approx(0.2 * research_vessel.HORIZON)
+    assert closure(logged(np.arange(0.0, 400.0, 0.1), r=0.05)) == pytest.approx(0.0, abs=1e-3)
+    run = logged(t, u=4.1)
+    run.pose[101] = np.nan
+    run.measured["u"][210] = np.nan
+    assert closure(run) == pytest.approx(0.1 * research_vessel.HORIZON), "gaps are bridged"
+
+
+def test_manoeuvres_begin_with_their_approach_and_leave_out_gaps_of_the_clock():
+    run = logged(np.arange(0.0, 400.0))
+    run.pose[120] = np.nan
+    gap = SimpleNamespace(kind="clock_gap", start=130.0, end=133.0)
+    slow = SimpleNamespace(kind="clock_rate", start=0.0, end=400.0)
+    kept = (run.time <= gap.start) | (run.time >= gap.end)
+    examined = SimpleNamespace(run=run.rows(kept), findings=(slow, gap))
+    made = [
+        research_vessel.Manoeuvre("circle", 100.0, 150.0),
+        research_vessel.Manoeuvre("zig", 300.0, 310.0),
+    ]
+    circle, zig = cut(run, examined, made)
+    assert (circle.name, zig.name) == ("circle", "zig")
+    left_out = {120.0, 131.0, 132.0}
+    assert circle.time.tolist() == [t for t in np.arange(80.0, 151.0) if t not in left_out]
+    assert zig.time.tolist() == np.arange(280.0, 311.0).tolist()
+
+
+# Tables
+
+
+def change(before, after):
+    return SimpleNamespace(before=before, after=after)
+
+
+def errors(name, scale, held_out=True, heading=0.1):
+    """As of the content of a diagnosis: half of everything is left."""
+    pull = SimpleNamespace(rms_before=10.0 * scale, rms_after=5.0 * scale)
+    return SimpleNamespace(
+        run=name,
+        held_out=held_out,
+        window_position_rmse=change(scale, 0.5 * scale),
+        window_heading_rmse=change(heading, 0.5 * heading),
+        omega_rms=change([scale, 2.0 * scale, 3.0 * scale], [0.5 * scale, scale, None]),
+        measured={"pull": pull},
+    )
+
+
+def fold(name, scale, accepted=(), **content):
+    rest = {
+        "verdict": "found",
+        "withdrawn": [],
+        "inseparable": [],
+        "correlation": SimpleNamespace(together=[]),
+    }
+    of = [
+        SimpleNamespace(
+            name=name,
+            held_out=held_out,
+            before=SimpleNamespace(errors=windows and SimpleNamespace(position=windows, heading=[0.1] * len(windows))),
+            after=SimpleNamespace(errors=SimpleNamespace(position=[0.5, 0.5], heading=[0.05, 0.05])),
+        )
+        for held_out, windows in ((True, [1.0, 3.0]), (True, None), (False, [99.0]))
+    ]  # fmt: skip
+    made = SimpleNamespace(
+        errors=[errors(name, scale), errors("learned from", 99.0, held_out=False)], accepted=list(accepted), **(rest | content)
+    )  # fmt: skip
+    return ship_folds.Fold([name], SimpleNamespace(comparison=SimpleNamespace(evaluations=of)), made)
+
+
+def test_errors_of_runs_left_out_are_told_with_their_root_mean_square_and_median(tmp_path):
+    lag = SimpleNamespace(id="lag", confidence=0.9, indistinguishable=["delay"], advice="turn quickly")
+    sure = SimpleNamespace(id="Y_r", confidence=None, indistinguishable=[], advice="none")
+    first = fold(
+        "a",
+        1.0,
+        [lag, sure],
+        inseparable=["m and X_u"],
+        correlation=SimpleNamespace(together=[["p", "q"]]),
+    )
+    second = fold("b", 7.0, withdrawn=[SimpleNamespace(id="bow")], inseparable=["m and X_u"])
+    report = Report(tmp_path, "A ship")
+    ship_folds.write_folds(report, [first, second])
+    text = report.write().read_text("utf-8")
+    assert "| a | 1 → 0.5 | 5.73 → 2.86 | 1 → 0.5 | 2 → 1 | 3 → nan | 10 → 5 |" in text
+    assert "| root mean square | 5 → 2.5 | 5.73 → 2.86 | 5 → 2.5 | 10 → 5 | 15 → nan | 50 → 25 |" in text
+    assert "| median | 4 → 2 | 5.73 → 2.86 | 4 → 2 | 8 → 4 | 12 → nan | 40 → 20 |" in text
+    assert "learned from" not in text
+    assert "Median of all windows: position 2 → 0.5 m, heading 5.73 → 2.86°." in text
+    assert "| a | found | lag (90 %), Y_r (–) | – | p, q |" in text
+    assert "| b | found | – | bow | – |" in text
+    assert text.count("- m and X_u") == 1
+    assert text.rstrip().endswith("- lag and delay: turn quickly")
+    results = json.loads((tmp_path / "results.json").read_text("utf-8"))
+    assert results["a"][0] == [1.0, 0.5]
+    assert results["overall"]["median"][0] == [4.0, 2.0]
+    assert results["medians of windows"][0] == pytest.approx([2.0, np.degrees(0.1)])
+
+
+def test_circles_are_told_measured_and_by_both_models(tmp_path, monkeypatch):
+    t = np.arange(0.0, 200.0)
+
+    def track(speed, rate):
+        psi = rate * t
+        return np.column_stack([speed / rate * np.sin(psi), -speed / rate * np.cos(psi), psi])
+
+    def evaluation(name, held_out=True):
+        eta = track(4.0, 0.1)
+        eta[3] = np.nan
+        return SimpleNamespace(name=name, held_out=held_out, smoothed=SimpleNamespace(time=t, eta=eta))
+
+    asked = []
+
+    def free_runs(s, models):
+        asked.append(models)
+        return t, [track(6.0, 0.05), track(4.4, 0.11)]
+
+    monkeypatch.setattr(research_vessel, "free_runs", free_runs)
+    of = [
+        evaluation("circle to port"),
+        evaluation("circle learned from", held_out=False),
+        evaluation("zig-zag"),
+    ]
+    found = SimpleNamespace(
+        comparison=SimpleNamespace(evaluations=of), learned=SimpleNamespace(model="learned")
+    )
+    report = Report(tmp_path, "A ship")
+    research_vessel.circles(report, [SimpleNamespace(found=found)], "nominal")
+    text = report.write().read_text("utf-8")
+    assert asked == [["nominal", "learned"]]
+    assert "| circle to port | 4.00, 6.00, 4.40 | 5.73, 2.86, 6.30 |" in text
+    assert "| circle learned from" not in text
+    assert "speed off by 50 % before, 10 % after; yaw rate by 50 % and 10 %." in text
+    empty = Report(tmp_path, "A ship")
+    research_vessel.circles(empty, [], "nominal")
+    assert "Median" not in empty.write().read_text("utf-8")
+
+
+# Studies and their commands
+
+
+def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
+    """A guess of 2 m and a finding of 0.5 m: the position is measured 2.5 m ahead."""
+    asked = {}
+    place = SimpleNamespace(channel="x", kind="place", value=0.5)
+    other = SimpleNamespace(channel="y", kind="place", value=9.0)
+    monkeypatch.setattr(research_vessel, "read", lambda path, _: SimpleNamespace(name=path.stem))
+    monkeypatch.setattr(research_vessel, "examine", lambda *_: SimpleNamespace(findings=[place, other]))
+    monkeypatch.setattr(research_vessel, "cut", lambda run, e, manoeuvres: manoeuvres)
+    monkeypatch.setattr(
+        research_vessel, "sensors", lambda report, trials: asked.update(trials=len(trials))
+    )
+    monkeypatch.setattr(research_vessel, "write_folds", lambda report, found: asked.update(folds=found))
+    monkeypatch.setattr(research_vessel, "circles", lambda report, found, model: None)
+
+    def gather(parts, model, anyway, horizon):
+        asked.update(parts=len(parts), model=model, horizon=horizon)
+        return [SimpleNamespace(width=10.0)] * len(parts)
+
+    monkeypatch.setattr(diagnosis, "gather", gather)
+    monkeypatch.setattr(research_vessel, "learn_folds", lambda runs, folds, *_: [(len(runs), folds)])
+    text = research_vessel.study(tmp_path, tmp_path / "a", 3, False).read_text("utf-8")
+    assert asked["model"].vessel == {"marker_offset_dx": 2.5}
+    assert (asked["trials"], asked["parts"], asked["folds"]) == (2, 17, [(17, 3)])
+    assert asked["horizon"] == research_vessel.HORIZON
+    assert "17 manoeuvres" in text
+    assert "measured 2.5 m ahead" in text
+    place.kind = "scale"
+    research_vessel.study(tmp_path, tmp_path / "b", None, True)
+    assert asked["model"].vessel == {"marker_offset_dx": 2.0}
+    assert asked["parts"] == 6, "a third"
+
+
+def test_zig_zags_are_learned_from_in_their_order(tmp_path, monkeypatch):
+    asked = []
+    for name in ("z_3", "z_1", "z_2", "z_5", "z_4", "other"):
+        (tmp_path / f"{name}.csv").touch()
+    monkeypatch.setattr(tanker, "read", lambda path, _: path.stem)
+
+    def gather(runs, model, anyway):
+        asked.append(runs)
+        return [SimpleNamespace(horizon=5.0, width=3.0)] * len(runs)
+
+    monkeypatch.setattr(diagnosis, "gather", gather)
+    monkeypatch.setattr(tanker, "learn_folds", lambda runs, folds, *_: [folds])
+    monkeypatch.setattr(tanker, "write_folds", lambda report, found: asked.append(found))
+    text = tanker.study(tmp_path, tmp_path / "out", 3, False).read_text("utf-8")
+    assert "5 zig-zags" in text
+    tanker.study(tmp_path, tmp_path / "out", None, True)
+    assert asked == [["z_1", "z_2", "z_3", "z_4", "z_5"], [3], ["z_1", "z_5"], [None]]
+
+
+@pytest.mark.parametrize("module", [tanker, research_vessel])
+@pytest.mark.parametrize(
+    ("arguments", "folds", "quick"),
+    [([], None, False), (["--folds", "3"], 3, False), (["--quick"], 2, True)],
+)
+def test_command_asks_for_its_folds(module, arguments, folds, quick, monkeypatch, tmp_path, capsys):
+    asked = []
+    monkeypatch.setattr(ship_folds, "run_study", asked.append)
+    command = [module.__name__, str(tmp_path), "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", [*command, *arguments])
+    module.main()
+    (work,) = asked
+    assert work.func is module.study
+    assert [*work.args] == [tmp_path, tmp_path / "out", folds, quick]
+    monkeypatch.setattr(sys, "argv", [*command, "--seeds", "3"])
+    with pytest.raises(SystemExit):
+        module.main()
+    assert "--seeds" in capsys.readouterr().err, "nothing is random, so that there are no seeds"
