@@ -8,8 +8,8 @@ from types import ModuleType
 from typing import Any, get_args
 
 from .actuators.actuation import command_units
-from .actuators.allocation import axes
 from .actuators.response import Layout, Prepared
+from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
 from .effects.effect import Device

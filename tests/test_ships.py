@@ -25,11 +25,11 @@ from support.ships import (
 
 from fmus import hull_functions
 from fmus.actuators.actuation import actuators, command_names, forces, ordered
-from fmus.actuators.allocation import allocate, axes
 from fmus.actuators.failings import failings
 from fmus.actuators.law import Flow, Law, Race
 from fmus.actuators.response import at_rest, command_response, total
 from fmus.actuators.steering import believed
+from fmus.actuators.weighted_allocation import allocate, axes
 from fmus.declare import group_of, variables
 from fmus.effects import Running
 from fmus.hull import (

@@ -4,9 +4,8 @@ from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ..actuators.actuation import actuators, forces, measurable, ordered, output, parameters, variable
-from ..actuators.allocation import allocate
+from ..actuators.actuator_layout import layout
 from ..actuators.command_variables import commands_of, rates_of
-from ..actuators.layout import layout
 from ..actuators.response import (
     Past,
     Prepared,
@@ -17,6 +16,7 @@ from ..actuators.response import (
     thruster_effects,
     total,
 )
+from ..actuators.weighted_allocation import allocate
 from ..declare import Component, Variable, bundle, group_of, redeclared, variables
 from ..effects import EffectSet
 from ..ops import Number, finite, when

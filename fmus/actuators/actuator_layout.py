@@ -7,8 +7,8 @@ from ..effects import Running, Thrust
 from ..ops import Number, clip, fmax
 from ..ship_description import Description
 from .actuation import command_names, forces, limits, ordered, variable
-from .allocation import TINY, allocate, largest
 from .response import Layout, Prepared, total
+from .weighted_allocation import TINY, allocate, largest
 
 
 def working(
