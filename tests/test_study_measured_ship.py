@@ -26,6 +26,7 @@ from fmus.thrusters.thrusters import COMPONENT
 from studies import measured_ship
 from studies.measured import bollard, expected, leave_one_out, ship_tables
 from studies.measured.expected import BY_HAND, STEERED, Fall
+from studies.study_report import Report
 
 CURVE = {"thrust_curve_ahead": 0.2, "thrust_curve_astern": -0.1, "thrust_curve_deadband": 0.2}
 COMMANDS = np.linspace(-1.0, 1.0, 11)
@@ -188,6 +189,194 @@ def test_error_of_a_model_that_runs_away():
     assert ship_tables.window_error(0.0123, 1000.0) == "12.3"
     assert ship_tables.window_error(float("inf"), 1000.0) == "runs away"
     assert ship_tables.window_error(float("nan"), 1000.0) == "–"
+
+
+# Folds
+
+
+def left_out(
+    name="run2", before=(4.0, 3.0, 2.0), after=(2.0, 1.0, 4.0), std=((3.0, 4.0, 0.0), (4.0, 3.0, 1.0))
+):
+    """A fold whose last evaluation is that of the run left out."""
+    e = SimpleNamespace(
+        name=name,
+        before=SimpleNamespace(omega_rms=np.array(before)),
+        after=SimpleNamespace(omega_rms=np.array(after)),
+        weak_windows="windows",
+        smoothed=SimpleNamespace(delay=0.25),
+    )
+    other = SimpleNamespace(name="learned from")
+    comparison = SimpleNamespace(evaluations=[other, e], omega_std=[None, np.array(std)])
+    return leave_one_out.Fold(
+        SimpleNamespace(comparison=comparison, learned=SimpleNamespace(model="learned"))
+    )
+
+
+def test_a_fold_is_judged_on_the_run_that_it_leaves_out():
+    fold = left_out()
+    assert (fold.name, fold.model, fold.seen) == ("run2", "learned", None)
+    assert fold.fall == pytest.approx([2.0, 3.0, 0.5])
+    assert fold.ceiling == pytest.approx([4.0 / np.sqrt(12.5), 3.0 / np.sqrt(12.5), 2.0 / np.sqrt(0.5)])
+    (again,) = measured_ship.with_all([fold], left_out(after=(1.0, 1.0, 1.0)).found)
+    assert again.found is fold.found
+    assert leave_one_out.fall(again.seen) == pytest.approx([4.0, 3.0, 2.0])
+
+
+def test_falls_have_all_that_bounds_them(monkeypatch):
+    shares = leave_one_out.Commanded(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6]))
+    monkeypatch.setattr(ship_tables, "commanded", lambda e, model: shares)
+    fold = left_out(std=((1.0, 1.0, 1.0),))
+    first, *_, last = ship_tables.falls(replace(fold, seen=left_out(after=(1.0, 1.0, 1.0)).evaluation))
+    assert first == Fall(2.0, 4.0, 4.0, 0.1, 0.4)
+    assert last == Fall(0.5, 2.0, 2.0, 0.3, 0.6)
+    assert np.isnan([x.seen for x in ship_tables.falls(fold)]).all()
+    for steered, kind in ((True, STEERED), (False, BY_HAND)):
+        monkeypatch.setattr(ship_tables, "steered", lambda w, steered=steered: steered)
+        assert ship_tables.kind(fold) == kind
+
+
+def test_each_run_is_left_out_of_those_learned_from(monkeypatch):
+    asked, told = [], []
+
+    def diagnose(runs, out, prior, advance):
+        advance("fit")
+        asked.append((runs, out, prior))
+
+    monkeypatch.setattr(diagnosis, "diagnose", diagnose)
+    runs = [SimpleNamespace(run=SimpleNamespace(name=n)) for n in "abc"]
+    a, b, c = runs
+    assert len(measured_ship.learned(runs, 0.1, False, told.append)) == 3
+    assert asked == [([b, c], [a], 0.1), ([a, c], [b], 0.1), ([a, b], [c], 0.1)]
+    assert told == ["without a: fit", "without b: fit", "without c: fit"]
+    assert len(measured_ship.learned(runs, None, True, told.append)) == 1
+    monkeypatch.setattr(diagnosis, "gather", lambda files, advance: (files, advance))
+    assert leave_one_out.gather(["x", "y"], print) == (["x", "y"], print)
+
+
+def test_runs_without_commands_of_each_vsp_explain_nothing():
+    w = windows()
+    joint = replace(
+        w,
+        smoothed=replace(w.smoothed, track=replace(w.smoothed.track, run=replace(w.run, commands=None))),
+    )
+    assert not leave_one_out.apart(joint)
+    assert not leave_one_out.steered(joint)
+    found = leave_one_out.commanded(SimpleNamespace(weak_windows=joint), Model())
+    assert [*found.both, *found.single] == [0.0] * 6
+
+
+# Tables
+
+
+def told(tmp_path, write, *given):
+    """Text and results of a report with one part."""
+    report = Report(tmp_path, "t")
+    write(report, *given)
+    text = report.write().read_text(encoding="utf-8")
+    return text, json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+
+
+def test_findings_are_told_with_their_shares_or_that_there_are_none(tmp_path):
+    stability = SimpleNamespace(
+        nominal_min_dissipation=0.25, learned_min_dissipation=0.125, bounded=True, region="|r| > 1"
+    )
+    effect = SimpleNamespace(
+        id="lag",
+        equation="x = 1 (0, 2)",
+        confidence=0.9,
+        share_of_error=None,
+        indistinguishable=["delay", "Y_r"],
+    )
+    alone = SimpleNamespace(
+        id="N_r", equation="y", confidence=None, share_of_error=0.5, indistinguishable=[]
+    )
+    suspects = [SimpleNamespace(name="m", value=23.456, z=4.04)]
+    content = SimpleNamespace(
+        accepted=[effect, alone], suspect_coefficients=suspects, stability=stability
+    )
+    text, _ = told(tmp_path, ship_tables.write_findings, "Learned", content)
+    assert "## Learned" in text
+    assert "| `lag` | x = 1 (0, 2) | 0.90 | 0.00 | delay, Y_r |" in text
+    assert "| `N_r` | y | 0.00 | 0.50 | none |" in text
+    assert "likely wrong: m = 23.5 (z = 4.0)." in text
+    assert "A controller holds the learned ship" in text
+    assert "Least dissipation 0.125 1/s (nominal 0.25). Less than nominal: |r| > 1." in text
+    content.accepted, content.suspect_coefficients, stability.bounded, stability.region = (
+        [],
+        [],
+        False,
+        None,
+    )
+    text, _ = told(tmp_path, ship_tables.write_findings, "Learned", content)
+    assert "No effect was found." in text
+    assert "likely wrong: none." in text
+    assert "does not hold the learned ship" in text
+    assert "Less than nominal" not in text
+
+
+def test_expectations_are_told_by_run_with_delays_that_need_no_model(tmp_path):
+    made = [
+        SimpleNamespace(
+            name=name, content=found(("delay", 0.4, [])), evaluation=SimpleNamespace(smoothed=SimpleNamespace(delay=delay))
+        )
+        for name, delay in (("a", 0.25), ("b", float("nan")))
+    ]  # fmt: skip
+    text, results = told(tmp_path, ship_tables.write_expected, made)
+    assert "| expected | without a | without b |" in text
+    assert "| delay of 0.3 to 0.5 s | 0.4 s | 0.4 s |" in text
+    assert "the delay of the commands: a 0.25 s. The" in text
+    assert results["late"] == {"a": 0.25, "b": None}
+    assert len(results["expected"]) == 4
+    text, _ = told(tmp_path, ship_tables.write_expected, made[1:])
+    assert "Pose and commands alone" not in text
+
+
+def test_the_learned_curve_is_held_against_the_pulls(tmp_path, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr(
+        Report, "figure", lambda report, name, figure, caption: drawn.update({name: figure})
+    )
+    (tmp_path / "cse1_static").mkdir()
+    curved, straight = Model().plus(CURVE), Model()
+    pulled = bollard.surge_force(curved, COMMANDS)
+    pd.DataFrame({"pitch": COMMANDS, "F_per_vsp": pulled}).to_csv(tmp_path / bollard.PULLS, index=False)
+    pulls = bollard.read(tmp_path)
+    assert pulls.command == pytest.approx(COMMANDS)
+    assert pulls.force == pytest.approx(pulled)
+    folds = [SimpleNamespace(name=n, model=straight) for n in "ab"]
+    text, results = told(tmp_path, ship_tables.write_curve, folds, curved, pulls)
+    assert "0.000 N learned from all" in text
+    assert "the target was 0.1 N: reached." in text
+    assert list(results["bollard"]["differences"]) == ["nominal", "all runs", "without a", "without b"]
+    assert results["bollard"]["forces"]["all runs"] == pytest.approx(pulled.tolist())
+    (axes,) = drawn["bollard"].axes
+    lines = {line.get_label(): line for line in axes.get_lines()}
+    assert lines["learned"].get_ydata() == pytest.approx(bollard.surge_force(curved, bollard.GRID))
+    for name in ("nominal", "learned, one run left out"):
+        assert lines[name].get_ydata() == pytest.approx(1.165 * bollard.GRID)
+    assert lines["bollard pulls, not learned from"].get_ydata() == pytest.approx(pulled)
+    assert (len(axes.get_lines()), len(axes.get_legend().get_texts())) == (5, 4), "folds share a label"
+    text, _ = told(tmp_path, ship_tables.write_curve, folds, straight, pulls)
+    assert "the target was 0.1 N: not reached." in text
+
+
+def test_gaps_of_a_run_are_gaps_of_its_model_error():
+    middle = np.array([1.0, 2.0, 5.0, 9.0])
+    omega_before, omega_after = np.arange(12.0).reshape(4, 3), -np.arange(12.0).reshape(4, 3)
+    e = SimpleNamespace(
+        weak_windows=SimpleNamespace(middle=middle),
+        before=SimpleNamespace(omega=omega_before),
+        after=SimpleNamespace(omega=omega_after),
+    )
+    figure = ship_tables.model_error_picture(e)
+    assert [panel.get_ylabel() for panel in figure.axes] == ["surge [N]", "sway [N]", "yaw [N m]"]
+    for k, panel in enumerate(figure.axes):
+        before, after = panel.get_lines()
+        assert (before.get_label(), after.get_label()) == ("before", "after")
+        assert before.get_xdata() == pytest.approx([1.0, 2.0, 5.0, np.nan, 9.0], nan_ok=True)
+        gapped = [*omega_after[:3, k], np.nan, omega_after[3, k]]
+        assert after.get_ydata() == pytest.approx(gapped, nan_ok=True)
+        assert before.get_ydata()[0] == omega_before[0, k]
 
 
 # The whole
