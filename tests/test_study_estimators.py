@@ -3,13 +3,19 @@
 import json
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 from support.project import ROOT
 
-from cosim import InputError
+import cosim
+import diagnosis
+from cosim import InputError, SimulationError
+from cosim.dispatch import FinishedRun
+from diagnosis.data import Run
+from fmus.frames import rotate_to_body
 from studies import estimators, observer_gains
 from studies.observers import basin, claims
 from studies.observers.claims import ahead
@@ -19,10 +25,14 @@ from studies.observers.estimates_replayed import (
     freezes,
     held,
     lag,
+    measures,
     observer,
     replay,
+    rms,
+    roughness,
     wraps,
 )
+from studies.study_report import Report
 
 H = 0.01
 DATA = Path(os.environ.get("CYBERSHIP_DATA", ROOT.parent / "shared" / "data"))
@@ -183,6 +193,210 @@ def test_kalman_predicts_the_real_ship_best():
         }
         found = {o: basin.prediction_error(log, e, 0.5) for o, e in estimates.items()}
         assert found["kalman"] < 0.8 * min(found["mdf"], found["luenberger"]), path.name
+
+
+# The whole
+
+
+def test_measures_are_by_observer_and_of_every_signal():
+    """True estimates are right, those of an observer that is 0.05 m/s too swift are wrong by that."""
+    log = circle() | {"vessel.v": np.zeros(6000)}
+    for name in ("x_m", "y_m", "psi_m"):
+        log[f"observer.{name}"][3000:3080] = log[f"observer.{name}"][2999]
+    right = measures(log, true_estimate(log))
+    zero = [f"{m}_{n}" for m in ("rms", "lag", "after_freeze", "after_wrap") for n in ("u", "v", "r")]
+    assert [right[name] for name in zero] == pytest.approx([0.0] * 12)
+    assert set(right) == {
+        *zero,
+        *(f"rms_{n}_dot" for n in "uvr"),
+        *(f"noise_{n}" for n in "uvr"),
+        "held",
+        "stuck",
+    }
+    assert (right["held"], right["stuck"]) == (1.0, 0.0)
+    wrong = true_estimate(log)
+    wrong |= {"u": wrong["u"] + 0.05, "r_dot": wrong["r_dot"].copy()}
+    wrong["r_dot"][-1] = np.nan
+    found = measures(log, wrong)
+    assert [found[f"{m}_u"] for m in ("rms", "after_freeze", "after_wrap")] == pytest.approx([0.05] * 3)
+    assert found["stuck"] == 1.0, "no number at the end"
+    wrong["r_dot"][-1] = 10.0
+    assert measures(log, wrong)["stuck"] == 1.0, "absurd at the end"
+    wrong["r_dot"][-1] = -9.9
+    assert measures(log, wrong)["stuck"] == 0.0
+
+
+def test_root_mean_square_also_of_what_has_run_away():
+    assert rms(np.array([3.0, -4.0, 0.0])) == pytest.approx(np.sqrt(25.0 / 3.0))
+    assert np.isnan(rms(np.array([])))
+    assert rms(np.array([1e300, 0.0])) == rms(np.array([np.nan])) == np.inf
+
+
+@pytest.mark.parametrize("hertz", [0.1, 4.0])
+def test_noise_is_what_is_quicker_than_a_quarter_of_a_second(hertz):
+    t = np.arange(6000) * H
+    values = np.sin(2.0 * np.pi * hertz * t)
+    values[:1000] = 99.0 * np.random.default_rng(0).normal(size=1000)
+    found = roughness({"time": t}, {"u": values}, "u")
+    assert found < 1e-4 if hertz < 1.0 else found > 0.1
+    values[5000] = np.nan
+    assert np.isnan(roughness({"time": t}, {"u": values}, "u"))
+
+
+def test_measured_runs_are_judged_by_the_smoother_and_by_prediction():
+    log = circle(h=0.05)
+    right = basin.measures(log, true_estimate(log))
+    assert max(right.values()) < 1e-3
+    wrong = true_estimate(log)
+    wrong["u"] = wrong["u"] + np.where(log["time"] < 12.0, 1.0, 0.02)
+    found = basin.measures(log, wrong)
+    assert found["median_u"] == pytest.approx(0.02, rel=1e-3)
+    known = (log["time"] >= 10.0) & np.isfinite(basin.reference(log)["u"])
+    early = (log["time"][known] < 12.0).mean()
+    assert found["rms_u"] == pytest.approx(np.sqrt(early + (1.0 - early) * 4e-4), rel=1e-2)
+    assert found["one_sample"] == pytest.approx(0.02 * 0.05, rel=1e-2)
+    assert found["half_second"] == pytest.approx(0.02 * 0.5, rel=1e-2)
+    assert found["median_v"] == right["median_v"]
+
+
+def test_a_prediction_turns_and_accelerates():
+    t = np.arange(1200) * 0.05
+    log = {
+        "time": t,
+        "observer.x_m": 0.005 * t**2,
+        "observer.y_m": 0.3 * t,
+        "observer.psi_m": 0.0 * t + 0.4,
+    }
+    along, across = rotate_to_body(log["observer.psi_m"], 0.01 * t, 0.0 * t + 0.3)
+    estimate = {
+        "x_hat": log["observer.x_m"],
+        "y_hat": log["observer.y_m"],
+        "psi_hat": log["observer.psi_m"],
+    }
+    a, b = rotate_to_body(log["observer.psi_m"], 0.01 + 0.0 * t, 0.0 * t)
+    estimate |= {"u": along, "v": across, "r": 0.0 * t, "u_dot": a, "v_dot": b}
+    assert basin.prediction_error(log, estimate, 0.5) == pytest.approx(0.0, abs=1e-12)
+    slow = estimate | {"u_dot": 0.0 * t, "v_dot": 0.0 * t}
+    assert basin.prediction_error(log, slow, 0.5) == pytest.approx(0.5 * 0.01 * 0.25)
+    log["observer.x_m"][::7] = np.nan
+    assert basin.prediction_error(log, estimate, 0.5) == pytest.approx(0.0, abs=1e-12), "lost samples"
+
+
+def test_a_command_has_acted_since_the_sample_before(monkeypatch, tmp_path):
+    tau = np.arange(12.0).reshape(4, 3)
+    run = Run("a", np.array([5.0, 5.1, 5.2, 5.3]), -tau, tau)
+    monkeypatch.setattr(diagnosis, "read", lambda path: run)
+    log = basin.read(tmp_path)
+    assert log["time"] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert log["observer.psi_m"].tolist() == [-2.0, -5.0, -8.0, -11.0]
+    assert log["observer.tau_Y"].tolist() == [10.0, 1.0, 4.0, 7.0]
+
+
+def test_every_observer_is_held_against_the_same_log(monkeypatch):
+    log = circle(12.0)
+    found = estimators.analyse(FinishedRun({}, log=log))
+    assert set(found) == set(OBSERVERS)
+    assert found["mdf"] == pytest.approx(measures(log, replay(observer("mdf"), log)), nan_ok=True)
+    with pytest.raises(SimulationError, match="why"):
+        estimators.analyse(FinishedRun({}, status="failed", message="why"))
+    other = {o: {k: x + 2.0 for k, x in row.items()} for o, row in found.items()}
+    mean = estimators.over_seeds([found, other])["kalman"]["rms_u"]
+    assert mean.mean == pytest.approx(found["kalman"]["rms_u"] + 1.0)
+    assert mean.low < found["kalman"]["rms_u"] < mean.high
+
+
+@pytest.fixture
+def report(tmp_path, monkeypatch):
+    """A report that keeps its figures, and as ``drawn`` their names."""
+    made = Report(tmp_path, "t")
+    made.drawn = []
+    monkeypatch.setattr(Report, "figure", lambda self, name, figure, caption: self.drawn.append(name))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("freeze", "rate", "drawn"),
+    [(True, 0.2, ["compared", "freeze", "wrap"]), (False, 0.01, ["compared"])],
+)
+def test_pictures_show_the_longest_freeze_and_a_wrap_where_there_are(
+    freeze, rate, drawn, report, monkeypatch
+):
+    log, asked = circle(30.0, h=0.05, r=rate), []
+    for first, end in ((300, 304), (350, 380), (420, 425)):
+        for name in ("x_m", "y_m", "psi_m"):
+            if freeze:
+                log[f"observer.{name}"][first:end] = log[f"observer.{name}"][first - 1]
+    monkeypatch.setattr(
+        cosim, "load_scenario", lambda content: asked.append((content["seed"], content["stop"]))
+    )
+    monkeypatch.setattr(cosim, "simulate", lambda scenario, folder: SimpleNamespace(folder=folder))
+    monkeypatch.setattr(cosim, "read_log", lambda folder: log)
+    monkeypatch.setattr(estimators.pictures, "compared", lambda *_: None)
+    monkeypatch.setattr(
+        estimators.pictures, "freeze", lambda log, e, first, end: asked.append((first, end))
+    )
+    estimators.examples(report, 42.0)
+    assert report.drawn == drawn
+    assert asked == [(0, 42.0)] * 2 + [(350, 380)] * freeze
+
+
+def test_measured_runs_have_a_table_and_a_picture_each(report, monkeypatch, tmp_path):
+    log = circle(40.0, h=0.05)
+    for name in ("x_m", "y_m", "psi_m"):
+        log[f"observer.{name}"][400:440] = log[f"observer.{name}"][399]
+    monkeypatch.setattr(basin, "read", lambda path: log)
+    found = estimators.measured(report, [tmp_path / "run1.mat", tmp_path / "run2.mat"])
+    assert report.drawn == ["measured_run1", "measured_run2"]
+    text = report.write().read_text("utf-8")
+    assert "**run1**: 40 s, 5.0 % of the samples frozen or lost" in text
+    estimate = replay(observer("df"), log, measurement_period=0.05)
+    assert found["run2"]["df"] == basin.measures(log, estimate)
+    row = found["run2"]["df"]
+    assert f"| df | {row['median_u']:.2g} / {row['rms_u']:.2g} |" in text
+    assert f"| {1e3 * row['one_sample']:.4g} | {1e3 * row['half_second']:.4g} |" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "given"),
+    [
+        ([], [10, None, False, []]),
+        (["--seeds", "3", "--jobs", "2", "--quick"], [3, 2, True, []]),
+        (["--data", "cse1"], [10, None, False, ["a.mat"]]),
+    ],
+)
+def test_command_asks_for_its_study(arguments, given, monkeypatch, tmp_path, capsys):
+    asked = []
+    monkeypatch.setattr(basin, "files", lambda _: ["a.mat"])
+    monkeypatch.setattr(estimators, "study", lambda *a: asked.append([*a]) or "there")
+    assert estimators.main(["--out", str(tmp_path), *arguments]) == 0
+    assert asked == [[tmp_path, *given]]
+    assert capsys.readouterr().out == "there\n"
+
+
+def test_a_run_that_fails_ends_in_exit_code_3(monkeypatch, tmp_path, capsys):
+    def study(*_):
+        raise SimulationError("why")
+
+    monkeypatch.setattr(estimators, "study", study)
+    assert estimators.main(["--out", str(tmp_path)]) == 3
+    assert capsys.readouterr().err == "error: why\n"
+
+
+def test_quick_study_has_two_seeds_and_half_the_time(monkeypatch, tmp_path):
+    asked = []
+
+    def run_all(runs, seeds, *_, **__):
+        asked.append((seeds, {content["stop"] for content in runs.values()}))
+        raise SimulationError("enough")
+
+    monkeypatch.setattr(estimators, "run_all", run_all)
+    for quick, seeds in ((True, 5), (True, 1), (False, 5)):
+        with pytest.raises(SimulationError, match="enough"):
+            estimators.study(tmp_path, seeds, None, quick, [])
+    assert asked == [([0, 1], {60.0}), ([0], {60.0}), ([0, 1, 2, 3, 4], {120.0})]
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot write to"):
+        estimators.study(tmp_path / "file", 1, None, True, [])
 
 
 @pytest.mark.slow
