@@ -22,12 +22,13 @@ from studies.basin_trials import (
     sysid4,
     trials,
 )
-from studies.basin_trials.found import FAULTY, REGULAR, Found, share
+from studies.basin_trials.found import FAULTY, FRESH, PRINTED, REGULAR, Found, share
 from studies.monte_carlo import shipped, vary
 from studies.observers.estimates_replayed import parameters
 from studies.tracking.outcome import missing, quick
 
 SLOW = trials.TRIALS[0]
+BLOCKED_FRESH = f"{FRESH}, blocker"
 
 
 def run(content, folder):
@@ -280,6 +281,162 @@ def test_spikes_are_the_cause_where_they_are():
     assert verdict(30.0, 3.0).here == "reproduced"
     assert "CLE 0.3 [0.3, 0.3] without spikes" in verdict(30.0, 3.0).numbers
     assert verdict(3.0, 3.0).here == "reversed"
+
+
+@pytest.mark.parametrize(
+    ("hard", "soft", "twice", "here"),
+    [
+        (0.3, None, 0.1, "reproduced"),
+        (0.5, 1.0, 0.3, "reproduced"),
+        (1.0, None, 0.5, "only with more than the gains of Table 6.4"),
+        (0.3, 0.5, 0.5, "only with more than the gains of Table 6.4"),
+        (0.3, 0.3, 1.0, "not reproduced"),
+        (None, None, None, "not reproduced"),
+    ],
+)
+def test_swift_gains_oscillate_from_a_delay_on(hard, soft, twice, here):
+    """A controller oscillates from a delay [s] on: four times the swing, or lost."""
+    begins = {"Table 6.4": hard, "Table 5.1": soft, "twice Table 6.4": twice}
+
+    def runs(name, delay, each):
+        wild = begins[name] is not None and delay >= begins[name]
+        lost = float(wild and each == trials.CLZ)
+        return [sailed(swing=0.04 if wild else 0.01, lost=lost, frequency=f) for f in (0.1, 0.2, 0.9)]
+
+    delayed = {
+        (name, delay): {c: runs(name, delay, c) for c in (trials.ABS, trials.CLZ)}
+        for name in begins
+        for delay in causes.DELAYS
+    }
+    found = causes.oscillation(Found({}, {}, {}, delayed, {}))
+    assert found.here == here
+    assert "Table 5.1, ABS: 0 s ×1 (0.20 Hz)" in found.numbers
+    if twice is not None:
+        assert f"{twice:g} s ×4 (0.20 Hz)" in found.numbers
+        assert f"{twice:g} s ×nan (nan Hz)" in found.numbers
+
+
+@pytest.mark.parametrize(
+    ("with_spikes", "blocked", "stored", "window", "said"),
+    [
+        (
+            0.3,
+            0.1,
+            0.2,
+            5.0,
+            ("reproduced; SVD keeps them longer than", "hurt 2 of 2", "and 0 of 2 with it"),
+        ),
+        (
+            0.1,
+            0.3,
+            0.02,
+            50.0,
+            ("not reproduced; SVD keeps them no longer", "hurt 0 of 2", "and 2 of 2 with it"),
+        ),
+    ],
+)
+def test_spikes_are_stored_and_hurt_or_not(with_spikes, blocked, stored, window, said):
+    names = [f"controller_cl_{n}" for n in ("svd_eps", "win_eps")]
+
+    def runs(cross_track, lost=0.0):
+        return [
+            sailed(cross_track=cross_track * (1.0 + 0.01 * k), lost=lost * (k == 2)) for k in range(3)
+        ]
+
+    spiked = {(store, False): {c: runs(0.1) for c in names} for store in (FRESH, BLOCKED_FRESH)}
+    spiked |= {(FRESH, True): {c: runs(with_spikes) for c in names}}
+    spiked |= {(BLOCKED_FRESH, True): {c: runs(blocked) for c in names}}
+    spiked |= {(PRINTED, False): {names[0]: runs(0.7), names[1]: runs(1.2)}}
+    spiked |= {(PRINTED, True): {c: runs(1.0, lost=1.0) for c in names}}
+    kept = store_contents.StoreContents(spikes=2.0, time=0.01, stored=stored, oldest=40.0, gained=0.5)
+    stores = {names[0]: [kept, kept._replace(oldest=20.0)], names[1]: [kept._replace(oldest=window)] * 2}
+    storing, spoiling = causes.spikes(Found({}, spiked, {}, {}, stores))
+    assert storing.here.startswith(said[0])
+    assert "which is 1.0 % of the time" in storing.numbers
+    assert (
+        f"svd_eps: {100 * stored:.0f} % of the samples, the oldest of them 30 s, and 50 %"
+        in storing.numbers
+    )
+    assert said[1] in spoiling.here
+    assert said[2] in spoiling.here
+    assert "7 to 12 times that with errors formed anew" in spoiling.numbers
+    assert f"win_eps {with_spikes / 0.1:.3g} [" in spoiling.numbers
+    assert f"({0.101:.3f}→{1.01 * with_spikes:.3f} m)" in spoiling.numbers
+    assert "lost 0→1)" in spoiling.numbers
+
+
+def circling(radius=1.0, behind=0.0, aside=0.0, seconds=100.0, **columns):
+    """A run on a circle of radius 5 m to starboard, 0.1 rad/s, the ship behind its target and on another radius."""
+    t = np.arange(0.0, seconds, 0.1)
+    angle, zero = 0.1 * t, 0.0 * t
+    names = [*trials.LOGGED, "vessel.x", "vessel.y", "vessel.psi", "controller.omega_hat_X"]
+    log = {"time": t, **dict.fromkeys(names, zero)}
+    ship = angle - behind
+    log |= {
+        "guidance.x_t": 5.0 * np.cos(angle),
+        "guidance.y_t": 5.0 * np.sin(angle),
+        "guidance.psi_t": angle + np.pi / 2,
+    }
+    log |= {
+        "vessel.x": 5.0 * radius * np.cos(ship),
+        "vessel.y": 5.0 * radius * np.sin(ship),
+        "vessel.psi": ship + np.pi / 2,
+    }
+    metrics = {
+        "cross_track_rms": 0.1,
+        "heading_rms": 0.2,
+        "IAE": 3.0,
+        "W": 4.0,
+        "IAEW": 5.0,
+        "IAEWWT": 6.0,
+    }
+    return FinishedRun(
+        {}, log=log | {n.replace("__", "."): x + zero for n, x in columns.items()}, metrics=metrics
+    )
+
+
+def test_numbers_of_a_run_that_is_known():
+    t = np.arange(0.0, 100.0, 0.1)
+    wave = 0.02 * np.sin(2.0 * np.pi * 0.8 * t)
+    run = circling(
+        radius=0.9,
+        controller__z1_x=np.where(t < 20.0, 9.0, np.where(t < 50.0, -0.2, -0.3)),
+        controller__omega_hat_X=np.where(t < 1.0, -0.7, 0.1),
+        thrusters__tau_cmd_X=np.where(t < 20.0, 9.0, -2.0),
+        thrusters__tau_cmd_Y=np.where(t < 20.0, 9.0, 3.0),
+        vessel__r=np.where(t < 20.0, 50.0 * wave, wave),
+    )
+    found = trials.sailed(run)
+    assert found.lost == 0.0
+    assert found.position == pytest.approx(0.5)
+    assert found.along == pytest.approx(0.0, abs=1e-12)
+    assert found.inside == pytest.approx(0.5, abs=1e-3)
+    assert (found.cross_track, found.heading) == (0.1, 0.2)
+    assert (found.iae, found.work, found.iaew, found.iaewwt) == (3.0, 4.0, 5.0, 6.0)
+    assert (found.first, found.lag) == pytest.approx((-0.2, -0.3))
+    assert found.omega_X == pytest.approx(2.0, rel=1e-3), (
+        "hardly any motion: the ship lacks minus the command"
+    )
+    assert found.omega_Y == pytest.approx(-3.0, rel=0.05)
+    assert found.omega_hat_X == 0.7
+    assert found.swing == pytest.approx(0.02 / np.sqrt(2.0), rel=0.02)
+    assert found.frequency == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_ship_that_is_behind_is_so_along_itself_and_lost_from_two_metres_on():
+    found = trials.sailed(circling(behind=0.1))
+    assert found.position == pytest.approx(10.0 * np.sin(0.05))
+    assert found.along == pytest.approx(5.0 * np.sin(0.1))
+    assert found.inside == pytest.approx(0.0, abs=1e-3)
+    assert found.lost == 0.0
+    assert trials.sailed(circling(behind=2.0 * np.arcsin(0.201))).lost == 1.0
+    assert trials.sailed(circling(behind=2.0 * np.arcsin(0.199))).lost == 0.0
+    broken = trials.sailed(FinishedRun({}, status="failed"))
+    assert broken.lost == 1.0
+    assert np.isnan(broken[1:]).all()
+    short = trials.sailed(circling(seconds=10.0, controller__z1_x=2.0))
+    assert np.isnan(short.first), "it settles until the second half"
+    assert short.lag == 2.0
 
 
 @pytest.mark.slow

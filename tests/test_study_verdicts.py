@@ -1,16 +1,17 @@
 """Verdicts of the studies of chapters 5 to 7 on synthetic numbers, with both answers of each."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from studies import chapter7, lost_thrust
+from studies import chapter7, lost_thrust, store_weight
 from studies.basin_trials import observations, sysid4, trials
 from studies.basin_trials.found import FAULTY, REGULAR, Found
 from studies.error_models import analysis_tables, model_loops
-from studies.monte_carlo import Interval
-from studies.store_weight import tables
+from studies.monte_carlo import Interval, shipped
+from studies.store_weight import FORMS, PLAIN, UNTOLD, WEIGHTS, tables
 from studies.study_report import Report
 from studies.tracking.outcome import BROKEN, TRUE_PHI
 from studies.tracking.store_verdicts import full_rank, lack_of_rank, order, richer, saturated, stale
@@ -66,6 +67,7 @@ def test_order_is_that_of_the_path(path):
     assert in_order(right, path)
     first, second, *_ = ORDERS[path]
     assert not in_order(right | {first: right[second], second: right[first]}, path)
+    assert not in_order(right | {first: right[second]}, path), "as good is not better"
     assert not in_order(right | {"bs": 0.001}, path), "one of the others is better"
     assert not in_order(right | {first: float("nan")}, path)
     assert in_order(ranked(BEST_FIRST["eight"]), "ellipse") is False
@@ -88,14 +90,14 @@ def test_verdict_on_the_order_judges_each_path_by_its_own():
 
 
 def test_table_of_weights_says_which_settings_have_the_order(tmp_path):
-    def outcomes(best):
-        errors = ranked(best)
-        return {c: [BROKEN._replace(position=errors[short(c)])] for c in CONTROLLERS}
-
-    from studies.store_weight import FORMS, PLAIN, UNTOLD, WEIGHTS
+    def outcomes(errors):
+        return {
+            c: [BROKEN._replace(position=errors[short(c)], sigma=0.25, rank=0.5)] for c in CONTROLLERS
+        }
 
     for best, count in ((BEST_FIRST["eight"], 24), (BEST_FIRST["ellipse"], 0)):
-        runs = outcomes(best)
+        errors = ranked(best)
+        runs = outcomes(errors)
         found = {f"{c}|{PLAIN}|1": runs[c] for c in CONTROLLERS if c not in FOUR}
         for form in FORMS | UNTOLD:
             found |= {f"{c}|{form}|{w:g}": runs[c] for c in FOUR for w in WEIGHTS}
@@ -103,7 +105,49 @@ def test_table_of_weights_says_which_settings_have_the_order(tmp_path):
         tables(report, "eight", found)
         text = report.write().read_text()
         assert f"{count} of 24 settings" in text
+        assert text.count(f"| {'yes' if count else 'no'} |") == 24
         assert "## Eight\n" in text
+        first, second = (errors[name] for name in ("svd_eps", "svd_z2"))
+        assert f"| stale, ungated, request, 0.05 | {first:.4f} | {second:.4f} |" in text
+        assert "| fresh, gated, 1 | 0.25 (50 %) | 0.25 (50 %) | 0.25 (50 %) | 0.25 (50 %) |" in text
+
+
+def test_settings_of_the_weights_are_what_they_say():
+    made = store_weight.variants("eight", 40.0)
+    assert len(made) == 2 + 4 * 6 * 4
+    for key, content in made.items():
+        name, form, weight = key.split("|")
+        given = content["fmus"]["controller"].get("parameters", {})
+        assert content["fmus"]["controller"]["path"] == f"{name}.fmu"
+        assert (content["stop"], content["metrics"]) == (40.0, {"from": 20.0})
+        assert ["vessel.u", "controller.u_hat"] in content["connections"]
+        assert given.get("store_weight", 1.0) == float(weight)
+        assert given.get("stale", 0.0) == ("stale" in form)
+        assert ("tau_max" in given) == ("ungated" in form)
+        assert (content.get("optional_connections") == []) == ("request" in form)
+    assert (
+        next(iter(store_weight.variants("ellipse", None).values()))["stop"] == shipped("ellipse")["stop"]
+    )
+
+
+def test_study_of_the_weights_takes_the_paths_that_are_asked_for(tmp_path, monkeypatch):
+    def run_all(contents, seeds, analyse, folder, processes, advance):
+        assert ([*seeds], folder, processes) == ([0], None, 2)
+        return {key: [BROKEN._replace(position=0.1)] for key in contents}
+
+    monkeypatch.setattr(store_weight, "run_all", run_all)
+    text = store_weight.study(tmp_path, ("eight",), 40.0, 2).read_text()
+    assert "## Eight" in text
+    assert "## Ellipse" not in text
+    assert set(json.loads((tmp_path / "results.json").read_text())) >= {"eight"}
+    asked = []
+    monkeypatch.setattr(store_weight, "run_study", asked.append)
+    for arguments in ([], ["--path", "eight", "--quick", "--jobs", "2"]):
+        store_weight.main(["--out", str(tmp_path), *arguments])
+    assert [[*work.args] for work in asked] == [
+        [tmp_path, ("ellipse", "eight"), None, None],
+        [tmp_path, ("eight",), 60.0, 2],
+    ]
 
 
 @pytest.mark.parametrize(
