@@ -218,6 +218,35 @@ def test_an_interrupt_keeps_what_has_finished(base, monkeypatch):
     assert json.loads((base / "out" / "campaign.json").read_text())["status"] == "interrupted"
 
 
+@pytest.mark.slow
+def test_the_table_is_whole_before_workers_are_asked_to_end(base, monkeypatch):
+    """A busy scheduler takes longer to answer than an interrupted command has."""
+    from distributed import Client
+
+    from cosim.dispatch.dask_workers import DaskWorkers
+
+    out, given, told, ask, cancel = base / "out", [], [], DaskWorkers._next, Client.cancel
+
+    def interrupted(self, ended):
+        if len(given) == 2:
+            raise KeyboardInterrupt
+        given.append(ask(self, ended))
+        return given[-1]
+
+    def recorded(self, futures, **options):
+        told.append(json.loads((out / "campaign.json").read_text()))
+        return cancel(self, futures, **options)
+
+    monkeypatch.setattr(DaskWorkers, "_next", interrupted)
+    monkeypatch.setattr(Client, "cancel", recorded)
+    path = campaign(base, {"m": {"set": "vessel.m", "values": [14.0, 15.0, 16.0, 17.0, 18.0]}})
+    with pytest.raises(KeyboardInterrupt):
+        cosim.run_campaign(path, out, workers=2)
+    journal = (out / JOURNAL).read_text().splitlines()
+    assert [content["status"] for content in told] == ["interrupted"]
+    assert told[0]["done"] == len(journal) == len(pandas.read_parquet(out / "runs.parquet")) >= 2
+
+
 def test_a_failed_run_is_a_row_with_its_message(base, chain, plain_fmu):
     step = "self.y += h\nif self.k > 2.5 and t > 0.4: raise ValueError('too much')\nreturn True"
     init = (

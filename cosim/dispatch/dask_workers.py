@@ -115,6 +115,7 @@ class DaskWorkers:
         except BaseException:
             self._close_cluster()
             raise
+        self._running: dict[Any, tuple[Future, list[Job], bool]] = {}
         self._walls: deque[float] = deque(maxlen=20)
         self._sent: set[str] = set()
 
@@ -123,7 +124,7 @@ class DaskWorkers:
         # Dask counts a worker's death against every task that it had. Those that it gives up go again at
         # the end, each alone, to find the one that ends its process.
         suspects: deque[Job] = deque()
-        running: dict[Any, tuple[Future, list[Job], bool]] = {}
+        running = self._running
         ended: Queue[Future] = Queue()
 
         def start(batch: list[Job], alone: bool) -> None:
@@ -155,9 +156,6 @@ class DaskWorkers:
                 fill()
         except OSError as error:
             raise SimulationError(f"{LOST}: {error}; {KEPT}") from None
-        finally:
-            with suppress(OSError):
-                self._client.cancel([future for future, *_ in running.values()])
 
     def _next(self, ended: Queue[Future]) -> Future:
         """The next task that ends.
@@ -218,6 +216,10 @@ class DaskWorkers:
                 self._client.set_metadata(key, True)
 
     def close(self) -> None:
+        # Only now, and not where an interrupt leaves the iterator: a busy scheduler takes its time, and the
+        # table is to be written first.
+        with suppress(OSError):
+            self._client.cancel([future for future, *_ in self._running.values()])
         with suppress(OSError):  # on a computer that is busy Dask gives up waiting; all has ended then
             self._client.close()
         self._close_cluster()

@@ -17,7 +17,7 @@ class Place(Protocol):
     """Where runs are made."""
 
     def rows(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Row], None, None]:
-        """Make runs; gives each as it ends, in any order. Closing the iterator abandons the others."""
+        """Make runs; gives each as it ends, in any order; :meth:`close` abandons the others."""
         ...
 
     def close(self) -> None:
