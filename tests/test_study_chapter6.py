@@ -404,7 +404,7 @@ def test_numbers_of_a_run_that_is_known():
         controller__omega_hat_X=np.where(t < 1.0, -0.7, 0.1),
         thrusters__tau_cmd_X=np.where(t < 20.0, 9.0, -2.0),
         thrusters__tau_cmd_Y=np.where(t < 20.0, 9.0, 3.0),
-        vessel__r=np.where(t < 20.0, 50.0 * wave, wave),
+        vessel__r=np.where(t < 18.0, 50.0 * wave, wave),
     )
     found = trials.sailed(run)
     assert found.lost == 0.0
@@ -419,7 +419,7 @@ def test_numbers_of_a_run_that_is_known():
     )
     assert found.omega_Y == pytest.approx(-3.0, rel=0.05)
     assert found.omega_hat_X == 0.7
-    assert found.swing == pytest.approx(0.02 / np.sqrt(2.0), rel=0.02)
+    assert found.swing == pytest.approx(0.02 / np.sqrt(2.0), rel=0.05)
     assert found.frequency == pytest.approx(0.8, abs=0.02)
 
 
