@@ -14,6 +14,7 @@ from diagnosis import Run
 from diagnosis import repair as command
 from diagnosis.data.telegrams import filled
 from diagnosis.sensors import closure, examine
+from diagnosis.sensors.clock_path import integral_of
 from diagnosis.sensors.wraps import unwrapped
 from fmus.scale import REFERENCE, Scale
 
@@ -110,6 +111,13 @@ def test_a_clock_that_wanders_is_told_by_its_stretches_and_repaired():
         closure(found.run, 30.0, 10.0).position
         < 0.3 * closure(replace(run, time=log), 30.0, 10.0).position
     )
+
+
+def test_true_time_rises_where_noise_makes_the_rate_of_the_clock_negative():
+    edges, clock = np.arange(0.0, 6.0), np.array([0.9, 1.1, -0.4, 1.0, 1.0])
+    true = integral_of(edges, clock)
+    assert (np.diff(true) > 0.0).all()
+    assert true[[0, 1, 2, 4, 5]] == pytest.approx([0.0, 0.9, 2.0, 2.6, 3.6])
 
 
 def test_seconds_that_the_log_lacks_are_told():
@@ -267,6 +275,7 @@ def test_the_sea_trial_closes_once_its_clock_is_repaired(trial):
     found = examine(run, Scale(33.9 / 1.105))
     after = closure(found.run, 60.0, 20.0)
     assert closure(run, 60.0, 20.0).position > 8.0
+    assert (np.diff(found.run.time) > 0.0).all()
     assert after.position < 2.0
     assert np.degrees(after.heading) < 1.0
     scale = next(f for f in found.findings if f.kind == "scale")

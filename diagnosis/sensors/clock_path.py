@@ -30,6 +30,7 @@ MOST_NODES, MOST_SAMPLES = 20_000, 8  # and samples between two of them, evenly 
 # Standard deviation believed of c about 1 at each node: of a clock that may be off, none of which runs
 # at half or double rate, and of one that may not.
 ANCHOR, EVEN = 0.5, 1e-6
+SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
 BEGIN = np.array(
     [0.1, 0.1, 0.03]
 )  # of the walks in a second: of the noise, and of the rate; first guesses
@@ -283,5 +284,10 @@ def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def integral_of(edges: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """(m,): true time [s] at the nodes since the first, for the rate of the clock between them."""
-    return np.concatenate([[0.0], np.cumsum(clock * np.diff(edges))])
+    """(m,): true time [s] at the nodes since the first, for the rate of the clock between them.
+
+    Between two nodes that noise has made fall the later one is put off: all others keep their time.
+    """
+    least = SLOWEST * (edges - edges[0])
+    true = np.concatenate([[0.0], np.cumsum(clock * np.diff(edges))])
+    return np.maximum.accumulate(true - least) + least
