@@ -216,8 +216,8 @@ class DaskWorkers:
                 self._client.set_metadata(key, True)
 
     def close(self) -> None:
-        # Not where an interrupt leaves the iterator: a busy scheduler takes its time, and the table is to
-        # be written first.
+        # Not where an interrupt leaves the iterator: a busy scheduler takes its time, and the table is
+        # to be written first.
         with suppress(OSError):
             self._client.cancel([future for future, *_ in self._running.values()])
         with suppress(OSError):  # on a computer that is busy Dask gives up waiting; all has ended then
