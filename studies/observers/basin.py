@@ -68,15 +68,15 @@ def local_cubic(values: np.ndarray, good: np.ndarray, h: float) -> tuple[np.ndar
     half = round(REACH / h)
     t = np.arange(-half, half + 1) * h / REACH
     kernel = (1.0 - np.abs(t) ** 3) ** 3 + 1e-9
-    mask, filled = good.astype(float), np.where(good, values, 0.0)
+    filled = np.where(good, values, 0.0)
 
     def around(x: np.ndarray, power: int) -> np.ndarray:
         return np.convolve(x, (kernel * t**power)[::-1], "same")
 
-    moments = [around(mask, k) for k in range(7)]
+    moments = [around(good, k) for k in range(7)]
     matrix = np.array([[moments[i + j] for j in range(4)] for i in range(4)]).transpose(2, 0, 1)
     right = np.array([around(filled, k) for k in range(4)]).T[:, :, None]
-    enough = np.convolve(mask, np.ones(2 * half + 1), "same") >= 0.6 * (2 * half + 1)
+    enough = np.convolve(good, np.ones(2 * half + 1), "same") >= 0.6 * (2 * half + 1)
     found = np.full((values.size, 4), np.nan)
     found[enough] = np.linalg.solve(matrix[enough], right[enough])[:, :, 0]
     return found[:, 0], found[:, 1] / REACH, 2.0 * found[:, 2] / REACH**2

@@ -103,7 +103,7 @@ def freezes(log: Log, shortest: float = FREEZE) -> list[tuple[int, int]]:
     """First row of each freeze and the row after it, where all channels repeat to the bit."""
     pose = np.column_stack([log[f"observer.{name}"] for name in INPUTS[:3]])
     same = np.concatenate([[False], (np.diff(pose, axis=0) == 0.0).all(axis=1), [False]])
-    change = np.flatnonzero(np.diff(same.astype(int)))
+    change = np.flatnonzero(np.diff(same))
     h = float(np.median(np.diff(log["time"])))
     return [
         (int(a) + 1, int(b) + 1)
