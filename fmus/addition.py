@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from .declare import Component, Variable, bundle, flatten, group_of, packer, variables
 from .frames import rotate_to_body, rotate_to_earth
-from .hull import inertia_force
+from .hull import accelerated, inertia_force
 from .ops import Number, fmax, where, wrap
 from .ship import Ship
 from .signals import Force
@@ -121,8 +121,7 @@ def addition(
             pasts.append(past)
         heavier = [inertia_force(*nu_dot, hull.hull.inertia) for hull in hulls]
         more = [b - a - (d - c) for a, b, c, d in zip(*forces, *heavier, strict=True)]
-        i11, i22, i23, i32, i33 = hulls[0].hull.inverse
-        faster = (i11 * more[0], i22 * more[1] + i23 * more[2], i32 * more[1] + i33 * more[2])
+        faster = accelerated(hulls[0].hull.inverse, *more)
         signals = dict(zip((v.name for v in commands), given_now, strict=True))
         for axis, name in enumerate(FORCE):
             if name in signals and not {name, ACCELERATION[axis]} & beside.keys():

@@ -15,6 +15,7 @@ from .ops import Number
 from .signals import Force
 
 Triple = tuple[Number, Number, Number]
+Inverse = tuple[Number, Number, Number, Number, Number]  # of the mass matrix
 
 # How well the values of Table 2.1 are known. A model of 15 kg is weighed to some ten grams, and what
 # lies on it from one day to the next adds a little.
@@ -119,7 +120,7 @@ def inertia_force(u_dot: Number, v_dot: Number, r_dot: Number, p: Inertia) -> Tr
     return m11 * u_dot, m22 * v_dot + m23 * r_dot, m32 * v_dot + m33 * r_dot
 
 
-def inverse_mass(p: Inertia) -> tuple[Number, Number, Number, Number, Number]:
+def inverse_mass(p: Inertia) -> Inverse:
     """The five entries of the inverse of M that are not zero: 11, 22, 23, 32, 33."""
     (m11, _, _), (_, m22, m23), (_, m32, m33) = mass_matrix(p)
     det = m22 * m33 - m23 * m32
@@ -256,15 +257,19 @@ class Hull(NamedTuple):
     """Inertia, its inverse and damping: what does not change during a step, computed once."""
 
     inertia: Inertia
-    inverse: tuple[Number, Number, Number, Number, Number]
+    inverse: Inverse
     damping: Damping
+
+
+def accelerated(inverse: Inverse, X: Any, Y: Any, N: Any) -> tuple[Any, Any, Any]:
+    """M^-1 tau [m/s2, m/s2, rad/s2] by the inverse of the mass matrix; of whole time series, too."""
+    i11, i22, i23, i32, i33 = inverse
+    return i11 * X, i22 * Y + i23 * N, i32 * Y + i33 * N
 
 
 def motion(u: Number, v: Number, r: Number, tau: Force, b: Hull) -> Triple:
     """nu_dot [m/s2, m/s2, rad/s2] of the hull under a force, (2.2), corrected: C(nu) nu."""
-    inertia, (i11, i22, i23, i32, i33), damping = b
+    inertia, inverse, damping = b
     CX, CY, CN = coriolis_force(u, v, r, inertia)
     DX, DY, DN = damping_force(u, v, r, damping)
-    Y = tau[1] - CY + DY
-    N = tau[2] - CN + DN
-    return i11 * (tau[0] - CX + DX), i22 * Y + i23 * N, i32 * Y + i33 * N
+    return accelerated(inverse, tau[0] - CX + DX, tau[1] - CY + DY, tau[2] - CN + DN)

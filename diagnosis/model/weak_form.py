@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from fmus.hull import accelerated
 from fmus.scale import REFERENCE, Scale
 from fmus.signals import Force
 from fmus.vessel import vessel
@@ -324,9 +325,8 @@ def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray
 
 def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
     """M^-1 of a force (n, 3)."""
-    i11, i22, i23, i32, i33 = model.hull.hull.inverse
     X, Y, N = force.T
-    return np.column_stack([i11 * X, i22 * Y + i23 * N, i32 * Y + i33 * N])
+    return np.column_stack(accelerated(model.hull.hull.inverse, X, Y, N))
 
 
 def _motion(w: WeakWindows, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

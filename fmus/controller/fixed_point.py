@@ -19,7 +19,7 @@ Butterworth. After the span T = 6/w, Sigma has fallen to e^-3 of P and x_j is ta
 from typing import Any, NamedTuple
 
 from ..frames import rotate_to_body, rotate_to_earth
-from ..hull import Triple, inverse_mass
+from ..hull import Triple, accelerated, inverse_mass
 from ..ops import Condition, Number, choose, fmax, when
 from .parametrisation import Parametrisation
 from .smoothing import Sample
@@ -82,10 +82,9 @@ def driving(model: Parametrisation, psi: Number, nu: Triple, tau: Triple, belief
     """Earth-fixed acceleration [m/s2, m/s2, rad/s2] by the force and what is known of the hull."""
     u, v, r = nu
     kX, kY, kN = model.known(u, v, r, belief)
-    X, Y, N = tau[0] + kX, tau[1] + kY, tau[2] + kN
-    i11, i22, i23, i32, i33 = inverse_mass(belief.inertia)
-    x, y = rotate_to_earth(psi, i11 * X - r * v, i22 * Y + i23 * N + r * u)
-    return x, y, i32 * Y + i33 * N
+    a, b, c = accelerated(inverse_mass(belief.inertia), tau[0] + kX, tau[1] + kY, tau[2] + kN)
+    x, y = rotate_to_earth(psi, a - r * v, b + r * u)
+    return x, y, c
 
 
 def body(axes: tuple[Axis, Axis, Axis], driven: Triple) -> tuple[Triple, Triple]:
