@@ -283,6 +283,40 @@ def test_spikes_are_the_cause_where_they_are():
     assert verdict(3.0, 3.0).here == "reversed"
 
 
+def test_experiments_differ_by_what_they_are_about():
+    plant = {"vessel.delta_X_u": -2.0, "thrusters.delay": 0.25}
+    trial = SLOW._replace(seconds=40.0)
+
+    def given(content):
+        parameters = {i: fmu.get("parameters", {}) for i, fmu in content["fmus"].items()}
+        assert parameters["vessel"]["delta_X_u"] == -2.0, "what is hidden, everywhere"
+        return parameters, any(fault["kind"] == "spikes" for fault in content["faults"])
+
+    for (name, delay), by_controller in chapter6_runs.delayed(trial, plant).items():
+        assert set(by_controller) == {trials.ABS, trials.CLZ}
+        for content in by_controller.values():
+            parameters, spiky = given(content)
+            assert not spiky
+            assert content["stop"] == 20.0
+            assert parameters["thrusters"]["delay"] == 0.25 + delay
+            factor = {"Table 6.4": 1.0, "twice Table 6.4": 2.0}.get(name)
+            if factor:
+                assert parameters["controller"]["K_d_r"] == factor * trials.HARD["d_r"]
+    for (store, spikes), by_controller in chapter6_runs.spiked(trial, plant).items():
+        for content in by_controller.values():
+            parameters, spiky = given(content)
+            assert spiky == spikes
+            assert (parameters["controller"].get("stale", 0.0) == 1.0) == store.startswith(PRINTED)
+    for (_, spikes), by_controller in chapter6_runs.slow_eight(trials.TRIALS[1], plant).items():
+        assert set(by_controller) == {trials.CLZ, trials.CLE}
+        for content in by_controller.values():
+            assert given(content)[1] == spikes
+            assert "eight" in content["fmus"]["guidance"]["path"]
+    for name, content in chapter6_runs.storing(trial, plant).items():
+        assert given(content)[1]
+        assert content["log"] == {"signals": store_contents.logged(f"{name}.fmu")}
+
+
 @pytest.mark.parametrize(
     ("hard", "soft", "twice", "here"),
     [

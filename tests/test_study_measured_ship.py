@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -377,6 +378,33 @@ def test_gaps_of_a_run_are_gaps_of_its_model_error():
         gapped = [*omega_after[:3, k], np.nan, omega_after[3, k]]
         assert after.get_ydata() == pytest.approx(gapped, nan_ok=True)
         assert before.get_ydata()[0] == omega_before[0, k]
+
+
+def test_shares_that_go_with_commands_are_of_blocks_that_were_not_fitted():
+    """A force that follows the commands goes with them; one of its own in each block, with none."""
+    rng = np.random.default_rng(0)
+    w = SimpleNamespace(held=np.eye(400), block=np.repeat(np.arange(8), 50))
+    commands = rng.normal(size=(400, 2))
+    law = np.column_stack([commands[:, 0], np.abs(commands[:, 1]), rng.normal(size=400)])
+    assert leave_one_out._explained(w, law, commands) == pytest.approx([1.0, 1.0, 0.0], abs=0.02)
+    half = law + np.column_stack([rng.normal(size=400)] * 2 + [np.zeros(400)])
+    assert leave_one_out._explained(w, half, commands)[0] == pytest.approx(0.5, abs=0.1)
+    switched = law * np.where(w.block < 4, 1.0, -1.0)[:, None]
+    assert leave_one_out._explained(w, switched, commands) == pytest.approx([0.0] * 3, abs=0.02)
+    every_other = law * np.where(w.block % 2, 1.0, -1.0)[:, None]
+    assert leave_one_out._explained(w, every_other, commands) == pytest.approx([0.0] * 3, abs=0.02)
+
+
+def test_command_asks_for_its_study(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(measured_ship, "run_study", asked.append)
+    measured_ship.main([str(tmp_path)])
+    measured_ship.main([str(tmp_path), "--out", str(tmp_path / "out"), "--prior", "0.1", "--quick"])
+    assert [[*work.args] for work in asked] == [
+        [tmp_path, Path("results/study_measured_ship"), None, False],
+        [tmp_path, tmp_path / "out", 0.1, True],
+    ]
+    assert asked[0].func is measured_ship.study
 
 
 # The whole

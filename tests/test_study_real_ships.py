@@ -77,14 +77,18 @@ def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
 
     def diagnose(rest, out, **_):
         seen.append(([w.run.name for w in rest], [w.run.name for w in out]))
+        return f"without {len(out)}"
 
     monkeypatch.setattr(diagnosis, "diagnose", diagnose)
-    monkeypatch.setattr(ship_folds, "diagnosis_content", lambda *_: None)
+    monkeypatch.setattr(ship_folds, "diagnosis_content", lambda found, *_: f"content {found}")
     for folds in (2, 3, None):
         seen.clear()
         found = list(ship_folds.learn_folds(runs, folds, Model(), lambda _: None))
         left_out = [name for fold in found for name in fold.left_out]
         assert sorted(left_out) == [w.run.name for w in runs]
+        for fold in found:
+            assert fold.found == f"without {len(fold.left_out)}"
+            assert fold.content == f"content {fold.found}"
         for rest, out in seen:
             assert not set(rest) & set(out)
             assert len(rest) + len(out) == 5
@@ -328,7 +332,7 @@ def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
     monkeypatch.setattr(research_vessel, "examine", lambda *_: SimpleNamespace(findings=[place, other]))
     monkeypatch.setattr(research_vessel, "cut", lambda run, e, manoeuvres: manoeuvres)
     monkeypatch.setattr(
-        research_vessel, "sensors", lambda report, trials: asked.update(trials=len(trials))
+        research_vessel, "sensors", lambda report, trials: report.heading(f"{len(trials)} trials")
     )
     monkeypatch.setattr(research_vessel, "write_folds", lambda report, found: asked.update(folds=found))
     monkeypatch.setattr(research_vessel, "circles", lambda report, found, model: None)
@@ -341,10 +345,12 @@ def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
     monkeypatch.setattr(research_vessel, "learn_folds", lambda runs, folds, *_: [(len(runs), folds)])
     text = research_vessel.study(tmp_path, tmp_path / "a", 3, False).read_text("utf-8")
     assert asked["model"].vessel == {"marker_offset_dx": 2.5}
-    assert (asked["trials"], asked["parts"], asked["folds"]) == (2, 17, [(17, 3)])
+    assert (asked["parts"], asked["folds"]) == (17, [(17, 3)])
     assert asked["horizon"] == research_vessel.HORIZON
     assert "17 manoeuvres" in text
     assert "measured 2.5 m ahead" in text
+    assert "## 2 trials" in text
+    assert "windows of 10 s" in text
     place.kind = "scale"
     research_vessel.study(tmp_path, tmp_path / "b", None, True)
     assert asked["model"].vessel == {"marker_offset_dx": 2.0}

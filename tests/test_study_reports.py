@@ -13,6 +13,7 @@ import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import analysis
 from diagnosis.analysis import NU, TAU, concurrent_passes
+from fmus.hull import RotationalDamping
 from studies import (
     chapter5,
     chapter6,
@@ -32,7 +33,7 @@ from studies.measured.expected import BY_HAND, STEERED, Fall
 from studies.observers import claims, estimates_replayed, pictures
 from studies.observers.estimates_replayed import OBSERVERS, SIGNALS
 from studies.study_report import Report
-from studies.tracking.outcome import AXES, LEARNED_FROM, Outcome
+from studies.tracking.outcome import AXES, LEARNED_FROM, Outcome, missing
 from studies.tracking.verdict import CONTROLLERS, FOUR, PRINTED
 
 
@@ -206,6 +207,7 @@ def test_report_of_chapter_6(tmp_path, monkeypatch, read):
     assert [path.name for path in read] == ["0"] * 16
     assert len(results["lessons"]) == 10
     assert "model error (seed 0)" in text
+    assert "Experiments on delay and stores: 3 seeds." in text
 
 
 def test_report_of_chapter_6_without_experiments(tmp_path, monkeypatch, read):
@@ -347,6 +349,7 @@ def laps(improved_=0.001, others=0.3):
         (0.1, 0.3, ["not reproduced", "not reached", "no", "reproduced: less than before, not zero"]),
         (0.001, 0.05, ["not reproduced", "reached", "yes", "reproduced: less than before, not zero"]),
         (0.4, 0.3, ["not reproduced", "not reached", "no", "no less than before"]),
+        (0.3, 0.3, ["not reproduced", "not reached", "no", "no less than before"]),
     ],
 )
 def test_verdicts_on_the_improved_controller(size, others, here):
@@ -373,6 +376,13 @@ def test_report_of_the_improved_controller(tmp_path, monkeypatch, figures, read)
     assert set(figures) == {f"{n}_{s}" for n in ("errors", "model_error") for s in ("mdf", "kalman")}
     assert drawn == [{n.removeprefix("controller_") for n in improved.CONTROLLERS}] * 2
     assert len(shown(text)) == 12
+    assert [path.relative_to(tmp_path / "logs").as_posix() for path in read] == [
+        f"{sense}/{name}/0" for sense in ("mdf", "kalman") for name in improved.CONTROLLERS
+    ]
+    for k, c in enumerate(improved.SURGE.coefficients):
+        line = f"| {c.name} | {c.unit} | {sysid4.PHI[k]:g} | {sysid4.PHI[k]:.3g} ["
+        assert line in text
+    assert "| mdf | 0.1 [0.1, 0.1] | -0.1 [-0.1, -0.1] | 0 [0, 0] |" in text
 
 
 def test_pictures_of_laps_show_each_run_in_one_width():
@@ -392,6 +402,11 @@ def test_pictures_of_laps_show_each_run_in_one_width():
         assert (dashed[0].get_ydata() == logs["a"][f"controller.omega_hat_{axis}"]).all()
         low, high = panel.get_ylim()
         assert low < solid[0].get_ydata().min() < solid[0].get_ydata().max() < high
+        late = np.concatenate([missing(log, axis)[log["time"] > 1.99] for log in logs.values()])
+        first, last = np.quantile(late, [0.005, 0.995])
+        assert (0.5 * (low + high), high - low) == pytest.approx(
+            (0.5 * (first + last), 2.0 * (last - first) + 0.04)
+        )
 
 
 def test_tracks_lie_over_the_target():
@@ -428,7 +443,7 @@ def test_picture_of_the_failure_shows_its_time():
     ]
     for panel in figure.axes:
         *drawn, fails = panel.get_lines()
-        assert len(drawn) == 3
+        assert [line.get_linewidth() for line in drawn] == [1.0] * 3
         assert list(fails.get_xdata()) == [lost_thrust.FAILS] * 2
         assert fails.get_linewidth() < drawn[0].get_linewidth()
     assert list(lines(figure.axes[-1]))[:3] == list(AXES)
@@ -453,9 +468,21 @@ def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
             MadeUp(),
         ]
     )
-    monkeypatch.setattr(lost_thrust, "run_all", lambda *_: {"": [next(given)]})
+    asked = []
+
+    def run_all(contents, seeds, analyse):
+        asked.append(("events" in contents[""], seeds, analyse))
+        return {"": [next(given)]}
+
+    monkeypatch.setattr(lost_thrust, "run_all", run_all)
     text, results = written(lost_thrust.study(tmp_path), tmp_path)
+    assert asked == [(False, [0], lost_thrust.analyse), (True, [0], lost_thrust.whole)]
     assert results["line"] == pytest.approx([-2.0, -1.0])
+    assert "N_r = -1.00 + -2.00 delta_N; on it delta_N = 0.07 goes with N_r = -1.14." in text
+    assert "Farthest from it is N_r by 0.00." in text
+    assert len(results["places"]) == len(lost_thrust.ESTIMATES) * len(lost_thrust.PACES)
+    assert results["places"]["MDF, 1"][0] == {"delta_N": 0.1, "N_r": -1.2, "r2": 0.9}
+    assert results["failure"]["thesis"].startswith("The bow thruster's failure")
     assert "| MDF, force 0.45 s late | 0.25 | 0.100, -1.20, 0.9000 |" in text
     assert set(figures) == {"failure"}
 
@@ -522,6 +549,9 @@ def test_runs_of_the_estimators_differ_by_freezes_upsets_and_what_is_hidden():
     assert kinds["ellipse, upsets"] > {"dropout", "spikes"}
     assert made["rich, drag"]["fmus"]["vessel"]["parameters"]["delta_X_u"] == -4.0
     assert all(content["stop"] == 60.0 for content in made.values())
+    hidden, damping = estimators.HIDDEN["damping"], RotationalDamping()
+    assert damping.Y_r + hidden["vessel.delta_Y_r"] == 0.0, "none in sway is left"
+    assert damping.N_r + hidden["vessel.delta_N_r"] == pytest.approx(-0.9), "and half of it in yaw"
 
 
 def test_pictures_of_observers_have_the_truth_on_top():

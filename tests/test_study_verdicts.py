@@ -107,6 +107,7 @@ def test_table_of_weights_says_which_settings_have_the_order(tmp_path):
         assert f"{count} of 24 settings" in text
         assert text.count(f"| {'yes' if count else 'no'} |") == 24
         assert "## Eight\n" in text
+        assert f"RMS [m]. bs: {errors['bs']:.4f}, abs: {errors['abs']:.4f}. The thesis' order" in text
         first, second = (errors[name] for name in ("svd_eps", "svd_z2"))
         assert f"| stale, ungated, request, 0.05 | {first:.4f} | {second:.4f} |" in text
         assert "| fresh, gated, 1 | 0.25 (50 %) | 0.25 (50 %) | 0.25 (50 %) | 0.25 (50 %) |" in text
