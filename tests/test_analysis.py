@@ -321,6 +321,61 @@ def test_pictures_of_the_analysis_hold_what_they_are_given():
     drawn = {line.get_label(): line for line in top.get_lines()}
     assert drawn["removed"].get_xdata().tolist() == [7]
     assert drawn["kept"].get_xdata().size == 49
+    assert (drawn["kept"].get_ydata() == nu[kept, 0]).all()
+
+
+def test_pictures_of_a_regression_hold_what_they_are_given():
+    r2, q2 = np.array([0.5, 0.75, 0.8]), np.array([0.4, 0.7, 0.6])
+    (panel,) = analysis_figures.share_of_variance(r2, q2, 2, "factors").axes
+    explained, validated, kept = panel.get_lines()
+    assert (explained.get_label(), validated.get_label()) == ("R²", "Q²")
+    assert explained.get_xdata().tolist() == validated.get_xdata().tolist() == [1, 2, 3]
+    assert explained.get_ydata() == pytest.approx(100.0 * r2)
+    assert validated.get_ydata() == pytest.approx(100.0 * q2)
+    assert list(kept.get_xdata()) == [2, 2]
+    assert (panel.get_xlabel(), panel.get_xticks().tolist()) == ("factors", [1, 2, 3])
+    (panel,) = analysis_figures.coefficient_bars(
+        np.array([1.0, -2.0]), np.array([0.1, 0.2]), ["u", "r"], "Y"
+    ).axes
+    assert [bar.get_height() for bar in panel.patches] == [1.0, -2.0]
+    assert [text.get_text() for text in panel.get_xticklabels()] == ["u", "r"]
+    (spread,) = panel.collections
+    assert [path.vertices[:, 1].tolist() for path in spread.get_paths()] == [[0.9, 1.1], [-2.2, -1.8]]
+    assert panel.get_ylabel() == "coefficient, ω Y"
+
+
+def test_a_spike_is_drawn_however_many_samples_there_are():
+    values = np.full(100 * analysis_figures.POINTS, 0.5)
+    values[12345], values[70:100] = 80.0, 0.0
+    (panel,) = analysis_figures.against_limit(values, 12.5, "T²").axes
+    points, limit = panel.get_lines()
+    assert points.get_xdata().size == analysis_figures.POINTS
+    assert points.get_xdata()[points.get_ydata() > 1.0].tolist() == [12345]
+    assert points.get_ydata().min() > 0.0, "the scale is logarithmic"
+    assert list(limit.get_ydata()) == [12.5, 12.5]
+    assert (limit.get_label(), panel.get_yscale(), panel.get_ylabel()) == (
+        "99 % limit 12.5",
+        "log",
+        "T²",
+    )
+
+
+def test_model_errors_are_drawn_by_axis_with_a_colour_for_each_model():
+    time = np.arange(2.0 * analysis_figures.POINTS)
+    measured = np.column_stack([time, 2.0 * time, 3.0 * time])
+    models = {name: measured + k for k, name in enumerate("abc")}
+    panels = analysis_figures.model_error_over_time(measured, models, time).axes
+    for k, panel in enumerate(panels):
+        omega, *rest = panel.get_lines()
+        rows = omega.get_xdata()
+        assert rows.size == analysis_figures.POINTS
+        assert (rows[0], rows[-1]) == (0, time.size - 1)
+        assert (omega.get_label(), [line.get_label() for line in rest]) == ("ω", ["a", "b", "c"])
+        assert len({line.get_color() for line in (omega, *rest)}) == 4
+        assert omega.get_ydata() == pytest.approx(measured[rows, k])
+        assert rest[2].get_ydata() == pytest.approx(measured[rows, k] + 2.0)
+    assert [panel.get_ylabel() for panel in panels] == ["ω X [N]", "ω Y [N]", "ω N [N·m]"]
+    assert panels[-1].get_xlabel() == "sample"
 
 
 def test_remark_where_the_validated_share_exceeds_the_explained_one():

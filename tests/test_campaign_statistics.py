@@ -156,10 +156,79 @@ def test_pareto_set_is_what_nothing_beats(table):
     assert list(pareto(table, ["c", "seed"], ["e_pos_rms", "W"], ["seed"])["c"]) == ["b"]
 
 
+@pytest.fixture
+def kept(monkeypatch):
+    """Figures that a campaign draws, by name."""
+    pytest.importorskip("pandas")
+    from cosim.campaign import charts
+
+    found = {}
+    monkeypatch.setattr(
+        charts.Figure,
+        "savefig",
+        lambda figure, path, **_: (found.update({len(found): figure}), path.touch()),
+    )
+    return found
+
+
+def test_categories_have_boxes_and_numbers_a_median_where_several_runs_share_a_value(kept, tmp_path):
+    import pandas as pd
+
+    from cosim.campaign.charts import draw_campaign
+
+    made = pd.DataFrame(
+        [
+            {"K": k, "c": c, "seed": s, "W": 10.0 * k + s + (c == "b"), "status": "done" if s < 3 else "failed"}
+            for k in (1.0, 2.0) for c in "ba" for s in range(4)
+        ]
+    )  # fmt: skip
+    made.loc[0, "W"] = np.nan
+    names = draw_campaign(made, ["K", "c", "seed"], ["seed"], ["W"], tmp_path, "c")
+    assert [path.name for path in names] == ["metrics.png", "differences_c.png"], (
+        "one axis of numbers has no map"
+    )
+    over_k, over_c = kept[0].axes
+    points, median = over_k.get_lines()
+    assert points.get_xdata().size == 12, "runs that are done"
+    assert median.get_xdata().tolist() == [1.0, 2.0]
+    assert median.get_ydata().tolist() == [12.0, 21.5]
+    assert [text.get_text() for text in over_c.get_xticklabels()] == ["b", "a"], "in their order"
+    assert (over_c.get_xlabel(), over_c.get_ylabel()) == ("c", "W [J]")
+    (panel,) = kept[1].axes
+    assert panel.get_title() == "c: less b"
+    assert panel.get_xlabel() == "mean difference of W [J]"
+    (bars,) = panel.containers
+    assert bars[0].get_xdata() == pytest.approx([-1.0])
+    assert panel.get_ylim() == (-0.5, 0.5)
+    with pytest.raises(InputError, match="no metric 'V'"):
+        draw_campaign(made, ["K"], [], ["V"], tmp_path)
+
+
+def test_points_stand_where_values_form_no_grid_and_a_name_is_no_path(kept, tmp_path):
+    import pandas as pd
+
+    from cosim.campaign.charts import draw_campaign
+
+    rows = [(0.1, 1, 5.0), (0.2, 2, 6.0), (0.3, 1, 7.0)]
+    made = pd.DataFrame([{"a/b": x, "n": n, "W": w, "status": "done"} for x, n, w in rows])
+    paths = draw_campaign(made, ["a/b", "n"], [], ["W"], tmp_path)
+    assert [path.name for path in paths] == ["metrics.png", "map_a_b_n.png"]
+    assert all(len(panel.get_lines()) == 1 for panel in kept[0].axes[:1]), "no median of single runs"
+    panel, _ = kept[1].axes
+    (points,) = panel.collections
+    assert points.get_offsets().tolist() == [[x, n] for x, n, _ in rows]
+    assert points.get_array().tolist() == [5.0, 6.0, 7.0]
+    assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_title()) == ("a/b", "n", "W")
+    kept.clear()
+    four = pd.DataFrame([{**dict.fromkeys("pqrs", float(k)), "W": k, "status": "done"} for k in (1, 2)])
+    assert len(draw_campaign(four, [*"pqrs"], [], ["W"], tmp_path)) == 4, "three maps at most"
+
+
 @pytest.mark.parametrize(("seeds", "title"), [((0, 1, 2), "W, median"), ((0,), "W")])
-def test_pictures_tell_units_and_what_a_cell_is(monkeypatch, tmp_path, seeds, title):
+def test_pictures_tell_units_and_what_a_cell_is(kept, tmp_path, seeds, title):
     """Axes with their units; on a grid cell (i, j) is around the i-th and j-th value, however far apart."""
-    pd = pytest.importorskip("pandas")
+    import pandas as pd
+
     from cosim.campaign import charts
 
     gains, stops = (0.1, 0.2, 0.8), (10.0, 20.0)
@@ -169,14 +238,10 @@ def test_pictures_tell_units_and_what_a_cell_is(monkeypatch, tmp_path, seeds, ti
             for k in gains for t in stops for s in seeds
         ]
     )  # fmt: skip
-    kept = []
-    monkeypatch.setattr(
-        charts.Figure, "savefig", lambda figure, path, **_: (kept.append(figure), path.touch())
-    )
     charts.draw_campaign(
         made, ["K", "end", "seed"], ["seed"], ["W"], tmp_path, units={"K": "1/s", "end": "s"}
     )
-    against, maps = kept
+    against, maps = kept.values()
     assert [panel.get_xlabel() for panel in against.axes] == ["K [1/s]", "end [s]"]
     panel, bar = maps.axes
     assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_title()) == ("K [1/s]", "end [s]", title)

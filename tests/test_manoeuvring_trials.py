@@ -17,6 +17,8 @@ import cosim
 from cosim.metrics import main as metrics_main
 from cosim.trials import MEASURES, executes, measure, outcome, passage, sheet
 from cosim.trials.measures import limits
+from cosim.trials.trial_outcome import Outcome
+from cosim.trials.trial_picture import draw_trial
 from fmus.declare import flatten, packer, variables
 from fmus.ship import ship
 from fmus.signals import Force, Velocity
@@ -108,6 +110,68 @@ def test_a_turn_tells_only_what_it_goes_far_enough_for():
     assert names[1] - names[0] == {"advance", "transfer", "time_90"}
     assert names[2] - names[1] == {"tactical_diameter", "time_180"}
     assert names[3] - names[2] == {"circle_speed", "circle_rate", "circle_diameter"}
+
+
+def straight_then(order, psi, length=2.0, kind="circle", **measures):
+    """A ship at 1 m/s that heads as told over a minute, its order put over after 10 s."""
+    t = np.arange(0.0, 60.0, 0.1)
+    course = psi(t) + 0.0 * t
+    x, y = (5.0 + np.cumsum(0.1 * f(course)) for f in (np.cos, np.sin))
+    return Outcome(kind, passage(t, x, y, course, order(t)), length, measures, {})
+
+
+@pytest.mark.parametrize("length", [2.0, 0.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_picture_of_a_turn_is_seen_along_the_first_heading(length, side):
+    found = straight_then(
+        lambda t: np.where(t > 10.0, 0.3 * side, 0.0),
+        lambda t: 0.8 + side * 0.1 * np.maximum(t - 10.0, 0.0),
+        length,
+        advance=10.0,
+        tactical_diameter=20.0,
+    )
+    track, heading, order = draw_trial(found).figure.axes
+    ship, start, advance, diameter = track.get_lines()
+    unit = length or 1.0
+    aside, ahead = ship.get_xdata(), ship.get_ydata()
+    assert aside[:100] == pytest.approx(0.0, abs=0.15), "straight ahead until the order is put over"
+    assert ahead[0] == pytest.approx(-10.0 / unit, abs=0.1)
+    assert aside[np.abs(aside).argmax()] == pytest.approx(side * 20.0 / unit, rel=0.02)
+    assert ahead.max() == pytest.approx(10.0 / unit, rel=0.03)
+    assert (start.get_xdata()[0], start.get_ydata()[0]) == (0.0, 0.0)
+    assert list(advance.get_ydata()) == [10.0 / unit] * 2
+    assert list(diameter.get_xdata()) == [side * 20.0 / unit] * 2
+    assert track.get_xlabel() == f"to starboard [{'L' if length else 'm'}]"
+    turned, put_over = heading.get_lines()
+    assert turned.get_xdata()[0] == pytest.approx(-10.0, abs=0.15), "time since the order"
+    assert turned.get_ydata()[-1] == pytest.approx(side * math.degrees(4.99), rel=0.01)
+    assert list(put_over.get_xdata()) == [0.0, 0.0]
+    (share,) = order.get_lines()
+    assert (share.get_ydata().min(), share.get_ydata().max()) == (
+        (0.0, 1.0) if side > 0.0 else (-1.0, 0.0)
+    )
+    (plain, _), *_ = [draw_trial(found._replace(measures={})).figure.axes[0].get_lines()]
+    assert plain.get_ydata() == pytest.approx(ahead)
+
+
+def test_a_picture_of_a_stop_has_the_speed_and_of_a_spiral_the_rates():
+    found = straight_then(lambda t: np.where(t > 10.0, -1.0, 0.0), lambda t: 0.2, kind="stop")
+    speed = draw_trial(found).figure.axes[1]
+    (line,) = speed.get_lines()
+    assert line.get_ydata() == pytest.approx(1.0, rel=1e-6)
+    assert line.get_xdata()[0] == pytest.approx(-10.0, abs=0.15)
+    assert speed.get_ylabel() == "speed [m/s]"
+    steps = [0.0, 0.3, 0.0, -0.3]
+    found = straight_then(
+        lambda t: np.array(steps)[(t / 15.0).astype(int)],
+        lambda t: np.cumsum(0.1 * np.array([0.0, 0.04, 0.01, -0.02])[(t / 15.0).astype(int)]),
+        kind="spiral",
+    )
+    rates = draw_trial(found).figure.axes[1]
+    (line,) = rates.get_lines()
+    assert line.get_xdata() == pytest.approx(steps[1:]), "the approach is left out"
+    assert line.get_ydata() == pytest.approx(np.degrees([0.04, 0.01, -0.02]), rel=1e-3)
+    assert (rates.get_xlabel(), rates.get_ylabel()) == ("order", "rate of turn [°/s]")
 
 
 def test_a_pull_out_leaves_no_rate_of_a_stable_ship_and_some_of_an_unstable_one():

@@ -375,6 +375,101 @@ class TestPlots:
         hull = [log[f"vessel.omega_star_{axis}"] for axis in "XYN"]
         assert np.array_equal(lines.missing_force(run._replace(log=short)), hull)
 
+    def test_lines_over_time_are_those_of_the_log(self):
+        """Heading off the target in degrees; forces that are zero have no panel; metrics that only grow."""
+        a, b = wild(1), wild(2)
+        a["vessel.psi"] = a["guidance.psi_t"] + 2.0 * np.pi + 0.1
+        drawn = dict(drawing.figures({"a": a, "b": b}))
+        heading, aside = drawn["errors"].axes
+        line, other, zero = heading.get_lines()
+        assert line.get_ydata() == pytest.approx(np.degrees(0.1))
+        assert other.get_ydata() == pytest.approx(
+            np.degrees(performance.wrap(b["vessel.psi"] - b["guidance.psi_t"]))
+        )
+        assert list(zero.get_ydata()) == [0.0, 0.0]
+        target = [a[name] for name in ROLES.target]
+        expected = performance.cross_track(a["vessel.x"], a["vessel.y"], target)
+        assert aside.get_lines()[0].get_ydata() == pytest.approx(expected)
+        grown = over_time(b, None, None, ROLES)
+        for panel, name in zip(
+            drawn["metrics"].axes, ("ISE", "IAE", "W", "I_tau_dot", "IAEW", "IAEWWT"), strict=True
+        ):
+            assert panel.get_ylabel().startswith(f"{name} [")
+            assert panel.get_lines()[1].get_ydata()[-1] == pytest.approx(grown[name][-1])
+            assert panel.get_ylim()[0] == 0.0
+        linear = [a[name] for name in ROLES.linear_force]
+        assert drawn["forces"].axes[0].get_lines()[0].get_ydata() == pytest.approx(
+            np.linalg.norm(linear, axis=0)
+        )
+        assert [panel.get_ylabel() for panel in drawn["forces"].axes] == [
+            f"{name} ‖τ‖ [N]" for name in ("linear", "nonlinear", "total")
+        ]
+        for name in ROLES.nonlinear_force:
+            a[name] = b[name] = 0.0 * a["time"]
+        (_, two), *_ = drawing.figures({"a": a}, names=("forces",))
+        assert [panel.get_ylabel() for panel in two.axes] == ["linear ‖τ‖ [N]", "total ‖τ‖ [N]"]
+        for name in (*ROLES.linear_force, *ROLES.requested_force):
+            a[name] = 0.0 * a["time"]
+        (_, one), *_ = drawing.figures({"a": a}, names=("forces",))
+        assert [panel.get_ylabel() for panel in one.axes] == ["total ‖τ‖ [N]"]
+
+    def test_model_error_has_a_column_for_each_run_and_its_estimate_in_its_colour(self):
+        logs = {"a": wild(1), "b": wild(2)}
+        (_, figure), *_ = drawing.figures(logs, names=("model_error",))
+        assert len(figure.axes) == 6
+        assert [panel.get_title() for panel in figure.axes[:2]] == ["a", "b"]
+        for k, panel in enumerate(figure.axes):
+            axis, (label, log) = "XYN"[k // 2], [*logs.items()][k % 2]
+            true, estimate, *_ = panel.get_lines()
+            assert true.get_ydata() == pytest.approx(
+                lines.missing_force(canvas.Run(label, log, {}, ROLES))[k // 2]
+            )
+            assert estimate.get_ydata() == pytest.approx(log[f"controller.omega_hat_{axis}"])
+            assert (true.get_color(), estimate.get_color()) == ("black", ("blue", "green")[k % 2])
+            assert true.get_zorder() > estimate.get_zorder()
+        labels = [panel.get_ylabel() for panel in figure.axes[::2]]
+        assert labels == ["ω in X [N]", "ω in Y [N]", "ω in N [N m]"]
+        assert [t.get_text() for t in figure.legends[0].get_texts()] == ["model error ω", "estimate ω̂"]
+        (_, alone), *_ = drawing.figures({"a": logs["a"]}, names=("model_error",))
+        assert [panel.get_title() for panel in alone.axes] == [""] * 3
+
+    def test_each_run_has_a_line_of_its_own(self):
+        every = [drawing._line(k) for k in range(10)]
+        assert len({(line["color"], line["linestyle"]) for line in every}) == 10
+        assert [line["color"] for line in every[:4]] == ["blue", "green", "red", "magenta"], (
+            "as in the thesis"
+        )
+        assert drawing._line(10) == drawing._line(4), "then they come again"
+
+    def test_ships_are_drawn_apart_and_a_target_at_rest_is_a_cross(self):
+        log = circle()
+        log["guidance.x_t"], log["guidance.y_t"] = 0.0 * log["time"] + 1.0, 0.0 * log["time"] + 2.0
+        told = {
+            "a": RunOptions(
+                outline=ARROW._replace(length=0.3, corners=((0.2, 0.0), (-0.1, 0.05), (-0.1, -0.05)))
+            )
+        }
+        (_, figure), *_ = drawing.figures({"a": log}, told, names=("trajectory",))
+        (panel,) = figure.axes
+        (ships,) = panel.collections
+        bows = np.array([path.vertices[0] for path in ships.get_paths()])
+        assert 4 < len(bows) < track.OUTLINES
+        assert np.hypot(*np.diff(bows, axis=0).T).min() > 0.3, "none lies on another"
+        drawn = {line.get_label(): line for line in panel.get_lines()}
+        assert (drawn["target"].get_xdata().tolist(), drawn["target"].get_ydata().tolist()) == (
+            [2.0],
+            [1.0],
+        )
+        assert drawn["target"].get_marker() == "+"
+        start = drawn["start"]
+        assert (start.get_xdata()[0], start.get_ydata()[0]) == (log["vessel.y"][0], log["vessel.x"][0])
+        assert panel.get_title(loc="right") == f"ships drawn full length, every {20.0 / 11:.3g} s"
+        told = {"a": RunOptions(outline=ARROW)}
+        (_, figure), *_ = drawing.figures({"a": log}, told, names=("trajectory",))
+        assert figure.axes[0].get_title(loc="right").startswith("ships drawn 1:2, "), (
+            "no longer than half of it"
+        )
+
     def test_a_run_that_blew_up_is_drawn_as_far_as_it_goes(self, tmp_path):
         log = wild()
         for name in ROLES.columns[1:]:
