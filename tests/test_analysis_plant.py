@@ -187,6 +187,54 @@ class TestPasses:
         now = cp.one_pass(np.zeros(14), large)
         assert np.sum((now - phi) ** 2 / cp.GAMMA) < np.sum(phi**2 / cp.GAMMA)
 
+    def test_share_of_a_column_that_is_its_own_is_the_sine_of_its_angle(self):
+        a, b = 0.3, np.array([np.cos(0.3), np.sin(0.3), 0.0])
+        A = np.column_stack([5.0 * np.eye(3)[0], 0.1 * b, 2.0 * np.eye(3)[2]])
+        condition, own = cp.separability(A)
+        assert own == pytest.approx([np.sin(a), np.sin(a), 1.0])
+        assert condition == pytest.approx(np.sqrt((1.0 + np.cos(a)) / (1.0 - np.cos(a))))
+        assert cp.separability(A)[0] == pytest.approx(cp.separability(A * [7.0, 1.0, 0.2])[0])
+        condition, own = cp.separability(np.column_stack([A, np.zeros(3)]))
+        assert condition == np.inf
+        assert own.tolist() == [0.0] * 4
+
+    def test_a_penalty_shrinks_alike_in_any_unit(self):
+        rng = np.random.default_rng(2)
+        A, y = rng.normal(size=(200, 3)), rng.normal(size=200)
+        assert cp.penalised(A, y, 0.0) == pytest.approx(np.linalg.lstsq(A, y, rcond=None)[0])
+        units = np.array([1e3, 1.0, 1e-3])
+        assert cp.penalised(A * units, y, 0.3) * units == pytest.approx(cp.penalised(A, y, 0.3))
+        assert cp.penalised(np.tile(A, (5, 1)), np.tile(y, 5), 0.3) == pytest.approx(
+            cp.penalised(A, y, 0.3)
+        )
+        B, _ = np.linalg.qr(rng.normal(size=(200, 3)))
+        assert cp.penalised(B, y, 1.0) == pytest.approx(0.5 * B.T @ y), "of columns that are orthogonal"
+
+    def test_ridge_takes_the_penalty_that_predicts_blocks_left_out(self):
+        rng = np.random.default_rng(4)
+        A = rng.normal(size=(400, 1)) + 0.03 * rng.normal(size=(400, 4))
+        clean = A @ [1.0, -2.0, 3.0, 1.0]
+        assert cp.by_ridge(A, clean) == pytest.approx([1.0, -2.0, 3.0, 1.0], rel=1e-3)
+        noisy = clean + 5.0 * rng.normal(size=400)
+        chosen = cp.by_ridge(A, noisy)
+        assert np.linalg.norm(chosen) < 0.5 * np.linalg.norm(np.linalg.lstsq(A, noisy, rcond=None)[0])
+        assert any(np.allclose(chosen, cp.penalised(A, noisy, x)) for x in cp.RIDGE)
+
+    def test_explained_share_is_about_the_mean_of_each_run(self):
+        s = made(row("SYSID2"), n=600)
+        assert cp.explained([s, s], row("SYSID2")) == pytest.approx([1.0] * 3)
+        none = cp.explained([s], np.zeros(14))
+        omega = cp.thinned(s).omega
+        assert none == pytest.approx(-(omega.mean(axis=0) ** 2) / omega.var(axis=0))
+
+    def test_nothing_is_learned_over_a_long_gap(self):
+        s = made(row("SYSID2"), n=600)
+        late = replace(s, time=s.time + np.where(np.arange(s.time.size) >= 300, 5.0, 0.0))
+        dt = cp.material(late).dt
+        whole = cp.material(s).dt
+        assert dt.sum() == pytest.approx(whole.sum() - cp.EVERY, abs=2.0 * cp.EVERY)
+        assert dt.max() < cp.GAP
+
     def test_limits_from_the_data_keep_the_bulk_and_block_what_stands_out(self):
         s = made(row("SYSID4"), n=1000)
         s.nu_dot[:] = 0.008 * np.random.default_rng(3).normal(size=(1000, 3))

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from support.measured import commands, sail, smoothed
 
 from diagnosis.assessment.windows import Windows
@@ -14,7 +15,7 @@ from diagnosis.identification.candidates import model_error
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, weak_windows
-from diagnosis.model.weak_form import EVERY, HORIZON
+from diagnosis.model.weak_form import EVERY, HORIZON, WIDTH, kernel
 from diagnosis.prediction_error import push as pushes
 from diagnosis.prediction_error import shooting
 from diagnosis.prediction_error.fit import fit_predictions, shootings
@@ -148,6 +149,45 @@ def test_lasting_push_moves_a_ship_at_rest_by_half_the_acceleration_times_time_s
     np.testing.assert_allclose(np.sqrt(np.diag(V[0, -1, :, -1])), moved, rtol=1e-5)
     at_half = V[0, 3, :, -1] / V[0, -1, :, -1].diagonal()
     np.testing.assert_allclose(at_half.diagonal(), 0.25, rtol=1e-5)
+
+
+def test_unrecorded_force_stays_as_large_as_it_is_and_is_forgotten_in_its_time():
+    push, every = Push(np.array([1.0, 2.0, 3.0]), np.array([0.2, 2.0, 12.0])), 0.5
+    motion = Linear(np.zeros((1, 3, 6, 6)), np.zeros((3, 3)), every)
+    over, added = pushes._steps(motion, push)
+    kept = over[0, 0, 6:, 6:]
+    assert kept == pytest.approx(np.diag(np.exp(-every / push.time)), rel=1e-6)
+    size = np.diag(push.size**2)
+    assert (kept @ size @ kept.T + added[0, 0, 6:, 6:]).diagonal() == pytest.approx(
+        push.size**2, rel=1e-3
+    )
+    assert not added[0, 0, :6, :6].any(), "nothing else is pushed"
+    apart = Push(np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0]]), push.time)
+    _, each = pushes._steps(Linear(np.zeros((2, 3, 6, 6)), np.zeros((3, 3)), every), apart)
+    assert each[0] == pytest.approx(added[0])
+    assert not each[1].any()
+
+
+@pytest.mark.parametrize("scale", [1e-3, 0.3, 20.0])
+def test_exponential_of_matrices_is_that_of_scipy(scale):
+    A = scale * np.random.default_rng(0).normal(size=(4, 2, 5, 5)) - scale * 2.0 * np.eye(5)
+    assert pushes._exponential(A) == pytest.approx(expm(A), rel=1e-7, abs=1e-9)
+    assert pushes._exponential(np.zeros((3, 3))).tolist() == np.eye(3).tolist()
+
+
+def test_covariance_of_a_windows_mean_is_the_double_integral():
+    t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, 401)
+    w = kernel(2.0 * t / WIDTH)
+    w /= w.sum()
+    for k in (0, 12, 24):
+        for lag in (0, 3, 12):
+            away = np.abs(lag * EVERY + t[:, None] - t)
+            whole = w @ np.exp(-away / pushes.TIMES[k]) @ w
+            assert pushes.OF_FORCE[k, lag] == pytest.approx(whole, rel=0.02, abs=1e-6)
+    assert (np.diff(pushes.OF_FORCE[:, 0]) > 0.0).all(), "the slower, the less its mean is over a window"
+    assert pushes.OF_NOISE[0] == 1.0
+    apart = np.arange(pushes.LAGS + 1) * EVERY >= WIDTH
+    assert pushes.OF_NOISE[apart] == pytest.approx(0.0, abs=1e-4), "windows without a sample in common"
 
 
 def test_initial_state_alone_gives_its_own_covariance():
