@@ -28,6 +28,7 @@ ACCEPTED = (
     "no measured runs",
     "no FMUs of other tools",
     "not for FMI 2.0",
+    "not in the extra dev",
     "no binary for",
     "not on Windows",
     "root may write",
