@@ -1,12 +1,26 @@
 """What the studies share: variants of scenarios, runs over seeds, intervals, reports."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cosim
-from studies.monte_carlo import Interval, interval, paired, ratio, run_all, shipped, vary, without
+from cosim.dispatch import FinishedRun
+from studies import monte_carlo, study_command
+from studies.monte_carlo import (
+    Interval,
+    interval,
+    paired,
+    ratio,
+    run_all,
+    run_each,
+    shipped,
+    vary,
+    without,
+)
 from studies.study_command import study_parser
 from studies.study_report import Report, Verdict, seeds_line
 
@@ -51,6 +65,82 @@ def test_runs_come_back_by_variant_and_seed(tmp_path):
     assert found["b"] == pytest.approx([7.0, 7.0], abs=0.05)
     assert found["a"][0] != found["a"][1], "another seed gives other noise"
     assert json.loads((tmp_path / "b" / "4" / "log.json").read_text())["scenario"]["seed"] == 4
+
+
+def test_every_variant_runs_with_its_seeds(monkeypatch, tmp_path):
+    asked = {}
+
+    def analyse_runs(contents, analyse, folders, processes, advance):
+        asked.update(contents=contents, analyse=analyse, folders=folders, processes=processes)
+        for _ in contents:
+            advance()
+        return [(content["name"], content["seed"]) for content in contents]
+
+    monkeypatch.setattr(monte_carlo, "analyse_runs", analyse_runs)
+    variants, finished = {"a": {"name": "A", "stop": 1.0}, "b": {"name": "B", "seed": 99}}, []
+    found = run_all(variants, [3, 4], print, tmp_path, 2, lambda: finished.append(1))
+    assert found == {"a": [("A", 3), ("A", 4)], "b": [("B", 3), ("B", 4)]}
+    assert asked["folders"] == [tmp_path / name / str(seed) for name in "ab" for seed in (3, 4)]
+    assert (asked["analyse"], asked["processes"], len(finished)) == (print, 2, 4)
+    assert asked["contents"][0] == {"name": "A", "stop": 1.0, "seed": 3}
+    assert variants["b"] == {"name": "B", "seed": 99}
+    assert run_each(variants, {"a": [7], "b": []}, print) == {"a": [("A", 7)], "b": []}
+    assert asked["folders"] == [None]
+    assert asked["processes"] is None
+
+
+def test_metrics_are_those_of_a_run_that_went_through(monkeypatch):
+    assert monte_carlo.metrics(FinishedRun({}, metrics={"W": 1.0})) == {"W": 1.0}
+    with pytest.raises(cosim.SimulationError, match="why"):
+        monte_carlo.metrics(FinishedRun({}, status="failed", message="why"))
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "out", "err"),
+    [
+        (None, 0, "there\n", ""),
+        (cosim.InputError("wrong"), 2, "", "error: wrong\n"),
+        (cosim.SimulationError("lost"), 3, "", "error: lost\n"),
+    ],
+)
+def test_a_study_ends_with_its_report_or_one_line(error, code, out, err, monkeypatch, capsys):
+    def study():
+        if error is not None:
+            raise error
+        return "there"
+
+    monkeypatch.setattr(study_command, "run_command", lambda work: sys.exit(work()))
+    with pytest.raises(SystemExit) as ended:
+        study_command.run_study(study)
+    assert (ended.value.code, *capsys.readouterr()) == (code, out, err)
+
+
+def test_options_of_studies_are_those_that_make_sense():
+    plain = study_parser("nothing", "What it does.", "an example").parse_args([])
+    assert vars(plain) == {
+        "out": Path("results/study_nothing"),
+        "seeds": 10,
+        "jobs": None,
+        "quick": False,
+    }
+    still = study_parser("nothing", "", "", seeds=None, jobs=False).parse_args(["--quick"])
+    assert vars(still) == {"out": Path("results/study_nothing"), "quick": True}
+    text = study_parser("nothing", "What it does.", "an example").format_help()
+    for part in (
+        "python -m studies.nothing",
+        "What it does.",
+        "examples:\nan example",
+        "(10)",
+        "0 done, 2 bad input",
+    ):
+        assert part in text
+
+
+def test_progress_moves_on_without_a_terminal(capsys):
+    with study_command.progress(2, "runs") as advance:
+        advance()
+        advance()
+    assert capsys.readouterr().out == ""
 
 
 def test_interval_holds_the_true_mean_as_often_as_it_says():

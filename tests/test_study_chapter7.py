@@ -352,6 +352,32 @@ def test_identification_stands_beside_what_is_hidden(tmp_path, monkeypatch):
     assert "its largest condition number is 60; the ellipse's: true states 30." in text
 
 
+def test_simulated_runs_have_every_part(found, tmp_path, monkeypatch, drawn):
+    asked = []
+    monkeypatch.setattr(analysis_tables, "regressions", lambda samples: found)
+    monkeypatch.setattr(analysis_tables, "write_table_7_1", lambda *given: asked.append(given[1:]))
+    monkeypatch.setattr(chapter7, "identification", lambda report, runs: asked.append(runs))
+    s = linear(0.01)
+    report = Report(tmp_path, "t")
+    assert chapter7.simulated(report, s, [("true states", s)]) is found
+    assert asked == [(s, "simulated"), [("true states", s)]]
+    text = report.write().read_text("utf-8")
+    for name, r in found.items():
+        factors = r.by_axis("factors")["X"]
+        assert (
+            f"| {name} | {' | '.join(analysis_tables.shares(r))} | {factors} | {len(r.columns)} |"
+            in text
+        )
+    for part in (
+        "Principal components (7.3)",
+        "4 components explain",
+        "| Three factors suffice",
+        "SYSID4 hidden",
+    ):
+        assert part in text
+    assert {name.partition("_")[0] for name in drawn} == {"simulated"}
+
+
 def test_real_runs_have_the_same_parts(found, tmp_path, monkeypatch, drawn):
     s = linear(0.01)
     asked = []

@@ -12,7 +12,7 @@ import pytest
 import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import analysis
-from diagnosis.analysis import NU, TAU, concurrent_passes
+from diagnosis.analysis import concurrent_passes
 from fmus.hull import RotationalDamping
 from studies import (
     chapter5,
@@ -269,38 +269,49 @@ def test_scenarios_of_chapter_7():
         assert bool(content["faults"]) == (name in trials.CONTROLLERS)
 
 
-def test_report_of_chapter_7(tmp_path, monkeypatch, figures):
-    monkeypatch.setattr(concurrent_passes, "MOST", 1)
-    asked, logs = [], {}
-
-    def read_log(folder):
-        """Columns that differ from run to run."""
-        k = len(logs)
-        return logs.setdefault(folder, MadeUp(90.0, shift=0.3 * k))
+def test_report_of_chapter_7(tmp_path, monkeypatch):
+    """What each part gets; the parts are tested by themselves."""
+    asked, parts = [], {}
 
     def gather_samples(folders, by):
         asked.append((by, [f.parent.name for f in folders]))
-        return [chapter7.true_samples(folder) for folder in folders]
+        return [by] * len(folders)
 
-    def sailed(contents, seeds, analyse, *_):
-        return {
-            key: [model_loops.Loop(5.0 if "PLS3" in key else 0.1, -0.1, MadeUp(20.0))]
-            for key in contents
-        }
+    def part(name):
+        return lambda report, *given: parts.setdefault(name, []).append(given) or name
 
-    monkeypatch.setattr(cosim, "read_log", read_log)
-    monkeypatch.setattr(chapter7, "run_all", lambda todo, *_: asked.append(set(todo)))
+    monkeypatch.setattr(cosim, "read_log", lambda folder: f"log of {folder.parent.name}")
+    monkeypatch.setattr(
+        chapter7, "run_all", lambda todo, seeds, analyse, *more: asked.append((set(todo), *more))
+    )
+    monkeypatch.setattr(chapter7, "true_samples", lambda folder: f"samples of {folder.parent.name}")
     monkeypatch.setattr(analysis, "gather_samples", gather_samples)
-    monkeypatch.setattr(model_loops, "run_all", sailed)
-    text, results = written(chapter7.study(tmp_path, 60.0, None, None), tmp_path)
-    assert asked[0] == {*trials.CONTROLLERS, "true", "eight"}
-    assert asked[1:] == [("mdf", [*trials.CONTROLLERS]), ("smoothed", ["true"]), ("mdf", ["true"])]
-    assert results["unstable"]["here"].startswith("reproduced; the check")
-    assert set(shown(text)) == {f"{name}.png" for name in figures}
-    shapes = figures["simulated_shapes"][0]
-    assert [panel.get_xlabel() for panel in shapes.axes] == [f"node of {n}" for n in (*NU, *TAU)]
-    assert {len(panel.get_lines()) for panel in shapes.axes} == {3}
-    assert len(figures["simulated_scatter"][0].axes) == 9
+    monkeypatch.setattr(analysis, "joined", "+".join)
+    monkeypatch.setattr(chapter7, "simulated", part("simulated"))
+    monkeypatch.setattr(chapter7, "measured", part("measured"))
+    monkeypatch.setattr(chapter7, "write_loops", part("loops"))
+    monkeypatch.setattr(chapter7.tables, "write_shapes", part("shapes"))
+    text, _ = written(chapter7.study(tmp_path, 60.0, 3, None), tmp_path)
+    assert asked == [
+        ({*trials.CONTROLLERS, "true", "eight"}, tmp_path / "logs", 3),
+        ("mdf", [*trials.CONTROLLERS]),
+        ("smoothed", ["true"]),
+        ("mdf", ["true"]),
+    ]
+    own = [
+        ("true states", "samples of true"),
+        ("smoothed", "smoothed"),
+        ("mdf", "mdf"),
+        ("eight", "samples of eight"),
+    ]
+    assert parts == {
+        "shapes": [("mdf+mdf+mdf+mdf", "log of true")],
+        "simulated": [("mdf+mdf+mdf+mdf", own)],
+        "loops": [("simulated", 60.0, 3)],
+    }
+    assert "Runs in a row: RBS, ABS, CLZ, CLE; ellipse" in text
+    chapter7.study(tmp_path, None, None, tmp_path)
+    assert parts["measured"] == [(tmp_path,)]
 
 
 def test_last_lap_is_the_last_99_seconds():
@@ -458,6 +469,55 @@ def test_force_late_by_the_delay_is_that_of_earlier_samples():
     assert (s.nu[:, 1] == log["observer.v_hat"][late]).all()
     assert (s.nu_dot[:, 1] == log["observer.v_dot_hat"][late]).all()
     assert (s.tau[9:, 2] == log["thrusters.tau_cmd_N"][late][:-9]).all()
+
+
+def test_passes_go_on_from_where_the_last_one_ended():
+    """The truth is where every pass stands; from zero a quicker loss of thrust takes more of the moment."""
+    s = lost_thrust.samples(MadeUp(60.0, 0.05), "observer", "_hat", 0.0)
+    s.omega[:] = analysis.regressors(s) @ np.array(sysid4.PHI)
+    slow, quick = (list(lost_thrust.places(s, pace)) for pace in (0.01, 1.0))
+    assert len(quick) == len(slow) == len(lost_thrust.PASSES)
+    for k, (count, place) in enumerate(zip(lost_thrust.PASSES, quick, strict=True)):
+        phi = np.zeros(14)
+        for _ in range(count):
+            phi = concurrent_passes.one_pass(phi, concurrent_passes.material(s))
+        assert place == pytest.approx((phi[13], phi[8], analysis.explained([s], phi)[2]))
+        assert abs(slow[k].delta_N) < abs(place.delta_N)
+    assert analysis.NAMES[lost_thrust.N_R] == "N_r"
+    assert analysis.NAMES[lost_thrust.DELTA_N] == "delta_N"
+
+
+def test_estimates_and_paces_of_a_run_are_tried_in_pairs(monkeypatch):
+    asked = []
+    monkeypatch.setattr(lost_thrust, "samples", lambda log, *how: how)
+    monkeypatch.setattr(lost_thrust, "places", lambda s, pace: asked.append((s, pace)) or iter([pace]))
+    found = lost_thrust.analyse(FinishedRun({}, log={}))
+    assert list(found) == [f"{n}, {p:g}" for n in lost_thrust.ESTIMATES for p in lost_thrust.PACES]
+    assert asked == [(how, p) for how in lost_thrust.ESTIMATES.values() for p in lost_thrust.PACES]
+    assert found["true states, 1"] == [1.0]
+    for analyse in (lost_thrust.analyse, lost_thrust.whole, chapter7.folder):
+        with pytest.raises(cosim.SimulationError, match="why"):
+            analyse(FinishedRun({}, status="failed", message="why"))
+    assert lost_thrust.whole(FinishedRun({}, log={"time": 1.0})) == {"time": 1.0}
+    assert [chapter5.done(FinishedRun({}, status=s)) for s in ("done", "failed")] == [True, False]
+
+
+def test_runs_of_the_lost_thrust_hide_sysid4_or_stop_the_bow_thruster():
+    hidden, failing = lost_thrust.scenario(), lost_thrust.failure()
+    assert hidden["fmus"]["thrusters"]["parameters"]["loss_yaw"] == 0.31
+    assert hidden["fmus"]["controller"]["path"] == "controller_bs.fmu"
+    assert {"vessel.r_dot", "observer.u_dot_hat", "thrusters.tau_cmd_N"} <= set(hidden["log"]["signals"])
+    (event,) = failing["events"]
+    assert (event["time"], event["model"], event["variable"], event["value"]) == (
+        140.0,
+        "thrusters",
+        "loss_bow",
+        1.0,
+    )
+    assert failing["fmus"]["controller"]["path"] == "controller_cl_improved.fmu"
+    assert hidden["faults"] == failing["faults"] == []
+    for content in (hidden, failing):
+        cosim.load_scenario(content)
 
 
 def test_report_of_the_lost_thrust(tmp_path, monkeypatch, figures):
@@ -619,6 +679,30 @@ def test_verdicts_on_the_gains(tmp_path):
     report = Report(tmp_path, "t")
     observer_gains.table(report, made(swift=True, jumpy=True))
     assert "| nonlinear | 6.0 | 9 |" in report.write().read_text(encoding="utf-8")
+
+
+def test_report_of_the_gains(tmp_path, monkeypatch):
+    pairs = itertools.product(observer_gains.CORRECTING, observer_gains.K_2, observer_gains.DAMPING)
+    names = ["df", "mdf", *(observer_gains.name_of(*pair) for pair in pairs)]
+    one = {n: observer_gains.Behaviour(0.1, 0.2, 0.3) for n in names}
+
+    def run_all(runs, seeds, analyse, processes, advance):
+        assert {content["stop"] for content in runs.values()} == {30.0}
+        assert (analyse, processes) == (observer_gains.analyse, 2)
+        return {name: [one] * len(seeds) for name in runs}
+
+    monkeypatch.setattr(observer_gains, "run_all", run_all)
+    text, results = written(observer_gains.study(tmp_path, range(3), 30.0, 2), tmp_path)
+    assert "Seeds 0-2." in text
+    assert "| df | – | – | 0.1 [0.1, 0.1] | 0.2 [0.2, 0.2] | 0.3 [0.3, 0.3] |" in text
+    assert text.count("\n| nonlinear | ") == text.count("\n| luenberger | ") == 8
+    assert len(results["claims"]) == 2
+    assert set(results["gains"]) == {observer_gains.CLEAN, observer_gains.FROZEN}
+    assert "damping ζ = 1 and 0.7" in text
+    log = MadeUp(20.0, 0.05, vessel__u=0.1)
+    behaviour = observer_gains.behaviour(log, {"u": 0.0 * log["time"] + 0.1})
+    assert behaviour.lag == 0.0
+    assert np.isnan(behaviour.after_freeze), "there is none"
 
 
 # Real time
