@@ -8,7 +8,7 @@ import pytest
 
 from cosim.dispatch import FinishedRun
 from diagnosis import Model, analysis
-from diagnosis.analysis import NU, TAU, Samples
+from diagnosis.analysis import NU, TAU, Samples, concurrent_passes
 from studies import chapter7
 from studies.basin_trials import sysid4, trials
 from studies.error_models import analysis_tables, model_loops
@@ -379,6 +379,7 @@ def test_simulated_runs_have_every_part(found, tmp_path, monkeypatch, drawn):
 
 
 def test_real_runs_have_the_same_parts(found, tmp_path, monkeypatch, drawn):
+    monkeypatch.setattr(concurrent_passes, "MOST", 1)
     s = linear(0.01)
     asked = []
     monkeypatch.setattr(chapter7.basin, "files", lambda data: [data / "a.mat"])
