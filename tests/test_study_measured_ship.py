@@ -54,7 +54,9 @@ def test_nominal_force_is_a_straight_line():
 
 
 def test_force_is_that_of_the_fmu_at_rest():
-    model = Model().plus({**CURVE, "deadband": 0.05, "loss_surge": 0.1, "plant_F_vsp": 0.2})
+    model = Model().plus(
+        {**CURVE, "deadband": 0.05, "loss_surge": 0.1, "plant_F_vsp": 0.2, "inflow_vsp_x": 0.5}
+    )
     p = model.drive.params
     for command in COMMANDS:
         inputs = Inputs(Force(1.165 * command, 0.0, 0.0), Velocity())
