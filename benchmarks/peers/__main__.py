@@ -134,6 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers", description=__doc__)
     parser.add_argument("data", type=Path, metavar="DATA", help="folder with *.mat or cse1/*.mat")
     parser.add_argument("--runs", nargs="+", metavar="NAME", help="to use, three or more (all)")
+    parser.add_argument("--left-out", nargs="+", metavar="NAME", help="runs left out in turn (all)")
     parser.add_argument(
         "--methods", nargs="+", choices=[*OURS, *PEERS], default=[*OURS, *PEERS], help="to ask (all)"
     )
@@ -150,12 +151,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with threadpool_limits(1):
         runs = diagnosis.gather(chosen)
         for name, asked in methods(options.methods, Nominal(Model(), runs[0].run.commands)):
-            answers = {}
+            file = options.out / f"{name}.json"
             for k, out in enumerate(runs):
-                answers[out.run.name] = asked([*runs[:k], *runs[k + 1 :]], out)
-                print(f"{name}, without {out.run.name}: {answers[out.run.name]}", flush=True)
-            kept = {run: asdict(a) for run, a in answers.items()}
-            (options.out / f"{name}.json").write_text(json.dumps(kept, indent=1) + "\n")
+                if options.left_out and out.run.name not in options.left_out:
+                    continue
+                found = asked([*runs[:k], *runs[k + 1 :]], out)
+                print(f"{name}, without {out.run.name}: {found}", flush=True)
+                kept = json.loads(file.read_text()) if file.exists() else {}
+                file.write_text(json.dumps(kept | {out.run.name: asdict(found)}, indent=1) + "\n")
     lines = table(options.out, [w.run.name for w in runs])
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", *PEERS.values()) if _installed(p))
     made = f"seed {SEED}, {platform.machine()}, CPython {platform.python_version()}, {packages}"
