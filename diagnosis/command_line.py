@@ -5,6 +5,7 @@ import io
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -189,6 +190,12 @@ def inputs_of(options: argparse.Namespace) -> dict[str, str]:
     given = [getattr(options, name, None) for name in INPUTS]
     paths = [p for each in given for p in (each if isinstance(each, list) else [each]) if p is not None]
     return {str(path): sha256(Path(path)) for path in paths}
+
+
+def import_later_parts() -> None:
+    """Import what is needed once runs are smoothed; it takes a second."""
+    for name in ("diagnosis.session", "diagnosis.report.page", "matplotlib.figure"):
+        import_module(name)
 
 
 def command_of(name: str) -> str:

@@ -14,7 +14,17 @@ from typing import Any
 
 from cosim.command import run_command
 
-from .command_line import MAP, Done, command_of, inputs_of, map_option, out_options, parser, run
+from .command_line import (
+    MAP,
+    Done,
+    command_of,
+    import_later_parts,
+    inputs_of,
+    map_option,
+    out_options,
+    parser,
+    run,
+)
 from .progress import Advance
 from .result_folder import together
 
@@ -28,15 +38,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from . import session  # only now: it takes a second to import
-    from .gathering import gather
+    from .gathering import gather  # only now: it takes a while to import
     from .initial_model import initial_model, proposing, write_map
     from .model import ship_with
     from .report import comparison_content, show_comparison, write_report
 
     with together(options.out, (*FILES, MAP)) as new:
         model, fmu = initial_model(options.model, options.map, ship_with(options.effects, options.ship))
-        runs = gather(options.runs, advance, options.anyway, model, options.horizon)
+        runs = gather(options.runs, advance, options.anyway, model, options.horizon, import_later_parts)
+        from . import session
+
         with proposing():
             comparison = session.evaluate(runs, fmu or model, advance=advance)
         advance("where it fails")

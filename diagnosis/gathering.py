@@ -1,7 +1,7 @@
 """From files to runs that can be judged: read all, then clean and smooth, two at a time."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -34,6 +34,7 @@ def gather(
     anyway: bool = False,
     model: Model | None = None,
     horizon: float | None = None,
+    meanwhile: Callable[[], object] | None = None,
 ) -> list[WeakWindows]:
     """Read and smooth measured runs, and refuse those whose files say something else than was meant.
 
@@ -49,6 +50,7 @@ def gather(
         model: the initial one, by which that is judged, and of whose ship they are; the nominal one by
             default.
         horizon: length of the windows in which models predict the runs [s]; by default that of the ship.
+        meanwhile: see :func:`.parallel.for_each`; done while a second process smooths.
 
     Returns:
         For each run its windows of the weak form; names are unique.
@@ -68,7 +70,7 @@ def gather(
     names = [path.name if isinstance(path, Run) else path for path in paths]
     _refuse_twice(runs, names)
     advance(f"smoothing {', '.join(run.name for run in runs)}")
-    smoothed = for_each(lambda run: _smoothed(run, anyway, scale), _distinct(runs, names))
+    smoothed = for_each(lambda run: _smoothed(run, anyway, scale), _distinct(runs, names), (), meanwhile)
     windows = [_windows(s, anyway, horizon) for s in smoothed]
     for s in smoothed:
         if s.track.run.trial is not None:

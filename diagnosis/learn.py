@@ -16,6 +16,7 @@ from .command_line import (
     MAP,
     Done,
     command_of,
+    import_later_parts,
     inputs_of,
     map_option,
     out_options,
@@ -46,13 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from . import session  # only now: it takes a second to import
-    from .foreign import write_wrapper
-    from .gathering import gather
+    from .gathering import gather  # only now: it takes a while to import
     from .identification import shares
     from .initial_model import initial_model, proposing, write_map
     from .model import ship_with, write_model
-    from .prediction_error.output_fit import fitted
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
@@ -64,7 +62,11 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         shares(craft, options.prior)
         by = method(options.method)
         paths = [*options.train, *options.test]
-        runs = gather(paths, advance, options.anyway, model, options.horizon)
+        runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
+        from . import session
+        from .foreign import write_wrapper
+        from .prediction_error.output_fit import fitted
+
         train = len(options.train)
         model = fitted(runs[:train], model, options.prior, options.fit)
         with proposing():

@@ -9,12 +9,13 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import cache
 from io import BytesIO
 from multiprocessing import current_process, get_context
 from pickle import Pickler, Unpickler
 from typing import Any, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from cosim.interrupts import UninterruptedProcesses, ignore_interrupts
 from cosim.process import end_with_parent
@@ -28,8 +29,17 @@ NUMBER = 2  # bytes of an item's number; all fit into a pipe's 64 kB
 _alone = not FORKS  # whether this process shares no work: it is a second one itself
 
 
+@cache
+def _libraries() -> ThreadpoolController:
+    """The loaded libraries with threads of their own, which take milliseconds to find."""
+    return ThreadpoolController()
+
+
 def for_each(
-    function: Callable[[Item], Found], items: Sequence[Item], common: Sequence[object] = ()
+    function: Callable[[Item], Found],
+    items: Sequence[Item],
+    common: Sequence[object] = (),
+    meanwhile: Callable[[], object] | None = None,
 ) -> list[Found]:
     """What a function gives for each item, in their order.
 
@@ -37,6 +47,8 @@ def for_each(
         function: depends on nothing that it changes.
         items: what it is called with.
         common: objects that results may contain and that are not sent, as both processes have them.
+        meanwhile: what this process does before its first item, such as imports that it needs later;
+            left out where there is no second process.
     """
     # Another thread might hold what a fork needs, and a process of a pool may have none of its own.
     main = threading.current_thread() is threading.main_thread()
@@ -67,11 +79,15 @@ def for_each(
             sender.send_bytes(_packed(work(), known))
 
     second = context.Process(target=beside, daemon=True)
-    with threadpool_limits(1, "blas"):  # or each process would have a thread for each core
+    with _libraries().limit(
+        limits=1, user_api="blas"
+    ):  # or each process would have a thread for each core
         with UninterruptedProcesses():
             second.start()
         sender.close()
         try:
+            if meanwhile is not None:
+                meanwhile()
             found = work()
             with suppress(EOFError):  # the second process was killed
                 found |= _unpacked(receiver.recv_bytes(), known)

@@ -257,7 +257,7 @@ def diagnose(
         return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)
 
     every = comparison.evaluations
-    banded = [replace(e, bands=b) for e, b in zip(every, for_each(bands, every), strict=True)]
+    banded = [replace(e, bands=b) for e, b in zip(every, map(bands, every), strict=True)]
     comparison = replace(comparison, evaluations=banded)
     advance("what is left")
     # What fails at times of its own in a run held out says nothing of what was learned of others.

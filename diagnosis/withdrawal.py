@@ -50,6 +50,7 @@ class Unseen:
         sigma: np.ndarray,
     ) -> None:
         self._start, self._sigma, self._held_out = start, sigma, bool(held_out)
+        self._known: dict[int, tuple[Findings | Model, Losses]] = {}
         self.where = "held-out runs" if held_out else "data left out of the fit"
         if held_out or len(train) > 1:
             self._parts = [Part(w) for w in held_out or train]
@@ -62,7 +63,12 @@ class Unseen:
 
     def losses(self, *found: Findings | Model) -> list[Losses]:
         """What models miss, each fitted without the part that it is held against."""
-        return losses(self._parts, [self._models(f) for f in found], self._sigma)
+        if any(id(f) not in self._known for f in found):
+            # The first model, which comes up again, takes hardly longer beside others.
+            due = {id(f): f for f in (*found, self._start) if id(f) not in self._known}
+            missed = losses(self._parts, [self._models(f) for f in due.values()], self._sigma)
+            self._known |= zip(due, zip(due.values(), missed, strict=True), strict=True)
+        return [self._known[id(f)][1] for f in found]
 
     def _models(self, found: Findings | Model) -> Sequence[Model]:
         if isinstance(found, Findings):

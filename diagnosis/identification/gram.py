@@ -14,7 +14,6 @@ import numpy as np
 
 from ..model import WeakWindows
 from ..model.weak_form import OVERLAP
-from ..parallel import for_each
 from .candidates import Candidate
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
@@ -48,10 +47,10 @@ class Nuisance:
     unit: np.ndarray
 
 
-class Fold(NamedTuple):
-    """Blocks held out (h,), and the Gram matrix (p, p) of all others."""
+class Folds(NamedTuple):
+    """Of each fold the blocks held out (h,), and the Gram matrix of all others, (folds, p, p)."""
 
-    held: np.ndarray
+    held: list[np.ndarray]
     train: np.ndarray
 
 
@@ -108,18 +107,18 @@ class GramTable:
         return self.grams.sum(axis=0)
 
     @cached_property
-    def by_block(self) -> list[Fold]:
+    def by_block(self) -> Folds:
         """Folds of interleaved blocks of all runs."""
         return self._folds(np.arange(len(self.grams)) % FOLDS)
 
     @cached_property
-    def by_run(self) -> list[Fold]:
+    def by_run(self) -> Folds:
         """Each run as a fold of its own."""
         return self._folds(self.runs)
 
-    def _folds(self, number: np.ndarray) -> list[Fold]:
+    def _folds(self, number: np.ndarray) -> Folds:
         held = [np.flatnonzero(number == n) for n in np.unique(number)]
-        return [Fold(k, self.total - self.grams[k].sum(axis=0)) for k in held]
+        return Folds(held, np.stack([self.total - self.grams[k].sum(axis=0) for k in held]))
 
     @property
     def per_parameter(self) -> float:
@@ -139,7 +138,7 @@ def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
         fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
         return float(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
 
-    return np.maximum(for_each(left, range(3)), floor)
+    return np.maximum([left(axis) for axis in range(3)], floor)
 
 
 def gram_table(

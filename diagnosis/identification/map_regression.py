@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from .gram import Fold, GramTable
+from .gram import Folds, GramTable
 
 RIDGE = 1e-9  # relative: collinear regressors share what they explain
 # Sum of squares, in units of noise and ship, below which a column holds nothing on these data.
@@ -30,24 +30,33 @@ def ridge(H: np.ndarray, unit: np.ndarray) -> np.ndarray:
     return RIDGE * np.diag(np.diag(H) + unit**-2.0)
 
 
+def _form(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """x^T A x of symmetric matrices A (..., p, p) and vectors (..., p)."""
+    return (np.matmul(matrix, x[..., None])[..., 0] * x).sum(axis=-1)
+
+
 class Fit(NamedTuple):
-    """A fitted regression.
+    """A fitted regression, or several of the same columns.
 
     Attributes:
-        used, left: columns and their weights, whose sum is what is left of the model error.
-        beta: (p,), fitted coefficients of the candidate.
-        penalty: prior penalty of all fitted parameters.
+        used, left: columns (n,) and weights (..., n), whose sum is what is left of the model error.
+        beta: (..., p), fitted coefficients of the candidate.
+        penalty: (...), prior penalty of all fitted parameters.
     """
 
     used: np.ndarray
     left: np.ndarray
     beta: np.ndarray
-    penalty: float
+    penalty: np.ndarray
+
+    def of(self, k: int) -> "Fit":
+        """One of several."""
+        return Fit(self.used, self.left[k], self.beta[k], self.penalty[k])
 
     def loss(self, grams: np.ndarray) -> np.ndarray:
         """Sum of squares left in each of some Gram matrices (..., p, p)."""
         part = grams[..., self.used[:, None], self.used]
-        return (part @ self.left) @ self.left
+        return _form(part, self.left)
 
 
 class Regression(NamedTuple):
@@ -71,19 +80,19 @@ class Regression(NamedTuple):
     unit: np.ndarray
 
     def fitted(self, gram: np.ndarray) -> Fit:
-        """The maximum a posteriori fit to data with a Gram matrix (p, p)."""
-        H = gram[self.use[:, None], self.use] + self.precision
-        diagonal = np.einsum("ii->i", H)
+        """The maximum a posteriori fits to data with Gram matrices (..., p, p)."""
+        H = gram[..., self.use[:, None], self.use] + self.precision
+        diagonal = np.einsum("...ii->...i", H)
         diagonal += RIDGE * (diagonal + self.unit**-2.0)
         given = np.flatnonzero(self.target)
-        right = gram[self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
-        beta = np.linalg.solve(H, right)
-        last = self.offset + beta
+        right = gram[..., self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
+        beta = np.linalg.solve(H, right[..., None])[..., 0]
+        target = np.broadcast_to(self.target[given], (*beta.shape[:-1], given.size))
         return Fit(
             np.concatenate([given, self.use]),
-            np.concatenate([self.target[given], -beta]),
-            beta[: self.free],
-            float(last @ self.precision @ last),
+            np.concatenate([target, -beta], axis=-1),
+            beta[..., : self.free],
+            _form(self.precision, self.offset + beta),
         )
 
     def size(self, gram: np.ndarray) -> float:
@@ -145,20 +154,20 @@ def score(t: GramTable, candidate: int, shapes: int) -> Scored:
     """Score of a candidate; in each fold its shape is chosen by the training part."""
     options = [regression(t, candidate, k) for k in range(shapes)]
     by_block = held_out_loss(t, options, t.by_block)
-    by_run = held_out_loss(t, options, t.by_run) if len(t.by_run) > 1 else by_block
+    by_run = held_out_loss(t, options, t.by_run) if len(t.by_run.held) > 1 else by_block
     fits = [o.fitted(t.total) for o in options]
-    shape = int(np.argmin([float(f.loss(t.total)) + f.penalty for f in fits]))
+    shape = int(np.argmin([f.loss(t.total) + f.penalty for f in fits]))
     complexity = options[shape].size(t.total) * t.per_parameter
-    return Scored(candidate, shape, by_block, by_run, fits[shape].penalty, complexity)
+    return Scored(candidate, shape, by_block, by_run, float(fits[shape].penalty), complexity)
 
 
-def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Sequence[Fold]) -> np.ndarray:
+def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Folds) -> np.ndarray:
     """Loss of each block (blocks,) by the fit, of the shape that does best, to all other folds."""
     found = np.empty(len(t.grams))
-    for held, train in folds:
-        fits = [o.fitted(train) for o in options]
-        best = min(fits, key=lambda one, train=train: float(one.loss(train)) + one.penalty)
-        found[held] = [best.loss(t.grams[k]) for k in held]
+    fits = [o.fitted(folds.train) for o in options]
+    best = np.argmin([f.loss(folds.train) + f.penalty for f in fits], axis=0)
+    for k, held in enumerate(folds.held):
+        found[held] = fits[best[k]].of(k).loss(t.grams[held])
     return found
 
 

@@ -84,7 +84,7 @@ def weighted(
     free = len(nuisance.offset) - t.prior.size
     size = float(table.total[0, 0])
     new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
-    order = in_order(for_each(lambda k: score(table, k, len(found[k].shapes)), new))
+    order = in_order([score(table, k, len(found[k].shapes)) for k in new])
     return Ranking(base, nuisance, table, found, order)
 
 

@@ -6,6 +6,7 @@ memory lasts only so long: the grid is cut into parts that are stepped side by s
 before it that still matters. Weak form and predictions use the same result, :class:`Response`.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -160,14 +161,10 @@ class Response:
     def _integrals(self) -> tuple["Integral", "Integral"]:
         if not self.slow:
             return self._commands, self._commands
-        h = self._step
-        edges = h * np.arange(int(np.ceil(self._clock[-1] / h + 1.0)) + 1)
-        given, acting = self._stepped(edges, h)
-        before = self._commands.before
-        return Integral(edges, given, before), Integral(edges, acting, before)
+        return self._of_steps(*stepped(self.drive, self.commanded, self.step))
 
     @property
-    def _step(self) -> float:
+    def step(self) -> float:
         """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
         fine = self._period / np.ceil(self._period / (STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
@@ -180,35 +177,78 @@ class Response:
     def _lasts(self, member: Any, memory: Memory) -> float:
         return float(memory.lasts(*self.drive.params.dynamics[member.parameters]))
 
-    def _stepped(self, edges: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Means over each step (K, k): commands that arrive, and shares that act."""
-        drive = self.drive
+    @property
+    def _steps(self) -> int:
+        return int(np.ceil(self._clock[-1] / self.step + 1.0)) + 1
+
+    @property
+    def _part(self) -> int:
+        """Steps of a part."""
+        return int(np.ceil(PART * self.model.ship.scale.time / self.step)) + 1
+
+    @cached_property
+    def commanded(self) -> np.ndarray:
+        """(m, parts, k), mean commands in each step; before each part those that it remembers."""
+        drive, h, part = self.drive, self.step, self._part
         memory = sum(self._lasts(member, m) for _, member, m in self._memories)
         largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
         rates = np.broadcast_to(drive.params.rate, largest.shape)
         memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
-        scale = self.model.ship.scale.time
-        longest = LONGEST_MEMORY * scale
-        before, part = (int(np.ceil(min(x, longest) / h)) + 1 for x in (memory, PART * scale))
-        size = edges.size - 1
-        parts = -(-size // part)
-        # Column m holds the steps of part m, those before it that it remembers first.
-        rows = np.arange(-before, part)[:, None] + part * np.arange(parts)
-        commands = np.diff(self._commands(np.append(edges, edges[-1] + h)), axis=0) / h
-        commanded = np.where(like(rows < 0, 1), self._commands.before, commands[np.clip(rows, 0, size)])
-        past = at_rest(drive.effects)
-        given = np.empty_like(commanded)
-        acting = np.empty_like(commanded)
-        for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
-            past, arriving = command_response(past, tuple(each), drive, h)
-            past, shares = force_response(past, arriving, drive, h)
-            for one in range(commanded.shape[-1]):
-                given[k, ..., one], acting[k, ..., one] = arriving[one], shares[one]
+        longest = LONGEST_MEMORY * self.model.ship.scale.time
+        before = int(np.ceil(min(memory, longest) / h)) + 1
+        rows = np.arange(-before, part)[:, None] + part * np.arange(-(-self._steps // part))
+        commands = np.diff(self._commands(h * np.arange(self._steps + 2)), axis=0) / h
+        return np.where(
+            like(rows < 0, 1), self._commands.before, commands[np.clip(rows, 0, self._steps)]
+        )
+
+    def _of_steps(self, given: np.ndarray, acting: np.ndarray) -> tuple["Integral", "Integral"]:
+        """Integrals of what becomes of :attr:`commanded` in its steps."""
+        edges = self.step * np.arange(self._steps + 1)
         found = []
         for signal in (given, acting):
-            parts_first = np.moveaxis(signal[before:], 1, 0)
-            found.append(parts_first.reshape(parts * part, *commanded.shape[2:])[:size])
+            parts = np.moveaxis(signal[-self._part :], 1, 0)
+            values = parts.reshape(-1, *signal.shape[2:])[: self._steps]
+            found.append(Integral(edges, values, self._commands.before))
         return found[0], found[1]
+
+    def take(self, given: np.ndarray, acting: np.ndarray) -> None:
+        """Know what becomes of :attr:`commanded`, as :func:`stepped` beside other runs."""
+        self._integrals = self._of_steps(given, acting)
+
+
+def stepped(drive: Prepared, commanded: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """What becomes of commands in steps of h [s]: those that arrive, and the shares that act.
+
+    Args:
+        drive: thrusters, at rest at first.
+        commanded: (m, parts, k), parts side by side.
+        h: step.
+    """
+    past = at_rest(drive.effects)
+    given = np.empty_like(commanded)
+    acting = np.empty_like(commanded)
+    for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
+        past, arriving = command_response(past, tuple(each), drive, h)
+        past, shares = force_response(past, arriving, drive, h)
+        for one in range(commanded.shape[-1]):
+            given[k, ..., one], acting[k, ..., one] = arriving[one], shares[one]
+    return given, acting
+
+
+def step_together(responses: Sequence[Response]) -> None:
+    """Step the same thrusters in several runs side by side, which takes hardly longer than in one."""
+    groups: dict[tuple[float, int, int, int], list[Response]] = {}
+    for r in responses:
+        if r.slow:
+            m, _, k = r.commanded.shape
+            groups.setdefault((r.step, m, k, id(r.drive.effects.layout)), []).append(r)
+    for (h, *_), group in groups.items():
+        commanded = np.concatenate([r.commanded for r in group], axis=1)
+        last = np.cumsum([r.commanded.shape[1] for r in group])[:-1]
+        parts = (np.split(x, last, axis=1) for x in stepped(group[0].drive, commanded, h))
+        for r, given, acting in zip(group, *parts, strict=True):
+            r.take(given, acting)
 
 
 class Integral:

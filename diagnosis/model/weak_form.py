@@ -24,7 +24,7 @@ from ..smoothing import Smoothed
 from ..smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
 from .ship_model import Model
-from .thrust import Response, thrust
+from .thrust import Response, step_together, thrust
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s
@@ -282,7 +282,8 @@ def arriving(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def _response(w: WeakWindows, model: Model) -> np.ndarray:
-    return w.recall("response", Response.key(model), lambda: _between(w, model), MEMORIES)
+    key = Response.key(model)
+    return w.recall("response", key, lambda: _response_to(w, model).between_samples, MEMORIES)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
@@ -292,21 +293,28 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
     return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
 
 
-def _between(w: WeakWindows, model: Model) -> np.ndarray:
-    return Response(w.run, model, not at_rest(w.smoothed)).between_samples
+def _response_to(w: WeakWindows, model: Model) -> Response:
+    return Response(w.run, model, not at_rest(w.smoothed))
 
 
 def remember_responses(data: Sequence[WeakWindows], models: Sequence[Model]) -> None:
     """Compute what the thrusters of some models make of the commands of all runs, and keep it."""
-    missing: dict[Any, tuple[WeakWindows, Model]] = {}
+    missing: dict[Any, dict[str, tuple[WeakWindows, Model]]] = {}
     for w in data:
         for model in (m.during(w.run.name) for m in models):
             key = Response.key(model)
             if key not in w.memory.get("response", {}):
-                missing[w.run.name, key] = w, model
-    found = for_each(lambda one: _between(*one), [*missing.values()])
-    for (_, key), (w, _), between in zip(missing, missing.values(), found, strict=True):
-        w.recall("response", key, lambda between=between: between, MEMORIES)
+                missing.setdefault(key, {})[w.run.name] = w, model
+
+    def between(one: dict[str, tuple[WeakWindows, Model]]) -> list[np.ndarray]:
+        responses = [_response_to(*of_run) for of_run in one.values()]
+        step_together(responses)
+        return [r.between_samples for r in responses]
+
+    found = for_each(between, [*missing.values()])
+    for (key, one), of_runs in zip(missing.items(), found, strict=True):
+        for (w, _), of_run in zip(one.values(), of_runs, strict=True):
+            w.recall("response", key, lambda of_run=of_run: of_run, MEMORIES)
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -179,11 +179,8 @@ class PredictionFit:
     def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
         """Twice the negative logarithm of the posterior, but for a constant."""
         theta, model = self.theta(at), at.model(self.prior)
-
-        def of_windows(k: int) -> float:
-            return float(np.sum(whitened(weights[k], self.windows[k].residuals(model)) ** 2))
-
-        squares = for_each(of_windows, range(len(self.windows)))
+        each = zip(weights, self.windows, strict=True)
+        squares = [float(np.sum(whitened(W, s.residuals(model)) ** 2)) for W, s in each]
         total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
         return total if np.isfinite(total) else np.inf
 
