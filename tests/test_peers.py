@@ -117,6 +117,14 @@ def test_method_predicts_a_linear_ship(name, package, setting):
     assert np.divide(errors, steady_error()).max() < (0.6 if name == "neural" else 0.1)
 
 
+@pytest.mark.parametrize("library", ["linear", "drag", "cubic"])
+def test_columns_are_those_of_the_library(library):
+    sindy = pytest.importorskip("benchmarks.peers.sindy")
+    x = np.random.default_rng(1).normal(size=(20, 5))
+    theirs = sindy.functions(library).fit(x).transform(x)
+    assert sindy.columns(library, x) == pytest.approx(np.asarray(theirs))
+
+
 def test_held_out_runs_reach_no_fit_and_no_choice():
     seen = []
 
@@ -125,7 +133,7 @@ def test_held_out_runs_reach_no_fit_and_no_choice():
         return Continuous(lambda nu, given: slower * linear(nu, given), 0.1)
 
     def ask(left_out):
-        method = Method("spy", fit, {"slower": (0.0, 1.0, 0.5)})
+        method = Method("spy", fit, {"slower": (0.0, 1.0, 0.5)}, fit)
         reference = Continuous(lambda nu, given: 0.0 * nu, 0.1)
         return answer(method, [toy(1), toy(2)], [left_out], Ignorant(), LENGTH, reference)
 

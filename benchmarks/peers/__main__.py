@@ -85,7 +85,8 @@ def methods(names: Sequence[str], nominal: Nominal) -> Iterator[tuple[str, Asked
         except ModuleNotFoundError:
             missing.append(f"{name} ({PEERS[name]})")
             continue
-        yield name, _searching(Method(name, module.fit, module.SETTINGS), nominal, reference)
+        final = getattr(module, "final", module.fit)
+        yield name, _searching(Method(name, module.fit, module.SETTINGS, final), nominal, reference)
     if missing:
         complain(f"not installed, left out: {', '.join(missing)}; pip install '.[peers]'", kind="")
 

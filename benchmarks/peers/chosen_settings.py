@@ -23,12 +23,14 @@ class Method:
         name: of the method.
         fit: ``fit(runs, nominal, **setting)``.
         settings: name -> values that are tried, each with each.
+        final: the fit with the settings that were chosen.
         fits: training runs and setting -> law, and the processor time of the fit [s].
     """
 
     name: str
     fit: Callable[..., Law]
     settings: Mapping[str, Sequence[Any]]
+    final: Callable[..., Law]
     fits: dict[Any, tuple[Law | None, float]] = field(default_factory=dict)
 
     def law(
@@ -105,7 +107,6 @@ def answer(
             best, chosen = total, setting
     if chosen is None:
         raise ValueError(f"{method.name} predicts nothing with any of its settings")
-    law, took = method.law(training, nominal, chosen)
-    assert law is not None
+    law = method.final(training, nominal, **chosen)
     position, heading = Held(left_out, length).errors(law)
     return Answer(position, heading, time.process_time() - begin + seconds, chosen)

@@ -2,8 +2,8 @@
 
 An extended Kalman filter with a model of the ship as its predictor and the smoother of Rauch, Tung and
 Striebel give the velocities from the raw pose; accelerations are their differences, and the terms of a
-manoeuvring model are fitted to them by ordinary least squares. The fitted model is the predictor of the
-second pass, the nominal one of the first.
+manoeuvring model are fitted to them by ordinary least squares. The nominal model is the predictor of the
+first pass, with which settings are chosen; the fitted one is that of the second, which the last fit has.
 """
 
 from collections.abc import Sequence
@@ -79,7 +79,13 @@ def regressors(terms: str, nu: np.ndarray, inputs: np.ndarray) -> np.ndarray:
 
 
 def fit(
-    runs: Sequence[Smoothed], nominal: Nominal, inputs: str, delay: float, terms: str, process: float
+    runs: Sequence[Smoothed],
+    nominal: Nominal,
+    inputs: str,
+    delay: float,
+    terms: str,
+    process: float,
+    passes: int = 1,
 ) -> Continuous:
     """A manoeuvring model by ordinary least squares.
 
@@ -90,6 +96,7 @@ def fit(
         delay: of the commands [s].
         terms: of the model.
         process: as of :func:`smoothed_velocity`.
+        passes: of smoothing and regression.
     """
     tables = [table(r, STEP, delay) for r in runs]
 
@@ -108,5 +115,10 @@ def fit(
         factors = np.linalg.lstsq(np.vstack(left), np.vstack(right), rcond=None)[0]
         return Continuous(partial(acceleration, factors), STEP, delay)
 
-    first = fitted([by_nominal(r, nominal, process) for r in runs])
-    return fitted([smoothed_velocity(first, t, process) for t in tables])
+    law = fitted([by_nominal(r, nominal, process) for r in runs])
+    for _ in range(passes - 1):
+        law = fitted([smoothed_velocity(law, t, process) for t in tables])
+    return law
+
+
+final = partial(fit, passes=2)

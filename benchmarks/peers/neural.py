@@ -18,7 +18,7 @@ SETTINGS = {
     "inputs": ("forces", "commands"),
     "delay": (0.0, 0.4),
     "hidden": ((16,), (32, 32)),
-    "alpha": (1e-4, 1.0, 30.0),
+    "alpha": (1e-2, 10.0),
 }
 
 
