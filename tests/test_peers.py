@@ -1,6 +1,7 @@
 """Established methods beside ours: the windows are the project's, and what is held out stays held out."""
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from functools import cache
 from importlib import import_module
 
@@ -9,7 +10,8 @@ import pytest
 from support.measured import sail
 
 import diagnosis
-from benchmarks.peers.chosen_settings import Method, answer
+from benchmarks.peers import __main__ as peers
+from benchmarks.peers.chosen_settings import Answer, Method, answer
 from benchmarks.peers.same_windows import Continuous, Held, Nominal, moved, table
 from diagnosis import Model, Run
 from diagnosis.data.columns import THREE
@@ -145,3 +147,22 @@ def test_held_out_runs_reach_no_fit_and_no_choice():
     other = ask(backwards)
     assert other.setting == told.setting
     assert other.position > told.position
+
+
+def test_what_is_not_installed_is_told_in_one_line(monkeypatch, capsys):
+    def missing(name, package):
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr(peers, "import_module", missing)
+    assert [name for name, _ in peers.methods(["steady", "narx", "sindy"], Ignorant())] == ["steady"]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("not installed, left out: narx (sysidentpy), sindy (pysindy)")
+
+
+def test_table_compares_with_the_nominal_model(tmp_path):
+    for name, errors in {"nominal": (0.4, 0.2), "learn": (0.1, 0.4), "sindy": (0.3, 0.3)}.items():
+        kept = {run: asdict(Answer(*errors, 2.0, {})) for run in ("a", "b")[: 1 + (name != "sindy")]}
+        (tmp_path / f"{name}.json").write_text(json.dumps(kept))
+    found = peers.table(tmp_path, ["a", "b"]).splitlines()
+    assert [line.split(" |")[0] for line in found[2:]] == ["| nominal", "| learn"]
+    assert found[3] == "| learn | 100 mm, 22.9° | 100 mm, 22.9° | 4.00x | 0.50x | 4 |"
