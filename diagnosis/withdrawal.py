@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from .assessment.evaluation import Evaluation
-from .identification.acceptance import worse
+from .identification.acceptance import lower_throughout
 from .identification.findings import Finding, Findings
 from .identification.gram import block_folds
 from .identification.refinement import at_limit
@@ -167,7 +167,7 @@ def _worst(
     for i, other in zip(rests, beside, strict=True):
         if harmed := harm(full, other):
             reason = ALONE.format(harm=harmed.format(where=unseen.where))
-        elif i in drive and not worse(other.omega, full.omega):
+        elif i in drive and not lower_throughout(full.omega, other.omega):
             reason = DRIVES.format(where=unseen.where)
         else:
             continue

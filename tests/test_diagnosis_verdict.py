@@ -15,7 +15,7 @@ from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from diagnosis.decision import doubted, limited, verdict
-from diagnosis.identification.acceptance import worse
+from diagnosis.identification.acceptance import lower_throughout, worse
 from diagnosis.identification.confidence import confidence, credible, evidence
 from diagnosis.identification.findings import Finding, Findings
 from diagnosis.identification.map_regression import Scored, first_share
@@ -432,6 +432,22 @@ def test_worse_is_more_than_two_paired_standard_errors():
     assert not worse(loss + change + 0.1, loss)
     assert worse(loss + change + 0.5, loss)
     assert not worse(loss + change - 5.0, loss)
+
+
+def test_one_block_with_most_of_the_loss_hides_no_gain_in_the_others():
+    before = np.append(np.ones(30), 1000.0)
+    assert not worse(before, np.zeros(31)), "one block decides the standard error"
+    assert lower_throughout(np.zeros(31), before)
+    assert not lower_throughout(before, np.zeros(31))
+    assert not lower_throughout(np.zeros(31), np.append(-np.ones(30), 1000.0)), "in one block alone"
+    assert not lower_throughout(np.append(np.zeros(30), 1000.0), np.append(np.ones(30), 0.0))
+    assert not lower_throughout(before, before)
+
+
+def test_a_gain_by_chance_is_seldom_shown():
+    losses = np.random.default_rng(4).standard_t(2.5, (2, 600, 40))
+    shown = [lower_throughout(a, b) for a, b in zip(*losses, strict=True)]
+    assert 0.01 < np.mean(shown) < 0.06, "2.3 % by the mean, and as many by ranks, mostly the same"
 
 
 def test_candidates_that_are_the_same_share_their_probability():
