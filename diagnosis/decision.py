@@ -53,9 +53,9 @@ def verdict(learned: Findings, refitted: bool, remainder: Remainder) -> Verdict:
     told = next((f for f in learned.effects if believed(f)), None)
     if told is not None:
         return "found" if told.confidence >= FOUND else "ambiguous"
-    if refitted:
+    if refitted and learned.plausible and not remainder.significant:
         return "coefficients"
-    return "unexplained" if remainder.significant or learned.effects else "none"
+    return "unexplained" if remainder.significant or learned.effects or refitted else "none"
 
 
 def concluded(found: Findings, runs: Sequence[WeakWindows], unseen: Unseen, start: Model) -> Conclusion:
@@ -76,9 +76,9 @@ def concluded(found: Findings, runs: Sequence[WeakWindows], unseen: Unseen, star
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
     if other is not None and alone.plausible:
-        missing, left = (_left(runs, start, m) for m in (start, other))
+        missing, left = (something_left(runs, start, m) for m in (start, other))
         before = [found, start] if found.effects else [start]
-        if _any(missing) and not _any(left) and unseen.judges(alone):
+        if missing and not left and unseen.judges(alone):
             now, *others = unseen.losses(alone, *before)
             if not any(harm(now, each) for each in others):
                 return Conclusion(replace(alone, model=other), True, found.effects)
@@ -118,9 +118,10 @@ def _any(axes: Mapping[str, AxisRemainder]) -> bool:
     return any(a.significant for a in axes.values())
 
 
-def _left(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
+def something_left(runs: Sequence[WeakWindows], start: Model, model: Model) -> bool:
+    """Whether a model leaves a significant remainder, beside what the first one leaves."""
     before, after = ([omega(w, m) for w in runs] for m in (start, model))
-    return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start)
+    return _any(axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start))
 
 
 def remainder_of(

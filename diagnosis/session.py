@@ -18,6 +18,7 @@ from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
+from .calibration import calibrated
 from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
 from .foreign import Fmu, Use, as_model, by_fmu, evaluate_fmu, use_of
 from .identification import DEFAULT, Method, Prior, method
@@ -109,6 +110,11 @@ class Diagnosis:
     @property
     def verdict(self) -> Verdict:
         return verdict(self.learned, self.refitted, self.remainder)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the learned model has other coefficients, and these are no explanation."""
+        return self.refitted and self.verdict == "unexplained"
 
     @property
     def believed(self) -> list[bool]:
@@ -247,6 +253,11 @@ def diagnose(
     if held_out and harm(*unseen.losses(fit.findings.model, start)):
         # The fit by the model error was held against these runs already.
         fit = fit.about(learned)
+    if use is None and not any(believed(f) for f in fit.findings.effects):
+        advance("calibration")
+        alone = calibrated(fit.findings, train, held_out, start, NominalPrior.of(start, prior))
+        if alone is not None:
+            dropped, refitted, something, fit = [*dropped, *learned.effects], True, True, alone
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)

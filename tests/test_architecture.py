@@ -48,7 +48,7 @@ DIAGNOSIS_LAYERS = (
     ("withdrawal",),
     ("gathering",),
     ("decision",),
-    ("foreign",),
+    ("calibration", "foreign"),
     ("session",),
     ("report",),
     ("analysis",),

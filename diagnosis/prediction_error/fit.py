@@ -30,7 +30,7 @@ from ..identification.candidates import SMALL, model_error
 from ..identification.map_regression import ridge
 from ..identification.prior import NominalPrior
 from ..identification.refinement import HALVINGS, SMALLEST_SCALE, Estimate
-from ..model import WeakWindows
+from ..model import Model, WeakWindows
 from ..model.uncertainty import omega_std
 from ..parallel import for_each
 from .push import NO_PUSH, Push, covariance, estimate
@@ -60,13 +60,13 @@ class Fitted:
     push: Push
 
 
-def shootings(runs: Sequence[WeakWindows]) -> list[Shooting]:
-    """The windows of all lengths, those of runs with one kind of commands together."""
+def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -> list[Shooting]:
+    """The windows of some lengths, those of runs with one kind of commands together."""
     found = []
     for signals in sorted({w.run.signals for w in runs}):
         these = [w for w in runs if w.run.signals == signals]
         smoothed = [w.smoothed for w in these]
-        found += [Shooting(smoothed, share * these[0].horizon) for share in LENGTHS]
+        found += [Shooting(smoothed, share * these[0].horizon) for share in lengths]
     return [s for s in found if s.run.size]
 
 
@@ -116,7 +116,12 @@ class PredictionFit:
         runs, windows: to learn from.
         at: where to begin.
         prior: of the nominal coefficients.
+
+    Attributes:
+        assumed: the unrecorded force that counts where windows are weighed.
     """
+
+    assumed = NO_PUSH
 
     def __init__(
         self,
@@ -162,25 +167,38 @@ class PredictionFit:
         r = around.residuals
         fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
         seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
-        V = covariance(around.motion[fine], s.at_start[fine], NO_PUSH)
-        squares = np.where(seen[..., None], r, 0.0) ** 2
-        missed = np.zeros((len(s.runs), 3))
-        np.add.at(missed, s.run, squares.sum(axis=1))
-        missed /= np.maximum(np.bincount(s.run, seen.sum(axis=1), len(s.runs)), 1.0)[:, None]
-        missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
+        V = covariance(around.motion[fine], s.at_start[fine], self.assumed)
+        missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
         found = np.zeros((len(r), r[0].size, r[0].size))
-        whole = _square(V, s.noise[fine] + missed[s.run[fine], None])
+        whole = _square(V, s.noise[fine] + missed[fine, None])
         # Of a ship that turns far within a window rounding alone would make it indefinite.
         diagonal = np.einsum("wii->wi", whole)
         diagonal += ROUNDING * diagonal.max(axis=1, keepdims=True)
         found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
         return found
 
+    def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """(w, 3): mean square of what the model misses in the run of each window, both places alike.
+
+        Args:
+            s: windows.
+            squares: (w, T, 3), of the residuals, 0 where not seen.
+            seen: (w, T), which instants count.
+        """
+        missed = np.zeros((len(s.runs), 3))
+        np.add.at(missed, s.run, squares.sum(axis=1))
+        missed /= np.maximum(np.bincount(s.run, seen.sum(axis=1), len(s.runs)), 1.0)[:, None]
+        missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
+        return missed[s.run]
+
+    def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
+        """Sum of squares of the whitened residuals of a model in the windows of one length."""
+        return float(np.sum(whitened(weights, self.windows[k].residuals(model)) ** 2))
+
     def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
         """Twice the negative logarithm of the posterior, but for a constant."""
         theta, model = self.theta(at), at.model(self.prior)
-        each = zip(weights, self.windows, strict=True)
-        squares = [float(np.sum(whitened(W, s.residuals(model)) ** 2)) for W, s in each]
+        squares = [self.squares(k, W, model) for k, W in enumerate(weights)]
         total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
         return total if np.isfinite(total) else np.inf
 
@@ -239,7 +257,11 @@ def fit_predictions(
         at: where to begin: a model with all effects that were accepted.
         prior: of the nominal coefficients.
     """
-    problem = PredictionFit(runs, windows, at, prior)
+    return fit_to(PredictionFit(runs, windows, at, prior), at)
+
+
+def fit_to(problem: PredictionFit, at: Estimate) -> Fitted:
+    """The most likely model of a problem, from where to begin, and how sure it is."""
     P, known = problem.precision, problem.information(at)
     for _ in range(STEPS):
         k = known.power(P)

@@ -71,12 +71,18 @@ def diagnosis_content(
     return result_keys.DiagnosisContent(
         verdict=diagnosis.verdict,
         sentence=headline(
-            diagnosis.verdict, effects, possibilities, suspects, diagnosis.remainder.beyond_chance
+            diagnosis.verdict,
+            effects,
+            possibilities,
+            suspects,
+            diagnosis.remainder.beyond_chance,
+            diagnosis.calibrated,
         ),
         remainder=result_keys.RemainderResult.model_validate(diagnosis.remainder),
         effects=effects,
         possibilities=possibilities,
         withdrawn=[result_keys.WithdrawnResult.model_validate(w) for w in diagnosis.withdrawn],
+        calibrated=diagnosis.calibrated,
         unrecorded=_unrecorded(diagnosis.unrecorded),
         correlation=result_keys.CorrelationResult(
             names=list(diagnosis.posterior.names),

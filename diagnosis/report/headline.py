@@ -12,6 +12,10 @@ UNEXPLAINED = "Something is missing, and no effect that is known here explains i
 NOT_BELIEVED = (
     "Something is missing, and no effect that is known here is likely enough to be told as its cause."
 )
+CALIBRATED = (
+    " The learned model is calibrated: with all coefficients fitted together, each within what is "
+    "believed of it, runs left out are predicted better. It tells no cause."
+)
 VERDICTS = {
     "found": "Something is missing, and it was found",
     "ambiguous": "Something is missing, and more than one cause fits",
@@ -62,6 +66,7 @@ def headline(
     possibilities: Sequence[EffectResult],
     suspects: Sequence[SuspectResult],
     something: bool,
+    calibrated: bool,
 ) -> str:
     """The result in a few sentences.
 
@@ -71,6 +76,7 @@ def headline(
         possibilities: that were accepted and are not believed.
         suspects: nominal coefficients that are wrong.
         something: whether more than noise is left.
+        calibrated: whether the learned model is a calibrated one.
     """
     if effects:
         return " ".join(told(e) for e in sorted(effects, key=lambda e: not is_sure(e)))
@@ -80,5 +86,5 @@ def headline(
             f"Other values of the nominal coefficients explain these data{names}; no effect is missing."
         )
     if verdict == "unexplained":
-        return NOT_BELIEVED if possibilities else UNEXPLAINED
+        return (NOT_BELIEVED if possibilities else UNEXPLAINED) + CALIBRATED * calibrated
     return TOO_LITTLE if something else NOTHING_FOUND

@@ -352,6 +352,7 @@ class DiagnosisContent(Part):
     effects: list[EffectResult]
     possibilities: list[PossibilityResult]
     withdrawn: list[WithdrawnResult]
+    calibrated: bool = False
     unrecorded: UnrecordedResult
     correlation: CorrelationResult
     inseparable: list[str] = []

@@ -135,7 +135,8 @@ def _run(name: str, held_out: bool) -> Text:
 
 def has_learned(r: DiagnosisContent) -> bool:
     """Whether the learned model is another than the one at first."""
-    return bool(r.effects) or r.verdict == "coefficients" or any(p.in_model for p in r.possibilities)
+    fitted = r.calibrated or r.verdict == "coefficients"
+    return bool(r.effects) or fitted or any(p.in_model for p in r.possibilities)
 
 
 def _effect(e: EffectResult) -> Iterator[str]:

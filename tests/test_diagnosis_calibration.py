@@ -1,0 +1,90 @@
+"""A calibrated model: all coefficients at once, by predictions, each run with constants of its own."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from support.measured import sail, smoothed
+
+from diagnosis.assessment.windows import Windows
+from diagnosis.calibration import CONSTANTS, LENGTH, SIZE, Calibration, begin, calibrated
+from diagnosis.identification.findings import Findings
+from diagnosis.identification.prior import NominalPrior
+from diagnosis.identification.refinement import Estimate
+from diagnosis.model import Model, weak_windows
+from diagnosis.prediction_error.fit import fit_to, shootings
+
+DRAG = -2.0  # N s/m, hidden
+MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded
+PRIOR = NominalPrior.of(Model())
+
+
+@cache
+def runs(drag=DRAG):
+    """Runs of a ship that may have more drag than the model, each turned by a constant of its own."""
+    ships = [{"delta_X_u": drag, "body_bias_N": moment if drag else 0.0} for moment in MOMENTS]
+    tracks = [smoothed(sail(seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
+    named = [
+        replace(s, track=replace(s.track, run=replace(s.track.run, name=f"run {k}")))
+        for k, s in enumerate(tracks)
+    ]
+    return [weak_windows(s) for s in named]
+
+
+@cache
+def fit():
+    at = begin(Model(), PRIOR)
+    problem = Calibration(runs(), shootings(runs(), LENGTH), at, PRIOR)
+    return problem, fit_to(problem, at)
+
+
+def nothing_found(sigma=1.0):
+    return Findings(sigma=np.full(3, sigma), estimate=Estimate.at(Model(), PRIOR), searched=PRIOR)
+
+
+def test_what_a_model_leaves_out_is_zero_give_or_take_its_size():
+    at = begin(Model(), PRIOR)
+    assert set(at.values.values()) == {0.0}
+    std = dict(zip(at.fitted, np.diag(at.precision) ** -0.5, strict=True))
+    assert std["delta_N_uv"] == pytest.approx(SIZE * Model().unit("delta_N_uv"))
+    assert not {n.removeprefix("delta_") for n in std} & set(PRIOR.mean)
+
+
+@pytest.mark.slow
+def test_the_drag_is_found_beside_constants_of_each_run():
+    problem, fitted = fit()
+    model = fitted.estimate.model(PRIOR)
+    still = {"delta_X_u": DRAG}
+    predicted = Windows([w.smoothed for w in runs()])
+    before, after, true = (
+        predicted.errors(m).over_all()[0] for m in (Model(), model, Model().plus(still))
+    )
+    assert after - true < 0.3 * (before - true)
+    assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
+    assert len(problem.without_each_run(fitted.estimate, problem.information(fitted.estimate))) == 4
+
+
+@pytest.mark.slow
+def test_a_constant_of_a_run_costs_less_than_what_it_does():
+    problem, fitted = fit()
+    known = problem.information(fitted.estimate)
+    model = fitted.estimate.model(PRIOR).plus({"body_bias_N": 0.01})
+    with_constants = problem.squares(0, known.weights[0], model)
+    without = super(Calibration, problem).squares(0, known.weights[0], model)
+    assert with_constants < 0.9 * without
+
+
+@pytest.mark.slow
+def test_it_is_kept_where_runs_left_out_are_predicted_better():
+    out = calibrated(nothing_found(), runs(), [], Model(), PRIOR)
+    assert out is not None
+    assert not out.findings.effects
+    assert not out.findings.suspects
+    assert "vessel.X_u" in out.posterior.names
+
+
+@pytest.mark.slow
+def test_nothing_is_calibrated_without_a_remainder_or_of_few_runs():
+    assert calibrated(nothing_found(), runs(0.0), [], Model(), PRIOR) is None
+    assert calibrated(nothing_found(), runs()[:3], [], Model(), PRIOR) is None
