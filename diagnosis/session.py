@@ -18,7 +18,7 @@ from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
-from .calibration import calibrated
+from .calibrated_model import calibrated
 from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
 from .foreign import Fmu, Use, as_model, by_fmu, evaluate_fmu, use_of
 from .identification import DEFAULT, Method, Prior, method

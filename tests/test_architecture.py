@@ -48,7 +48,7 @@ DIAGNOSIS_LAYERS = (
     ("withdrawal",),
     ("gathering",),
     ("decision",),
-    ("calibration", "foreign"),
+    ("calibrated_model", "foreign"),
     ("session",),
     ("report",),
     ("analysis",),

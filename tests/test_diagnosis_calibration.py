@@ -8,7 +8,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis.assessment.windows import Windows
-from diagnosis.calibration import CONSTANTS, LENGTH, SIZE, Calibration, begin, calibrated
+from diagnosis.calibrated_model import CONSTANTS, LENGTH, SIZE, Calibration, begin, calibrated
 from diagnosis.identification.findings import Findings
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
