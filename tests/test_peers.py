@@ -163,6 +163,7 @@ def test_table_compares_with_the_nominal_model(tmp_path):
     for name, errors in {"nominal": (0.4, 0.2), "learn": (0.1, 0.4), "sindy": (0.3, 0.3)}.items():
         kept = {run: asdict(Answer(*errors, 2.0, {})) for run in ("a", "b")[: 1 + (name != "sindy")]}
         (tmp_path / f"{name}.json").write_text(json.dumps(kept))
-    found = peers.table(tmp_path, ["a", "b"]).splitlines()
-    assert [line.split(" |")[0] for line in found[2:]] == ["| nominal", "| learn"]
-    assert found[3] == "| learn | 100 mm, 22.9° | 100 mm, 22.9° | 4.00x | 0.50x | 4 |"
+    found = {name: cells for name, *cells in peers.rows(tmp_path, ["a", "b"])}
+    assert found["learn"] == ["100 mm, 22.9°", "100 mm, 22.9°", "4.00x", "0.50x", "2"]
+    assert found["sindy"] == ["300 mm, 17.2°", "–", "–", "–", "2"]
+    assert "| learn | 100 mm, 22.9°" in peers.write(tmp_path, ["a", "b"]).read_text()

@@ -8,13 +8,12 @@ the project's windows, from the same start states. ``nominal`` is the model that
 
 import argparse
 import json
-import platform
 import resource
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from math import degrees
 from pathlib import Path
 
@@ -25,6 +24,7 @@ import cosim
 import diagnosis
 from cosim.command import complain, run_command
 from diagnosis import Model, WeakWindows
+from studies.study_report import Report
 
 from .chosen_settings import SEED, Answer, Method, answer
 from .same_windows import Continuous, Held, Law, Nominal
@@ -99,35 +99,44 @@ def _searching(method: Method, nominal: Nominal, reference: Law) -> Asked:
     return asked
 
 
-def table(folder: Path, runs: Sequence[str]) -> str:
-    """Lines of errors by method and run left out, of all answers in a folder.
+def rows(folder: Path, runs: Sequence[str]) -> Iterator[list[str]]:
+    """Errors by method and run left out, of the answers in a folder.
 
-    Behind them are the geometric means of nominal over own error, and the processor time of all runs.
+    Behind them are the geometric means of nominal over own errors, where all runs are there, and the
+    processor time for a run left out.
     """
     kept = {name: folder / f"{name}.json" for name in (*OURS, *PEERS)}
     read = {name: json.loads(file.read_text()) for name, file in kept.items() if file.exists()}
-    answers = {name: [Answer(**a[r]) for r in runs] for name, a in read.items() if set(runs) <= a.keys()}
-    lines = ["| method | " + " | ".join(runs) + " | position | heading | seconds |"]
-    lines.append("|---|" + "--:|" * (len(runs) + 3))
-    for name, found in answers.items():
-        cells = [f"{1e3 * a.position:.0f} mm, {degrees(a.heading):.1f}°" for a in found]
-        if "nominal" in answers:
-            pairs = zip(answers["nominal"], found, strict=True)
-            by = np.array([[n.position / a.position, n.heading / a.heading] for n, a in pairs])
-            cells += [f"{x:.2f}x" for x in np.exp(np.mean(np.log(by), axis=0))]
-        else:
-            cells += ["–", "–"]
-        lines.append(
-            f"| {name} | " + " | ".join([*cells, f"{sum(a.seconds for a in found):.0f}"]) + " |"
-        )
-    return "\n".join(lines)
+    for name, found in read.items():
+        answers = {r: Answer(**found[r]) for r in runs if r in found}
+        cells = [
+            f"{1e3 * a.position:.0f} mm, {degrees(a.heading):.1f}°" if a else "–"
+            for a in map(answers.get, runs)
+        ]
+        falls = ["–", "–"]
+        if all(r in read.get("nominal", {}) and r in answers for r in runs):
+            nominal = [Answer(**read["nominal"][r]) for r in runs]
+            by = [
+                (n.position / answers[r].position, n.heading / answers[r].heading)
+                for n, r in zip(nominal, runs, strict=True)
+            ]
+            falls = [f"{x:.2f}x" for x in np.exp(np.mean(np.log(by), axis=0))]
+        if answers:
+            yield [name, *cells, *falls, f"{np.mean([a.seconds for a in answers.values()]):.3g}"]
 
 
-def _installed(package: str) -> bool:
-    try:
-        return bool(version(package))
-    except PackageNotFoundError:
-        return False
+def write(folder: Path, runs: Sequence[str]) -> Path:
+    """The report of all answers in a folder; its path."""
+    report = Report(folder, "Established methods", [SEED])
+    packages = sorted({p for n, p in PEERS.items() if (folder / f"{n}.json").exists()})
+    report.text(
+        "Errors in the project's windows of the run that nobody learned from, from the same start states; "
+        "behind them geometric means of nominal over own error, and processor time for a run left out [s], "
+        "search included; what runs left out share is counted once. "
+        f"{', '.join(f'{p} {version(p)}' for p in packages)}."
+    )
+    report.table(["method", *runs, "position", "heading", "time"], rows(folder, runs))
+    return report.write()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -160,11 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{name}, without {out.run.name}: {found}", flush=True)
                 kept = json.loads(file.read_text()) if file.exists() else {}
                 file.write_text(json.dumps(kept | {out.run.name: asdict(found)}, indent=1) + "\n")
-    lines = table(options.out, [w.run.name for w in runs])
-    packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", *PEERS.values()) if _installed(p))
-    made = f"seed {SEED}, {platform.machine()}, CPython {platform.python_version()}, {packages}"
-    (options.out / "report.md").write_text(f"# Established methods\n\n{lines}\n\nMade with {made}.\n")
-    print(lines)
+    print(write(options.out, [w.run.name for w in runs]).read_text())
     return 0
 
 
