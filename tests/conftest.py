@@ -141,12 +141,15 @@ def _ask_the_builder_once(_session_cache):
     ask, cache, known = own_fmus.run_builder, cache_folder(), {}
 
     def builder(*arguments, warnings=None):
-        if arguments[0] != "--" or cache_folder() != cache:
+        after = arguments.index("--") + 1
+        options, names = arguments[:after], arguments[after:]
+        described = any(option.endswith(".toml") for option in options)  # a file that may change
+        if described or cache_folder() != cache:
             return ask(*arguments, warnings=warnings)
-        names = arguments[1:]
-        if missing := [name for name in names if name not in known]:
-            known.update(zip(missing, ask("--", *missing), strict=True))
-        return [known[name] for name in names]
+        of_these = known.setdefault(options, {})
+        if missing := [name for name in names if name not in of_these]:
+            of_these.update(zip(missing, ask(*options, *missing, warnings=warnings), strict=True))
+        return [of_these[name] for name in names]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(own_fmus, "run_builder", builder)
