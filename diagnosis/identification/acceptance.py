@@ -66,7 +66,8 @@ def lower_throughout(its: np.ndarray, others: np.ndarray) -> bool:
         return False
     from scipy.stats import norm, wilcoxon  # half a second of import, and seldom asked for
 
-    return bool(wilcoxon(d, alternative="greater").pvalue < norm.sf(TIE))
+    _, p = wilcoxon(d, alternative="greater")
+    return bool(p < norm.sf(TIE))
 
 
 def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
