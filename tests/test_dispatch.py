@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.dispatch import analyse_runs
+from cosim.dispatch import analyse_runs, measured_run
+from cosim.dispatch.job import Row
+from cosim.results import MetricsError
 
 
 @pytest.fixture
@@ -12,6 +14,18 @@ def short(ellipse):
     """The ellipse of 1 s, with few signals and a row for every second step."""
     log = {"signals": ["vessel.*", "observer.x_m"], "every": 2}
     return {**ellipse, "stop": 1.0, "metrics": {}, "log": log}
+
+
+def test_a_run_without_metrics_is_done_and_says_why(monkeypatch):
+    made = measured_run.Measured()
+    monkeypatch.setattr(measured_run, "run_in_memory", lambda pool, scenario: {"W": 1.0})
+    assert made(None, None) == Row("done", "", 0.0, {"W": 1.0}, {})
+
+    def none(pool, scenario):
+        raise MetricsError("the log has no rows")
+
+    monkeypatch.setattr(measured_run, "run_in_memory", none)
+    assert made(None, None) == Row("done", "no metrics: the log has no rows", 0.0, {}, {})
 
 
 def everything(run):

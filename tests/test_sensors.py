@@ -175,6 +175,14 @@ def test_a_second_antenna_has_its_place():
     assert found["psi_2", "offset"].value == pytest.approx(0.03, abs=1e-3)
 
 
+def test_a_second_antenna_that_is_late_is_told_by_how_much():
+    run, late = made(), 0.4
+    x, y = (np.interp(run.time - late, run.time, column) for column in run.pose.T[:2])
+    found = told(beside(run, x_2=x, y_2=y))
+    assert found["x_2", "delay"].value == pytest.approx(late, rel=0.1)
+    assert ("x_2", "place") not in found
+
+
 def test_the_smoother_is_sharper_with_channels_that_agree():
     run = made()
     rough = replace(run, pose=run.pose + 0.02 * np.random.default_rng(3).standard_normal(run.pose.shape))

@@ -26,6 +26,19 @@ def window(share, axes, since=watch.ROWS):
     return tuple(rows)
 
 
+def test_the_first_sample_comes_after_its_time_and_two_of_the_low_pass():
+    """By 0.1 s; a sample each 5 s, or as soon as the low pass has settled."""
+    inputs = watch.COMPONENT.inputs()
+    for sample_time, filter_time, first in ((5.0, 1.0, 5.0), (0.5, 1.0, 2.0)):
+        p = watch.Params(sample_time=sample_time, filter_time=filter_time)
+        s, times = watch.init(inputs, p), []
+        while len(times) < 2:
+            s, _ = watch.step(s, inputs, p, 0.1)
+            if s.waited == 0.0:
+                times.append(s.time)
+        assert times == pytest.approx([first, first + sample_time])
+
+
 @pytest.mark.parametrize("axes", [(0, 1), (2,)])
 @pytest.mark.parametrize("share", [0.3, 1.0])
 def test_share_and_time_of_a_loss_are_found(axes, share):
