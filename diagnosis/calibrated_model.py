@@ -1,12 +1,12 @@
 """A calibrated model where no cause is believed: all coefficients at once, by predictions and priors.
 
 Predictions may use what is not sure enough to be told. Beside the nominal coefficients, each with the
-prior of where its value is from, those that simple models leave out are fitted (lift of the hull, by
-sway and yaw, and drag in turns), and the axis of the heading. The windows are weighed by the covariance
-of initial state, noise and unrecorded force of the usual run, and in each run a constant sway force and
-a constant yaw moment of that size act besides, integrated out: the angle of an actuator that nobody
-recorded is no coefficient. So a run counts as what it is, hardly more than one sample of what lasts, and
-many of what changes with its motion.
+prior of where its value is from, those that simple models leave out are fitted (lift of the hull by
+sway and yaw, drag in turns, resistance that is not quadratic), and the axis of the heading. The windows
+are weighed by the covariance of initial state, noise and unrecorded force of the usual run, and in each
+run a constant sway force and a constant yaw moment of that size act besides, integrated out: the angle
+of an actuator that nobody recorded is no coefficient. So a run counts as what it is, hardly more than
+one sample of what lasts, and many of what changes with its motion.
 
 No effect follows from it. It is kept if runs left out are predicted better than by what was found.
 """
@@ -42,7 +42,7 @@ FEWEST = 4  # runs, from which on constants of each are told from coefficients; 
 # Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
 # (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms.
-LEFT_OUT, SIZE = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), 3.0
+LEFT_OUT, SIZE = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr", "X_u", "X_uuu"), 3.0
 HEADING, AXIS = (
     "heading_offset",
     0.035,
@@ -129,8 +129,8 @@ def calibrated(
         start: the model at first.
         prior: of the nominal coefficients.
     """
-    fits = found.estimate is not None and any(prior.std.values())
-    if len(train) < FEWEST or not fits or not something_left(train, start, start):
+    fits = len(train) >= FEWEST and any(prior.std.values())
+    if not fits or not something_left(train, start, start):
         return None
     windows = shootings(train, LENGTH)
     if not windows:

@@ -19,6 +19,7 @@ from cosim import InputError
 from diagnosis import Model
 from diagnosis.assessment import free_runs
 from diagnosis.data import Run, read_frame
+from diagnosis.identification import Method
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 from diagnosis.sensors import Examined, examine
@@ -180,7 +181,7 @@ def sensors(report: Report, trials: Sequence[tuple[Run, Examined]]) -> None:
         report.items([*others, *examined.notes])
 
 
-def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
+def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: bool) -> Path:
     """Repair the trials, learn from their manoeuvres, some left out in turn, and write what came out."""
     ship = ship_with((), "gunnerus")
     trials = []
@@ -200,7 +201,7 @@ def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
         f"{HORIZON:g} s; model error in windows of {runs[0].width:.3g} s."
     )
     sensors(report, trials)
-    found = list(learn_folds(runs, folds, model, silent))
+    found = list(learn_folds(runs, folds, model, by, silent))
     write_folds(report, found)
     circles(report, found, model)
     return report.write()

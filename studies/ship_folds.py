@@ -15,6 +15,8 @@ import numpy as np
 import diagnosis
 from cosim import InputError
 from diagnosis import Diagnosis, DiagnosisContent, Model, WeakWindows, diagnosis_content
+from diagnosis.identification import DEFAULT, Findings, Method, Prior
+from diagnosis.model import omega
 from diagnosis.progress import Advance
 
 from .study_command import run_study, study_parser
@@ -34,6 +36,18 @@ class Fold(NamedTuple):
         return [e for e in self.content.errors if e.held_out]
 
 
+class NoSearch:
+    """No effect is searched for: what calibration alone gives."""
+
+    name = "calibration"
+
+    def fit(
+        self, runs: Sequence[WeakWindows], model: Model, prior: Prior, advance: Advance, seed: int
+    ) -> Findings:
+        error = np.concatenate([omega(w, model) for w in runs])
+        return Findings(model=model, sigma=np.sqrt(np.mean(error**2, axis=0)))
+
+
 def folds_command(
     name: str, description: str, example: str, data: str, one: str, study: Callable[..., Path]
 ) -> None:
@@ -44,19 +58,27 @@ def folds_command(
         example: a folder of the data.
         data: what that folder is.
         one: what a fold leaves out at the least.
-        study: ``study(data, out, folds, quick)``.
+        study: ``study(data, out, folds, by, quick)``, by the method of identification.
     """
     command = f"  python -m studies.{name} {example}"
     parser = study_parser(name, description, f"{command}\n{command} --folds 3", seeds=None, jobs=False)
     parser.add_argument("data", type=Path, metavar="DATA", help=data)
     parser.add_argument("--folds", type=int, metavar="N", help=f"folds left out (one for each {one})")
+    parser.add_argument(
+        "--calibrate", action="store_true", help="search no effects: what calibration alone gives"
+    )
     options = parser.parse_args()
+    by = NoSearch() if options.calibrate else DEFAULT
     folds = 2 if options.quick else options.folds
-    run_study(partial(study, options.data, options.out, folds, options.quick))
+    run_study(partial(study, options.data, options.out, folds, by, options.quick))
 
 
 def learn_folds(
-    runs: Sequence[WeakWindows], folds: int | None, model: Model, advance: Advance
+    runs: Sequence[WeakWindows],
+    folds: int | None,
+    model: Model,
+    by: str | Method,
+    advance: Advance,
 ) -> Iterator[Fold]:
     """Learn from the runs of all folds but one, for each fold.
 
@@ -64,6 +86,7 @@ def learn_folds(
         runs: two or more.
         folds: how many; None: one for each run.
         model: the nominal one of the ship.
+        by: method of identification, or its name.
         advance: receives the name of each step when it begins.
 
     Raises:
@@ -75,7 +98,7 @@ def learn_folds(
     for k in range(count):
         out = [w for i, w in enumerate(runs) if i % count == k]
         rest = [w for i, w in enumerate(runs) if i % count != k]
-        found = diagnosis.diagnose(rest, out, model=model, advance=advance)
+        found = diagnosis.diagnose(rest, out, model=model, advance=advance, by=by)
         yield Fold([w.run.name for w in out], found, diagnosis_content(found, None, []))
 
 

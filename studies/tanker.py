@@ -14,6 +14,7 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Model
 from diagnosis.data import Run, read_frame
+from diagnosis.identification import Method
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 
@@ -46,7 +47,7 @@ def read(path: Path, model: Model) -> Run:
     return read_frame(pd.DataFrame(signals), path.stem, model.ship)
 
 
-def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
+def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: bool) -> Path:
     """Learn from the zig-zags, some left out in turn, and write what came out."""
     files = sorted(data.glob("z_*.csv"))
     if not files:
@@ -60,7 +61,7 @@ def study(data: Path, out: Path, folds: int | None, quick: bool) -> Path:
         f"(`ships/kvlcc2.toml`). Predictions over {runs[0].horizon:.3g} s; model error in windows of "
         f"{runs[0].width:.3g} s. The measured thrust is used by no fit."
     )
-    write_folds(report, list(learn_folds(runs, folds, model, silent)))
+    write_folds(report, list(learn_folds(runs, folds, model, by, silent)))
     return report.write()
 
 
