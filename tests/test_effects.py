@@ -485,6 +485,20 @@ def command(module, *arguments, cwd):
     )
 
 
+def test_values_that_are_tried_are_allowed_and_those_of_one_parameter_grow():
+    for name in STANDARD:
+        effect = STANDARD[name]
+        tries = effect.search.tries if isinstance(effect.search.tries, list) else []
+        ranges = {p.name: p.range for p in effect.parameters}
+        for parameter, value in (pair for each in tries for pair in each.items()):
+            low, high = ranges[parameter].min, ranges[parameter].max
+            assert low is None or low <= value, (name, parameter)
+            assert high is None or value <= high, (name, parameter)
+        alone = [value for each in tries if len(each) == 1 for value in each.values()]
+        if len({parameter for each in tries for parameter in each}) == 1:
+            assert alone == sorted(set(alone)), name
+
+
 def test_documentation_table_is_that_of_the_registry():
     assert (ROOT / "docs" / "effects.md").read_text() == effects_table()
 

@@ -42,7 +42,7 @@ def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> "Figure
             low, high = (drawn(measured + sign * Z95 * std[:, axis]) for sign in (-1.0, 1.0))
             panel.fill_between(t, low, high, color=BAND, alpha=0.45, lw=0.0, label="uncertainty, 95 %")
         panel.axhline(0.0, color=INK, lw=0.6)
-        panel.plot(t, drawn(measured), color=BEFORE, lw=1.8, alpha=0.8, label="measured")
+        panel.plot(t, drawn(measured), color=BEFORE, lw=1.8, label="measured")
         if learned:
             explained = measured - e.after.omega[:, axis]
             panel.plot(t, drawn(explained), color=AFTER, lw=1.0, label="explained")
