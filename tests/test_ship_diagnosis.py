@@ -139,11 +139,19 @@ def test_model_error_of_the_analyses_is_that_of_the_ship(otter_log):
     }
 
 
+@pytest.fixture(scope="module")
+def cybership2_log(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cybership2") / "run"
+    cosim.simulate("ellipse_bs", folder, stop=60.0, pictures=False, ship="cybership2")
+    return folder
+
+
 @pytest.mark.parametrize(("name", "more"), [("pca", []), ("pls", ["--recipe", "PLS1"])])
-def test_analyses_without_a_model_of_their_own_take_any_ship(tmp_path, capsys, name, more):
-    cosim.simulate("ellipse_bs", tmp_path / "run", stop=60.0, pictures=False, ship="cybership2")
+def test_analyses_without_a_model_of_their_own_take_any_ship(
+    cybership2_log, tmp_path, capsys, name, more
+):
     command = importlib.import_module(f"diagnosis.{name}").main
-    assert command([str(tmp_path / "run"), "--out", str(tmp_path / "out"), *more]) == 0
+    assert command([str(cybership2_log), "--out", str(tmp_path / "out"), *more]) == 0
     assert "the ship is cybership2" in capsys.readouterr().err
 
 
