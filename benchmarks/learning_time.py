@@ -111,7 +111,7 @@ def main() -> None:
         found = {name: in_tree(tree, runs) for name, tree in trees.items()}
     print("| s |", " | ".join(found), "|")
     print("|---|", "|".join(["--:"] * len(found)), "|")
-    for part in dict.fromkeys(p for each in found.values() for p in each):
+    for part in dict.fromkeys(["import", *PARTS.values(), "all", "wall"]):
         print("|", part, "|", " | ".join(f"{each.get(part, 0.0):.1f}" for each in found.values()), "|")
 
 

@@ -66,10 +66,11 @@ def write_report(
     diagnosis = content if isinstance(content, DiagnosisContent) else None
     advance("report: figures")
     makers: list[tuple[str, Callable[[], Iterator[Drawing]]]] = [
-        *(("tracks", partial(_tracks, k, e, learned)) for k, e in enumerate(evaluations)),
-        ("where", lambda: _profiles(evaluations, omega_std, learned)),
-        ("omega", lambda: _omega(evaluations, omega_std, learned)),
+        # What takes longest comes first, so that no process waits for it at the end.
         ("free", lambda: _free(evaluations, learned)),
+        ("where", lambda: _profiles(evaluations, omega_std, learned)),
+        *(("tracks", partial(_tracks, k, e, learned)) for k, e in enumerate(evaluations)),
+        ("omega", lambda: _omega(evaluations, omega_std, learned)),
         ("growth", lambda: _growth(evaluations, learned)),
         ("place", lambda: _places(content, evaluations, learned)),
         ("shapes", lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations)),
