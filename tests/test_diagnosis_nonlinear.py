@@ -1,12 +1,14 @@
 """What a regression is not linear in: outages by segmentation, shapes of effects from many starts, curves."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
+from diagnosis.identification import profile
 from diagnosis.identification.candidates import additions, candidate, covered, model_error
 from diagnosis.identification.multistart import Landscape, best_values
 from diagnosis.identification.segmentation import programmed
@@ -162,3 +164,21 @@ def test_a_curve_is_fitted_where_the_data_reach_it():
     columns[:, 0, 8] = 0.5
     columns[0, 0, 15] = 0.01
     assert np.flatnonzero(covered(columns)).tolist() == [6, 7, 8]
+
+
+@pytest.mark.parametrize(("growth", "rough"), [(0.0, False), (-0.4, True)])
+def test_a_slope_that_depends_on_its_step_is_none(growth, rough, monkeypatch):
+    name, t = "thrust_curve_deadband", SimpleNamespace(prior=None, error=lambda at: "left")
+    at = SimpleNamespace(start=Model(), values={name: 0.2}, model=lambda prior: Model())
+    sizes = []
+
+    def slope(given, model, left, parameter, size):
+        assert (given, left, parameter) == (t, "left", name)
+        sizes.append(size)
+        return np.full((5, 3), 1.0 + growth * len(sizes))
+
+    monkeypatch.setattr(profile, "slope", slope)
+    assert profile.is_rough(t, at, name) == rough
+    assert sizes == pytest.approx([0.2, 0.2 * profile.COARSER])
+    assert not profile.is_rough(t, at, "loss_surge"), "a linear one has one slope"
+    assert len(sizes) == 2

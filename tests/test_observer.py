@@ -176,3 +176,12 @@ def test_state_is_all_there_is():
         state, a = COMPONENT.step(state, Inputs(Measurement(*m), Force()), params(), H)
         copy, b = COMPONENT.step(copy, Inputs(Measurement(*m), Force()), params(), H)
         assert a == b
+
+
+def test_weights_of_the_filters_are_shares():
+    """A weight of one or more would never let a filter settle."""
+    shares = {v.name: v.range for v in variables(COMPONENT.params) if v.name in ("a", "b")}
+    assert set(shares) == {"a", "b"}
+    for allowed in shares.values():
+        assert allowed.min == 0.0
+        assert 0.9 < allowed.max < 1.0

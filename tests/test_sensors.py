@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -13,9 +14,10 @@ from cosim import InputError
 from diagnosis import Run
 from diagnosis import repair as command
 from diagnosis.data.telegrams import filled
-from diagnosis.sensors import closure, examine
+from diagnosis.sensors import closure, examine, motion
 from diagnosis.sensors.clock_path import integral_of
 from diagnosis.sensors.wraps import unwrapped
+from diagnosis.smoothing import measured_rates
 from fmus.scale import REFERENCE, Scale
 
 H, SECONDS = 0.1, 160.0
@@ -181,6 +183,30 @@ def test_a_second_antenna_that_is_late_is_told_by_how_much():
     found = told(beside(run, x_2=x, y_2=y))
     assert found["x_2", "delay"].value == pytest.approx(late, rel=0.1)
     assert ("x_2", "place") not in found
+
+
+def test_stretches_of_a_clock_are_off_in_one_sense_and_have_the_mean_of_their_time(monkeypatch):
+    mean, std = np.array([1.0, 1.1, 1.2, 1.0, 0.9, 1.1]), np.full(6, 0.001)
+    first, last = np.array([0.0, 1.0, 2.0, 6.0, 7.0, 8.0]), np.array([1.0, 2.0, 6.0, 7.0, 8.0, 9.0])
+    monkeypatch.setattr(motion, "_blocks", lambda found: motion._Blocks(mean, std, first, last))
+    fast, slow, again = motion._stretches(None)
+    assert fast == pytest.approx((1.0, 6.0, 1.18, 0.001 / np.sqrt(2.0)))
+    assert slow == pytest.approx((7.0, 8.0, 0.9, 0.001))
+    assert again[:3] == pytest.approx((8.0, 9.0, 1.1))
+
+
+def test_rates_count_where_all_that_agree_are_there(monkeypatch):
+    run = made()
+    run.measured["r"][40] = np.nan
+    monkeypatch.setattr(measured_rates, "basis", lambda grid, t, derivative: t)
+    rows, psi = np.arange(0, run.time.size, 2), run.pose[:, 2]
+    track = SimpleNamespace(run=run)
+    at, rates = measured_rates.measured_rates(track, rows, psi, {"r": 0.5}, None)
+    assert at.tolist() == [row for row in rows if row != 40]
+    assert rates.z[:, 2] == pytest.approx(run.measured["r"][at])
+    assert rates.sigma.tolist() == [np.inf, np.inf, 0.5]
+    assert measured_rates.measured_rates(track, rows, psi, {}, None) is None
+    assert measured_rates.measured_rates(track, np.array([40]), psi, {"r": 0.5}, None) is None
 
 
 def test_the_smoother_is_sharper_with_channels_that_agree():
