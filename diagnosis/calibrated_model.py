@@ -41,12 +41,13 @@ from .withdrawal import Unseen
 FEWEST = 4  # runs, from which on constants of each are told from coefficients; chosen
 # Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
-# (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms.
-LEFT_OUT, SIZE = ("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr", "X_u", "X_uuu"), 3.0
-HEADING, AXIS = (
-    "heading_offset",
-    0.035,
-)  # rad, of a heading's axis: two degrees, as compasses are aligned
+# (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms; half
+# a unit of X_uuu is three tenths of the resistance of both at their speed.
+LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), 3.0) | {
+    "X_u": 0.5,
+    "X_uuu": 0.5,
+}
+HEADING, AXIS = "heading_offset", 0.035  # rad, of a heading's axis: two degrees; chosen
 CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
 FLOOR = 0.05  # of the mean square that is missed: what is not linear about a prediction; chosen
 LENGTH = (1.0,)  # of the windows: those in which predictions are shown
@@ -167,8 +168,8 @@ def begin(start: Model, prior: NominalPrior) -> Estimate:
     """The first model with coefficients that it leaves out, zero as yet, and their prior precision."""
     effects = start.ship.effects
     std = {
-        n: SIZE * start.unit(n)
-        for i in LEFT_OUT
+        n: size * start.unit(n)
+        for i, size in LEFT_OUT.items()
         if i in effects and i not in prior.mean
         for n in effects[i].coefficients
     } | ({HEADING: AXIS} if HEADING in effects else {})

@@ -8,7 +8,7 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis.assessment.windows import Windows
-from diagnosis.calibrated_model import CONSTANTS, LENGTH, SIZE, Calibration, begin, calibrated
+from diagnosis.calibrated_model import CONSTANTS, LEFT_OUT, LENGTH, Calibration, begin, calibrated
 from diagnosis.identification.findings import Findings
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
@@ -47,7 +47,7 @@ def test_what_a_model_leaves_out_is_zero_give_or_take_its_size():
     at = begin(Model(), PRIOR)
     assert set(at.values.values()) == {0.0}
     std = dict(zip(at.fitted, np.diag(at.precision) ** -0.5, strict=True))
-    assert std["delta_N_uv"] == pytest.approx(SIZE * Model().unit("delta_N_uv"))
+    assert std["delta_N_uv"] == pytest.approx(LEFT_OUT["N_uv"] * Model().unit("delta_N_uv"))
     assert not {n.removeprefix("delta_") for n in std} & set(PRIOR.mean)
 
 
