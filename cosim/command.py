@@ -34,6 +34,7 @@ BAD_INPUT, FAILED = 2, 3
 LONGEST_WORD, LONGEST_LINE = 400, 4000
 # Libraries that not every installation has, as they are imported -> the extra that brings them.
 EXTRAS = {
+    "cryptography": "sign",
     "distributed": "campaign",
     "fmu_manipulation_toolbox": "export",
     "jinja2": "diagnosis",

@@ -25,6 +25,8 @@ SUBCOMMANDS = {
     "columns": Subcommand("diagnosis.propose_columns", "what must be told of a measurement of your own"),
     "repair": Subcommand("diagnosis.repair", "what a run's own channels show to be wrong, repaired"),
     "compare": Subcommand("diagnosis.compare", "where does a model fail against measured runs?"),
+    "criteria": Subcommand("diagnosis.criteria", "a first file of criteria for compare --criteria"),
+    "verify": Subcommand("diagnosis.verify", "check a validation record that compare has made"),
     "learn": Subcommand("diagnosis.learn", "which physical effect does the model lack?"),
     "campaign": Subcommand("cosim.campaign", "many runs: grids and samples, one table, differences"),
     "build": Subcommand("fmus.build", "build the FMUs, or one from a component file of your own"),

@@ -38,3 +38,6 @@ from .session import Diagnosis as Diagnosis
 from .session import evaluate as evaluate
 from .smoothing import Smoothed as Smoothed
 from .smoothing import smooth as smooth
+from .validation import Validation as Validation
+from .validation import validate as validate
+from .validation import verify_record as verify_record

@@ -21,7 +21,7 @@ from .progress import Advance, progress
 from .result_folder import default_folder, keep_inputs, sha256
 
 # Options that name files which decide a result.
-INPUTS = ("train", "test", "runs", "run", "model", "map", "effects")
+INPUTS = ("train", "test", "runs", "run", "model", "map", "effects", "criteria")
 MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
 RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
 

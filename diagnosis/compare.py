@@ -12,7 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from cosim.command import run_command
+from cosim import InputError
+from cosim.command import printable, run_command
 
 from .command_line import (
     MAP,
@@ -42,8 +43,13 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .initial_model import initial_model, proposing, write_map
     from .model import ship_with
     from .report import comparison_content, show_comparison, write_report
+    from .validation import FILES as RECORD
+    from .validation import lines, read_criteria, validate
 
-    with together(options.out, (*FILES, MAP)) as new:
+    if options.criteria is None and (options.sign or options.learned):
+        raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")
+    criteria = None if options.criteria is None else read_criteria(options.criteria)
+    with together(options.out, (*FILES, MAP, *RECORD)) as new:
         model, fmu = initial_model(options.model, options.map, ship_with(options.effects, options.ship))
         runs = gather(options.runs, advance, options.anyway, model, options.horizon, import_later_parts)
         from . import session
@@ -60,7 +66,17 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         write_report(
             new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
         )
-    return Done(0, show_comparison(content, str(options.out)))
+        judged: list[str] = []
+        if criteria is not None:
+            advance("criteria")
+            files = {name: getattr(options, name) for name in ("model", "map", "effects")}
+            files["ship"] = options.ship if Path(options.ship or "").is_file() else None
+            command = origin["command"]
+            record = validate(comparison, criteria, options.learned, files, command)
+            written = record.write_into(new, options.sign)
+            judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
+            judged.append(f"  {', '.join(written)} in {options.out}")
+    return Done(0, [*show_comparison(content, str(options.out)), *map(printable, judged)])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -76,6 +92,21 @@ def _parser() -> argparse.ArgumentParser:
     map_option(made)
     made.add_argument(
         "runs", type=Path, nargs="+", metavar="RUN", help="measured run, or folder of a log"
+    )
+    made.add_argument(
+        "--criteria",
+        type=Path,
+        metavar="FILE.json",
+        help="what counts as agreement: judged, and kept in a validation record",
+    )
+    made.add_argument(
+        "--learned",
+        type=Path,
+        metavar="DIR",
+        help="result folder of learn that made the model, for the uncertainty in the record",
+    )
+    made.add_argument(
+        "--sign", type=Path, metavar="KEY.pem", help="private key (Ed25519) that signs the record"
     )
     out_options(made, Path("results", "comparison"))
     return made

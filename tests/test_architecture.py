@@ -53,9 +53,11 @@ DIAGNOSIS_LAYERS = (
     ("report",),
     ("analysis",),
     ("open_loop",),
+    ("validation",),
     ("interactive", "command_line", "initial_model"),
     (
         "compare",
+        "criteria",
         "learn",
         "measure_trial",
         "pca",
@@ -64,6 +66,7 @@ DIAGNOSIS_LAYERS = (
         "repair",
         "replay",
         "sysid",
+        "verify",
         "watch",
     ),  # commands
 )
@@ -105,6 +108,7 @@ PUBLIC = (
 # diagnosis reads logs and parameter sets, asks FMUs for their variables, plays a run to FMUs, and writes a
 # foreign one together with what was found beside it.
 PUBLIC_TO_DIAGNOSIS = (
+    "cosim.campaign",  # of an ensemble: what is known of parameters
     "cosim",
     "cosim.command",
     "cosim.errors",

@@ -7,7 +7,7 @@ sample that is no spike. Longer predictions say nothing: the nominal hull is uns
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -107,6 +107,14 @@ class Windows:
         kept.measured = self.measured[late]
         if np.unique(kept.sample_window).size < self.run.size:
             raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
+        return kept
+
+    def finer(self, parts: int) -> "Windows":
+        """The same windows, predicted with steps that are divided into so many."""
+        kept = copy(self)
+        kept._groups = [
+            (replace(s, h=s.h / parts, steps=s.steps * parts), windows) for s, windows in self._groups
+        ]
         return kept
 
     def residuals(self, model: Model | None = None) -> np.ndarray:

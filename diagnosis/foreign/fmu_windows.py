@@ -114,11 +114,11 @@ def evaluate_fmu(w: WeakWindows, use: Use, model: Model) -> Evaluation:
     Raises:
         InputError: the FMU fails, or the run is too short for its run-in.
     """
-    windows, lacking = _windows(w, use), omega(w, model)
+    windows, lacking = predicted_windows(w, use), omega(w, model)
     if windows is None:
         error = PredictionError(lacking, np.zeros((0, 3)), None)
     else:
-        residuals = _residuals(w.smoothed, use, windows)
+        residuals = window_residuals(w.smoothed, use, windows)
         error = PredictionError(lacking, residuals, windows.summary(residuals))
     return Evaluation(
         model, w, windows, False, error, error, foreign=lambda begin: free_run(w.smoothed, use, begin)
@@ -134,7 +134,7 @@ def by_fmu(evaluations: Sequence[Evaluation], use: Use) -> list[Evaluation]:
     found = []
     for e in evaluations:
         if e.windows is not None and not use.whole:
-            own = _residuals(e.smoothed, use, e.windows)
+            own = window_residuals(e.smoothed, use, e.windows)
             learned = own + e.after.residuals - e.before.residuals
             learned[:, 2] = wrap(learned[:, 2])
             before = replace(e.before, residuals=own, errors=e.windows.summary(own))
@@ -144,13 +144,13 @@ def by_fmu(evaluations: Sequence[Evaluation], use: Use) -> list[Evaluation]:
     return found
 
 
-def _residuals(smoothed: Smoothed, use: Use, windows: Windows) -> np.ndarray:
-    """Measured minus predicted pose (samples, 3) [m, m, rad], heading wrapped."""
+def window_residuals(smoothed: Smoothed, use: Use, windows: Windows, parts: int = 1) -> np.ndarray:
+    """Measured minus predicted pose (samples, 3) [m, m, rad], heading wrapped; steps in parts."""
     begins = np.searchsorted(smoothed.time, windows.start)
-    h = step_of(smoothed)
-    parts = [begins[k : k + TOGETHER] for k in range(0, begins.size, TOGETHER)]
+    h = step_of(smoothed) / parts
+    groups = [begins[k : k + TOGETHER] for k in range(0, begins.size, TOGETHER)]
     steps = int(np.ceil(windows.length / h - 1e-6))
-    pose = np.concatenate([_poses(smoothed, use, part, h, steps) for part in parts], axis=-1)
+    pose = np.concatenate([_poses(smoothed, use, group, h, steps) for group in groups], axis=-1)
     if use.placed:
         first = round(use.run_in(smoothed) / h)
         rows = np.searchsorted(smoothed.time, windows.start + first * h - 1e-9)
@@ -216,7 +216,7 @@ def _pose(motion: np.ndarray, h: float) -> np.ndarray:
     return _track(motion, h) if np.isnan(motion[0, :3]).any() else motion[:, :3]
 
 
-def _windows(w: WeakWindows, use: Use) -> Windows | None:
+def predicted_windows(w: WeakWindows, use: Use) -> Windows | None:
     """The windows that are predicted: as of any model, or one that is the run as a whole."""
     smoothed = w.smoothed
     try:

@@ -38,9 +38,9 @@ def comparison_content(
     """
     return result_keys.ComparisonContent(
         data=_data(comparison.evaluations),
-        fmu=_fmu(comparison),
+        fmu=fmu_result(comparison),
         windows=_lengths(comparison.evaluations),
-        sensors=[s for e in comparison.evaluations for s in _sensors(e)],
+        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         **_provenance(comparison, model, files),
@@ -95,11 +95,11 @@ def diagnosis_content(
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
         data=_data(comparison.evaluations),
         windows=_lengths(comparison.evaluations),
-        sensors=[s for e in comparison.evaluations for s in _sensors(e)],
+        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
         errors=[_errors(e) for e in comparison.evaluations],
         where=result_keys.WhereResult.model_validate(comparison.before),
         where_after=result_keys.WhereResult.model_validate(comparison.after),
-        fmu=_fmu(comparison),
+        fmu=fmu_result(comparison),
         stability=result_keys.StabilityResult.model_validate(diagnosis.stability),
         prior=dict(prior) if isinstance(prior, Mapping) else prior,
         seed=diagnosis.seed,
@@ -159,13 +159,17 @@ class _Provenance(TypedDict):
 
 
 def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]) -> _Provenance:
-    versions = {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
     return {
         "runs": [e.name for e in comparison.evaluations],
         "model": None if model is None else model.name,
         "files": list(files),
-        "versions": versions,
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Of all that makes numbers."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
 def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
@@ -175,7 +179,8 @@ def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
     return result_keys.WindowLengths(prediction=max(lengths, default=w.horizon), model_error=w.width)
 
 
-def _fmu(comparison: Comparison) -> result_keys.FmuResult | None:
+def fmu_result(comparison: Comparison) -> result_keys.FmuResult | None:
+    """How an FMU predicts the runs; None: it is no FMU."""
     use = comparison.use
     if use is None:
         return None
@@ -210,7 +215,7 @@ def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
     return result_keys.Data(runs=runs, **totals)
 
 
-def _sensors(e: Evaluation) -> Iterator[result_keys.SensorResult]:
+def sensor_results(e: Evaluation) -> Iterator[result_keys.SensorResult]:
     """Faults of a run's channels."""
     for f in e.smoothed.sensors.findings if e.smoothed.sensors else ():
         yield result_keys.SensorResult.model_validate({"run": e.name, **vars(f)})

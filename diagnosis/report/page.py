@@ -23,7 +23,7 @@ from .svg import data_uri, inline, style
 from .trial_rows import trial_rows
 
 if TYPE_CHECKING:
-    from jinja2 import Template
+    from jinja2 import Environment
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
@@ -82,27 +82,32 @@ def write_report(
     for (place, _), drawings in zip(makers, made, strict=True):
         drawn.setdefault(place, []).extend(drawings)
     advance("report: page")
-    text = _template().render(
-        content=content,
-        diagnosis=diagnosis,
-        verdict="" if diagnosis is None else verdict_title(diagnosis),
-        title="Model against measurements" if diagnosis is None else "Diagnosis",
-        learned=learned,
-        figures=drawn,
-        tiles=list(_tiles(content, learned)),
-        runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
-        provenance=[(k, v) for k, v in (*_provenance(content), *origin.items()) if v is not None],
-        glossary=list(formatting.glossary(content.windows.prediction, content.windows.model_error)),
+    text = (
+        environment()
+        .get_template("page.html")
+        .render(
+            content=content,
+            diagnosis=diagnosis,
+            verdict="" if diagnosis is None else verdict_title(diagnosis),
+            title="Model against measurements" if diagnosis is None else "Diagnosis",
+            learned=learned,
+            figures=drawn,
+            tiles=list(_tiles(content, learned)),
+            runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
+            provenance=[(k, v) for k, v in (*_provenance(content), *origin.items()) if v is not None],
+            glossary=list(formatting.glossary(content.windows.prediction, content.windows.model_error)),
+        )
     )
     with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
     return path
 
 
-def _template() -> "Template":
+def environment() -> "Environment":
+    """Templates of this folder, and the filters that they use."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(
+    made = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=StrictUndefined,
@@ -118,9 +123,9 @@ def _template() -> "Template":
         trial_rows,
         *told_so,
     )
-    environment.filters |= {f.__name__: f for f in filters}
-    environment.globals["times"] = formatting.times
-    return environment.get_template("page.html")
+    made.filters |= {f.__name__: f for f in filters}
+    made.globals["times"] = formatting.times
+    return made
 
 
 def _provenance(content: ComparisonContent | DiagnosisContent) -> Iterator[tuple[str, object]]:

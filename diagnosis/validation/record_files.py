@@ -1,0 +1,68 @@
+"""The files of a record: the report as HTML and PDF, the record, its signature."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..report.page import environment
+from ..report.svg import inline, style
+from ..result_folder import sha256
+from .error_figure import error_figure
+from .judged_criterion import Judgement
+from .pdf import write_pdf
+from .record_keys import FileResult, RecordContent
+from .sections import Section, sections
+from .signature import public_key, sign
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RECORD, PAGE, PDF, SIGNATURE = (f"validation.{kind}" for kind in ("json", "html", "pdf", "sig"))
+FILES = (RECORD, PAGE, PDF, SIGNATURE)
+TITLE = "Validation record"
+
+
+def write_record(
+    content: RecordContent, judgements: Sequence[Judgement], folder: Path, key: str | Path | None
+) -> list[str]:
+    """Write all files into a folder that is there; returns their names.
+
+    The record has the hashes of the report and the public key, so it is written, and signed, last.
+
+    Raises:
+        InputError: no such key.
+    """
+    if key is not None:
+        content = content.model_copy(update={"public_key": public_key(key)})
+    parts = [*sections(content)]
+    with style():
+        figures = _figures(judgements)
+        _write_page(folder / PAGE, parts, figures)
+        write_pdf(folder / PDF, TITLE, parts, [figure for figure, _ in figures])
+    reports = [FileResult(role="report", path=name, sha256=sha256(folder / name)) for name in FILES[1:3]]
+    text = content.model_copy(update={"reports": tuple(reports)}).model_dump_json(indent=2) + "\n"
+    (folder / RECORD).write_bytes(text.encode())
+    if key is None:
+        return [*FILES[:3]]
+    (folder / SIGNATURE).write_bytes(sign(text.encode(), key))
+    return [*FILES]
+
+
+def _figures(judgements: Sequence[Judgement]) -> "list[tuple[Figure, str]]":
+    """The errors of each criterion's windows, and a caption."""
+    return [
+        (error_figure(j), f"{j.criterion.title}: error of each window, and the tolerance.")
+        for j in judgements
+        if j.errors.size
+    ]
+
+
+def _write_page(path: Path, parts: Sequence[Section], figures: "list[tuple[Figure, str]]") -> None:
+    from markupsafe import Markup
+
+    drawn = [
+        (Markup(inline(figure, f"errors-{k}", caption)), caption)
+        for k, (figure, caption) in enumerate(figures)
+    ]
+    page = environment().get_template("validation.html")
+    path.write_text(page.render(title=TITLE, sections=parts, figures=drawn), encoding="utf-8")

@@ -1,0 +1,101 @@
+"""The report of a record as sections with tables, for the page and for the PDF alike."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from ..report.formatting import NO_VALUE, number
+from .record_keys import JudgementResult, RecordContent
+
+NOT_KNOWN = "not known"
+BUDGET = ("u_D", "initial_state", "parameters", "process_noise", "u_input", "u_num", "u_val")
+CALLED = {"u_D": "measurement u_D", "initial_state": "initial state", "process_noise": "process noise"}
+
+
+class Section(NamedTuple):
+    """A heading with paragraphs, and a table: its heads and rows, empty where there is none."""
+
+    title: str
+    paragraphs: Sequence[str] = ()
+    heads: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+
+
+def sections(r: RecordContent) -> Iterator[Section]:
+    """The report, in order."""
+    yield Section("Verdict", (), ("criterion", "verdict", "why"), [*map(_verdict, r.judgements)])
+    yield _errors(r)
+    yield _uncertainty(r)
+    yield Section(
+        "Validity range",
+        ["What the data cover: least, quantiles and greatest over all samples that are used."],
+        ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest"),
+        [
+            (v.signal, v.unit, *map(number, (v.least, v.q05, v.median, v.q95, v.greatest)))
+            for v in r.validity
+        ],
+    )
+    faults = [f"{s.run}: {s.sentence}" for s in r.sensors]
+    yield Section("Faults of sensors", faults or ["The channels do not contradict each other."])
+    yield Section("What is not covered", r.not_covered)
+    if r.notes:
+        yield Section("Notes", r.notes)
+    yield _origin(r)
+    yield Section("Terms and standing", [r.standing, *r.references])
+
+
+def _verdict(j: JudgementResult) -> tuple[str, str, str]:
+    return f"{j.criterion}: {j.requirement}", j.outcome, j.reason
+
+
+def _errors(r: RecordContent) -> Section:
+    rows = [
+        (
+            j.criterion,
+            j.unit,
+            *map(number, (j.tolerance, j.E, j.rms, j.largest)),
+            f"{j.windows}, {number(j.independent)} independent",
+            f"{number(j.estimate)} ({number(j.low)} to {number(j.high)})",
+        )
+        for j in r.judgements
+    ]
+    told = (
+        "E is measured minus predicted at the horizon, of position the distance, its mean over windows. "
+        "Bounds of the share, or of the RMS, are one-sided at the confidence of the criterion."
+    )
+    heads = ("criterion", "unit", "tolerance", "E", "RMS", "largest", "windows", "share or RMS")
+    return Section("Comparison error", [told], heads, rows)
+
+
+def _uncertainty(r: RecordContent) -> Section:
+    judged = [j for j in r.judgements if j.budget is not None]
+    rows = []
+    for j in judged:
+        told = j.budget.model_dump() if j.budget else {}
+        rows.append((j.criterion, j.unit, *(_known(told[name]) for name in BUDGET)))
+    told = (
+        "Standard uncertainties of the judged quantity at the horizon; u_input² is that of initial "
+        "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."
+    )
+    heads = ("criterion", "unit", *(CALLED.get(name, name) for name in BUDGET))
+    return Section("Uncertainty", [told], heads, rows)
+
+
+def _known(u: float | None) -> str:
+    return NOT_KNOWN if u is None else number(u)
+
+
+def _origin(r: RecordContent) -> Section:
+    c = r.criteria
+    rows = [
+        ("made", r.made),
+        ("command", r.command),
+        ("model", r.model),
+        ("ship", r.ship),
+        ("criteria", f"{c.path}, last changed {c.modified}, read {c.read}, SHA-256 {c.sha256}"),
+        *((f.role, f"{f.path}, SHA-256 {f.sha256 or NO_VALUE}") for f in r.files),
+        ("versions", ", ".join(f"{name} {v}" for name, v in r.versions.items())),
+        ("signed", "no" if r.public_key is None else r.public_key),
+    ]
+    purpose = [f"Purpose: {c.purpose}."] if c.purpose else []
+    told = r.fmu.sentences if r.fmu else []
+    return Section("Made with", [*purpose, *told], ("", ""), rows)

@@ -1,0 +1,357 @@
+"""Criteria that are judged, the uncertainty beside them, and records that show any change."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+from support.measured import sail
+from support.project import ROOT
+
+import diagnosis
+from cosim import InputError
+from cosim.campaign import Posterior
+from diagnosis import compare
+from diagnosis.prediction_error.push import Push
+from diagnosis.validation import FILES, json_schema, read_criteria, template
+from diagnosis.validation.budget import Budget, Learned, Sources, budget, combined, sources_of
+from diagnosis.validation.criterion import Criterion
+from diagnosis.validation.judged_criterion import Predicted, decide, judge
+from diagnosis.validation.pdf import table
+from diagnosis.validation.predictions import Predictions, difference, judged
+from diagnosis.validation.statistics import independent, root_mean_square, share
+from diagnosis.validation.validity import window_means
+from diagnosis.verify import main as verify_main
+
+cryptography = pytest.importorskip("cryptography")
+WITHIN = {"quantity": "position", "horizon": 8.0, "tolerance": 1.0, "unit": "m"}
+
+
+def criterion(**changes):
+    return Criterion(**{**WITHIN, **changes})
+
+
+def outcome(errors, u_val=0.0, n=None, **changes):
+    errors = np.asarray(errors, float)
+    return decide(criterion(**changes), errors, errors.size if n is None else n, u_val)[0]
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return diagnosis.gather([sail(48.0, h=0.1)[0]], horizon=4.0)
+
+
+@pytest.fixture(scope="module")
+def comparison(runs):
+    return diagnosis.evaluate(runs)
+
+
+@pytest.fixture(scope="module")
+def predictions(comparison):
+    return Predictions(comparison.evaluations[0], None, 4.0)
+
+
+@pytest.fixture
+def key(tmp_path):
+    return write_key(tmp_path / "key.pem")
+
+
+def write_key(path):
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
+    made = Ed25519PrivateKey.generate()
+    path.write_bytes(made.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
+    return path
+
+
+def write_criteria(path, *criteria, **more):
+    path.write_text(json.dumps({"criteria": [{**WITHIN, **c} for c in criteria], **more}))
+    return path
+
+
+@pytest.mark.parametrize("statistic", ["share", "median", "rms"])
+def test_all_three_outcomes(statistic):
+    told = {"statistic": statistic}
+    assert outcome(np.full(60, 0.5), **told) == "met"
+    assert outcome(np.full(60, 2.0), **told) == "not met"
+    few = [0.5, 0.6, 0.4, 1.2][: 4 if statistic == "rms" else 3]
+    assert outcome(few, **told) == "cannot be judged"
+
+
+def test_a_model_that_runs_away_does_not_meet_a_share():
+    assert outcome(np.full(60, np.inf)) == "not met"
+
+
+def test_what_measurement_may_explain_is_not_held_against_a_model():
+    """Errors beyond the tolerance by less than 2 u_val; and a tolerance that nobody could see."""
+    errors = np.full(60, 1.1)
+    assert outcome(errors) == outcome(errors, 0.04) == "not met"
+    assert outcome(errors, 0.06) == "cannot be judged"
+    assert outcome(np.full(60, 0.5), 0.51) == "cannot be judged"
+
+
+def test_overlap_of_what_windows_say_is_no_evidence():
+    """As many windows, of which few are independent."""
+    assert outcome(np.full(60, 0.5), n=60) == "met"
+    assert outcome(np.full(60, 0.5), n=10) == "cannot be judged"
+
+
+def test_outcomes_do_not_depend_on_units():
+    errors = np.random.default_rng(1).rayleigh(0.4, 80)
+    found = [
+        decide(criterion(), errors, 80, 0.1),
+        decide(criterion(tolerance=100.0, unit="cm"), errors, 80, 0.1),
+    ]
+    assert found[0][0] == found[1][0]
+    assert found[0][2] == pytest.approx(found[1][2])
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_a_criterion_that_is_just_missed_is_hardly_ever_told_met(correlation):
+    """Errors of which 90 % are within; 5 % of all records may say more than that."""
+    tolerance = 1.6448536269514722  # of a standard normal distribution 90 %
+    assert met_share(tolerance, correlation) < (0.08 if correlation == 0.0 else 0.12)
+
+
+def test_a_criterion_that_is_met_is_told_so_at_the_rate_of_its_bound():
+    """Of 120 independent windows with 95 % within, by the binomial distribution."""
+    n, wanted = 120, 0.9
+    enough = next(k for k in range(n + 1) if share(np.arange(n) < k, n, 0.95).low >= wanted)
+    expected = binom.sf(enough - 1, n, 0.95)
+    found = met_share(1.959963984540054, 0.0, n, given=n)
+    assert found == pytest.approx(expected, abs=4.0 * np.sqrt(0.25 / 400))
+
+
+def met_share(tolerance, correlation, n=120, records=400, given=None):
+    rng, run = np.random.default_rng(7), np.zeros(n, int)
+    told = 0
+    for _ in range(records):
+        errors = rng.standard_normal(n)
+        for k in range(1, n):
+            errors[k] = correlation * errors[k - 1] + np.sqrt(1.0 - correlation**2) * errors[k]
+        free = given or independent(np.abs(errors), run)
+        told += outcome(errors, n=free, tolerance=tolerance) == "met"
+    return told / records
+
+
+def test_bounds_of_a_share_are_those_of_the_binomial_distribution():
+    low, high = share(np.arange(40) < 33, 40, 0.95)[1:]
+    assert binom.sf(32, 40, low) == pytest.approx(0.05)
+    assert binom.cdf(33, 40, high) == pytest.approx(0.05)
+    assert share(np.ones(29, bool), 29, 0.95) == pytest.approx((1.0, 0.05 ** (1 / 29), 1.0))
+
+
+def test_independent_windows():
+    """Of an autoregression (1 - a) / (1 + a) of all; runs are apart; one value again and again counts fully."""
+    rng, n, a = np.random.default_rng(2), 4000, 0.5
+    errors = rng.standard_normal(n)
+    assert independent(errors, np.zeros(n)) > 0.85 * n
+    for k in range(1, n):
+        errors[k] += a * errors[k - 1]
+    assert independent(errors, np.zeros(n)) == pytest.approx(n / 3.0, rel=0.2)
+    assert independent(errors, np.arange(n)) == n
+    assert independent(7.0 * errors, np.zeros(n)) == pytest.approx(independent(errors, np.zeros(n)))
+
+
+def test_rms_bounds_hold_their_probability():
+    rng = np.random.default_rng(3)
+    beyond = [root_mean_square(rng.standard_normal(60), 60, 0.95).high < 1.0 for _ in range(600)]
+    assert np.mean(beyond) < 0.12  # squares are skew; 0.05 of many
+
+
+def test_uncertainties_combine_by_their_squares():
+    b = Budget(3.0, 4.0, None, 12.0, None)
+    assert combined(3.0, None, 4.0) == 5.0
+    assert b.u_input == pytest.approx(np.sqrt(160.0))
+    assert b.u_val == pytest.approx(13.0)
+    assert b.unknown == ["parameters", "numerical"]
+
+
+def test_a_budget_is_over_the_windows_that_count():
+    one = {"u": np.array([1.0, 9.0, 100.0])}
+    s = Sources(one, one, None, None, one, {})
+    found = budget("u", [s], [np.array([True, True, False])])
+    assert found.measurement == pytest.approx(np.sqrt(5.0))
+    assert found.parameters is None
+    assert budget("r", [s], [np.ones(3, bool)]).measurement is None
+
+
+def with_std(predictions, **std):
+    """Predictions whose initial state is as uncertain as told, and else exact."""
+    s = predictions.smoothed
+    zero = {name: np.zeros_like(getattr(s, name)) for name in ("eta_std", "eta_dot_std")}
+    for name, values in std.items():
+        zero[name][:] = values
+    made = object.__new__(Predictions)
+    made.__dict__ = {**predictions.__dict__, "smoothed": replace(s, **zero)}
+    return made
+
+
+def test_the_initial_state_in_closed_form(comparison):
+    """A shift moves the end by as much; of a velocity, for a short while, what it covers in that time."""
+    p = Predictions(comparison.evaluations[0], None, 1.0)
+    shifted = sources_of(with_std(p, eta_std=[3e-3, 4e-3, 0.0]), None).initial_state
+    assert shifted["position"] == pytest.approx(np.full(p.rows.size, 25e-6), rel=1e-6)
+    assert shifted["heading"] == pytest.approx(0.0)
+    faster = sources_of(with_std(p, eta_dot_std=[3e-3, 4e-3, 2e-3]), None).initial_state
+    seconds = p.smoothed.time[p.rows] - p.start
+    assert np.sqrt(faster["position"]) == pytest.approx(5e-3 * seconds, rel=0.2)
+    assert np.sqrt(faster["heading"]) == pytest.approx(2e-3 * seconds, rel=0.35)  # yaw is damped
+
+
+def test_parameters_and_process_noise(predictions):
+    """By one parameter as its change does; both quadratic in their size, and unknown without a posterior."""
+    assert sources_of(predictions, None).parameters is None
+    assert sources_of(predictions, None).process_noise is None
+    size = np.array([0.02, 0.01, 0.005])
+    found = []
+    for factor in (1.0, 2.0):
+        posterior = Posterior(
+            names=["vessel.X_u"], units=["N.s/m"], mean=[0.0], covariance=[[(0.01 * factor) ** 2]]
+        )
+        found.append(sources_of(predictions, Learned(posterior, Push(factor * size, np.ones(3)), ())))
+    (changed,) = predictions.motions([predictions.model.plus({"X_u": 0.01})])
+    expected = judged("position", difference(changed, predictions.motion))
+    assert np.sqrt(found[0].parameters["position"]) == pytest.approx(expected, rel=1e-3)
+    assert found[1].parameters["position"] == pytest.approx(
+        4.0 * found[0].parameters["position"], rel=1e-2
+    )
+    assert found[1].process_noise["heading"] == pytest.approx(4.0 * found[0].process_noise["heading"])
+    assert "u" not in found[0].process_noise
+
+
+def test_predicted_velocities_are_those_of_the_ship(predictions):
+    """The nominal model is the ship that sailed: what is left is noise and smoothing."""
+    off = difference(predictions.measured, predictions.motion)
+    for quantity, most in {"position": 3e-3, "heading": 6e-3, "u": 6e-3, "v": 6e-3, "r": 2e-2}.items():
+        assert np.sqrt(np.mean(judged(quantity, off) ** 2)) < most
+
+
+def test_only_windows_within_count(comparison, predictions):
+    p = Predicted("run", predictions, sources_of(predictions, None), window_means(predictions))
+    u = p.signals["u"]
+    some = judge(criterion(within={"u": [float(np.median(u)), 9.0]}), ["run"], [p])
+    assert some.errors.size == np.sum(u >= np.median(u))
+    none = judge(criterion(within={"u": [8.0, 9.0]}), ["run"], [p])
+    assert none.reason == "outside the data: no window has u from 8 to 9"
+    assert judge(criterion(runs=["other"]), ["run"], [p]).reason == "run other was not compared"
+    with pytest.raises(InputError, match=r"run run has no 'tau_x'; did you mean 'tau_X'"):
+        judge(criterion(within={"tau_x": [0.0, 1.0]}), ["run"], [p])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "cannot be read as criteria"),
+        ("[" * 100_000, "nested too deeply"),
+        ("[]", "valid dictionary"),
+        ('{"criteria": []}', "criteria: List should have at least 1 item"),
+        ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
+        ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
+        ({"unit": "deg"}, "'deg' is no unit of position; there are m, mm"),
+        ({"tolerance": -1.0}, "criteria.0.tolerance: Input should be greater than 0"),
+        ({"tolerence": 1.0}, r"criteria.0.tolerence: no such key; did you mean 'tolerance'"),
+        ({"horizon": 1e400}, "criteria.0.horizon"),
+        ({"statistic": "rms", "coverage": 0.5}, "coverage is of the statistic 'share'"),
+        ({"within": {"u": [2, 1]}}, "within.u: 2 is not below 1"),
+    ],
+)  # fmt: skip
+def test_what_are_no_criteria(tmp_path, text, message):
+    path = tmp_path / "criteria.json"
+    path.write_text(text if isinstance(text, str) else json.dumps({"criteria": [{**WITHIN, **text}]}))
+    with pytest.raises(InputError, match=message) as raised:
+        read_criteria(path)
+    assert "\n" not in str(raised.value)
+    with pytest.raises(InputError, match="no such criteria"):
+        read_criteria(tmp_path / "other.json")
+
+
+def test_the_first_file_and_the_schema(tmp_path):
+    path = tmp_path / "criteria.json"
+    path.write_text(json.dumps(template()))
+    assert len(read_criteria(path).content.criteria) == 2
+    kept = json.loads((ROOT / "docs" / "criteria.schema.json").read_text())
+    assert kept == json_schema(), "cybership criteria --schema > docs/criteria.schema.json"
+
+
+def test_a_record_of_both_verdicts_and_what_shows_a_change(comparison, tmp_path, key, capsys):
+    """Written, checked, and with a byte changed in each file that it names."""
+    easy, hard = {"tolerance": 0.5, "coverage": 0.5, "horizon": 4.0}, {"tolerance": 1e-4, "horizon": 4.0}
+    criteria = write_criteria(tmp_path / "criteria.json", easy, hard, purpose="a test")
+    model = tmp_path / "model.ssv"
+    model.write_text("a model")
+    v = diagnosis.validate(comparison, criteria, files={"model": model})
+    assert [j.outcome for j in v.content.judgements] == ["met", "cannot be judged"]
+    assert "within the validation uncertainty" in v.content.judgements[1].reason
+    out = tmp_path / "out"
+    assert set(v.write(out, key)) == set(FILES) == {p.name for p in out.iterdir()}
+    record = out / FILES[0]
+    assert all(c.holds for c in diagnosis.verify_record(record))
+    assert (out / FILES[2]).read_bytes().startswith(b"%PDF")
+    for path in (criteria, model, *(out / name for name in FILES)):
+        raw = path.read_bytes()
+        # Of the record a byte that leaves it one.
+        at = raw.index(b'"purpose": "a t') + 12 if path == record else len(raw) // 2
+        path.write_bytes(raw[:at] + bytes([raw[at] ^ 1]) + raw[at + 1 :])
+        assert verify_main([str(record)]) == 1, path
+        path.write_bytes(raw)
+    assert verify_main([str(record)]) == 0
+    model.unlink()
+    assert verify_main([str(record)]) == 0
+    assert "model.ssv: not found here" in capsys.readouterr().out
+
+
+def test_whose_signature_it_is(comparison, tmp_path, key):
+    from diagnosis.validation.signature import public_key
+
+    criteria = write_criteria(tmp_path / "criteria.json", {"horizon": 4.0})
+    record = tmp_path / "out" / FILES[0]
+    diagnosis.validate(comparison, criteria).write(record.parent, key)
+    mine, other = tmp_path / "mine.pem", tmp_path / "other.pem"
+    mine.write_text(public_key(key))
+    other.write_text(public_key(write_key(tmp_path / "key_2.pem")))
+    assert verify_main([str(record), "--key", str(mine)]) == 0
+    assert verify_main([str(record), "--key", str(other)]) == 1
+    assert verify_main([str(record), "--key", str(criteria)]) == 2
+    assert verify_main([str(criteria)]) == 2
+    assert verify_main([str(tmp_path / "no.json")]) == 2
+    diagnosis.validate(comparison, criteria).write(record.parent)
+    assert not (record.parent / FILES[3]).exists()  # of the record before
+    assert verify_main([str(record)]) == 0
+    assert verify_main([str(record), "--key", str(mine)]) == 1
+
+
+@pytest.mark.parametrize("kind", ["nothing", "no key", "public key"])
+def test_what_cannot_sign_leaves_nothing(comparison, tmp_path, key, kind):
+    from diagnosis.validation.signature import public_key
+
+    contents = {"no key": "no key", "public key": public_key(key)}
+    path = tmp_path / "bad.pem"
+    if kind in contents:
+        path.write_text(contents[kind])
+    v = diagnosis.validate(comparison, write_criteria(tmp_path / "criteria.json", {"horizon": 4.0}))
+    with pytest.raises(InputError, match=r"bad\.pem"):
+        v.write(tmp_path / "out", path)
+    assert not (tmp_path / "out").exists()
+
+
+def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
+    from diagnosis.validation.signature import sign
+
+    monkeypatch.setitem(__import__("sys").modules, "cryptography", None)
+    with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[sign\]'"):
+        sign(b"", key)
+
+
+def test_a_signature_is_of_criteria(tmp_path, capsys):
+    assert compare.main([str(tmp_path), "--sign", "key.pem", "--out", str(tmp_path / "out")]) == 2
+    assert "--criteria FILE.json is missing" in capsys.readouterr().err
+
+
+def test_tables_fit_into_their_lines():
+    rows = [("head", "what it is"), ("a" * 30, "words " * 40)]
+    lines = list(table(rows, 60))
+    assert max(map(len, lines)) <= 60
+    assert "".join(lines).count("words") == 40
