@@ -177,8 +177,15 @@ def test_a_force_too_strong_for_the_thrusters_is_told_apart():
     )
     found = check_stability(Model({"F_n": 30.0}), Model({"body_bias_X": 30.0}))
     assert not found.bounded
+    assert not found.safe
+
+
+@pytest.mark.usefixtures("short_loops")
+def test_a_model_that_was_unsound_before_it_learned_is_no_reason_to_withhold_it():
     found = check_stability(Model({"X_u": 40.0}), Model({"X_u": 40.0}))
     assert not found.bounded
+    assert found.safe
+    assert not check_stability(Model({"X_u": 41.0}), Model({"X_u": 40.0})).safe  # is driven on more
     assert "the nominal model is not held there either" in found.notes
 
 

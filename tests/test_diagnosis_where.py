@@ -13,6 +13,7 @@ from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME
 from diagnosis.assessment.regions import _Design, find_regions
 from diagnosis.model import omega, weak_windows
+from diagnosis.model.weak_form import halfway
 
 
 def windows(run):
@@ -44,6 +45,15 @@ def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level):
     spread = np.sqrt(np.mean(np.square(left), axis=(0, 1)))
     expected = np.sqrt(np.mean(np.square(stated), axis=(0, 1)))
     np.testing.assert_allclose(expected, spread, rtol=0.3)
+
+
+def test_a_force_that_goes_with_speed_is_taken_halfway_between_samples():
+    """The mean over each step of what is straight in time; beside a sample that is not known, its own."""
+    nu = np.arange(12.0).reshape(4, 3)
+    known = np.array([True, True, True, False])
+    between = halfway(SimpleNamespace(known=known), nu)
+    np.testing.assert_allclose(between[:2], 0.5 * (nu[:2] + nu[1:3]))
+    np.testing.assert_array_equal(between[2:], nu[2:])
 
 
 def test_uncertainty_grows_with_the_noise_and_where_samples_are_missing():

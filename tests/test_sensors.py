@@ -18,6 +18,7 @@ from diagnosis.sensors import closure, examine, motion
 from diagnosis.sensors.clock_path import integral_of
 from diagnosis.sensors.wraps import unwrapped
 from diagnosis.smoothing import measured_rates
+from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 
 H, SECONDS = 0.1, 160.0
@@ -86,6 +87,41 @@ def test_a_constant_fault_is_named_with_its_size_and_repaired(name):
 def test_a_unit_of_the_rate_is_named():
     found = told(beside(made(), r=np.degrees(made().measured["r"])))
     assert "deg/s in place of rad/s" in found["r", "scale"].sentence
+
+
+def swung(deviation=0.0):
+    """A run all round the compass, which is off by heading as iron makes it."""
+    run = made()
+    more = 0.06 * run.time  # rad: a turn and a half
+    r, psi = run.measured["r"] + 0.06, run.pose[:, 2] + more
+    v_n, v_e = rotate_to_earth(psi, run.measured["u"], run.measured["v"])
+    x, y = (np.concatenate([[0.0], np.cumsum((a[1:] + a[:-1]) * H / 2)]) for a in (v_n, v_e))
+    rng = np.random.default_rng(3)
+    pose = np.column_stack([x, y, psi + deviation * np.sin(psi) - 0.5 * deviation * np.cos(2 * psi)])
+    return beside(replace(run, pose=pose + NOISE * rng.standard_normal(pose.shape)), r=r)
+
+
+def test_a_compass_off_by_heading_is_no_clock_that_wanders():
+    found = told(swung(0.07))
+    assert set(found) == {("psi", "deviation_sin"), ("psi", "deviation_cos_2")}
+    assert found["psi", "deviation_sin"].value == pytest.approx(0.07, abs=0.004)
+    assert found["psi", "deviation_cos_2"].value == pytest.approx(-0.035, abs=0.004)
+    assert not told(swung())
+    repaired = examine(swung(0.07), REFERENCE).run.pose[:, 2]
+    assert np.std(repaired - swung().pose[:, 2]) < 0.006
+
+
+def test_without_a_speed_clock_and_scale_of_the_rate_are_one():
+    run = beside(made(), r=1.06 * made().measured["r"])
+    alone = replace(run, measured={"r": run.measured["r"]})
+    (found,) = told(alone).values()
+    assert (found.channel, found.kind, found.alike, found.repaired) == (
+        "r",
+        "scale",
+        ("clock_rate",),
+        False,
+    )
+    assert told(run)["r", "scale"].repaired
 
 
 def test_findings_do_not_depend_on_where_and_how_the_earth_lies():

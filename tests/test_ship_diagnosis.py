@@ -72,6 +72,22 @@ def test_a_wrong_column_is_told_in_one_line(ship, run, columns, told):
         read_frame(run.rename(columns=columns), "run", ship)
 
 
+def test_commands_far_beyond_their_limit_are_refused_and_say_since_when(ship, run):
+    """Beyond its limit a command counts as the limit: a change of its unit midway would be learned."""
+    other = run.copy()
+    half = len(other) // 2
+    other.loc[half:, "port.n"] *= 60.0
+    first = run["time"][int(np.argmax(np.abs(other["port.n"]) > 3.0 * 16.541))]
+    assert first >= run["time"][half]
+    with pytest.raises(
+        InputError, match=rf"port\.n reaches .* times its limit, .*from {first:.4g} s on"
+    ):
+        diagnosis.load(other, ship="otter")
+    requested = run.copy()
+    requested["port.n"] *= 1.5  # a request that was logged before it was clipped
+    assert diagnosis.load(requested, ship="otter")
+
+
 def test_force_columns_are_commands_too(ship, run):
     """A run that tells forces is one of the commands that the ship's allocation gives for them."""
     found = read_frame(run, "run", ship)

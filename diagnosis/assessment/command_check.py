@@ -32,7 +32,7 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
         model: its thrusters.
     """
     if run.commands is not None:
-        return None  # shares of the full thrust, see :func:`diagnosis.read`
+        return _beyond_limits(run, model)
     full, size = full_thrust(model), np.abs(run.tau_cmd)
     beyond = size > MOST_THRUST * full
     share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
@@ -47,6 +47,26 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     if 2 * rows > len(size):
         return seen
     return f"{seen}: leave the cells of false commands empty, and log commands after they are clipped"
+
+
+def _beyond_limits(run: Run, model: Model) -> str | None:
+    """A clause about a command that is many times its limit, as which it then counts."""
+    if run.commands is None or model.ship.commands is None:
+        return None  # shares of the full thrust, see :func:`diagnosis.read`
+    layout = model.ship.layout_of(run.commands)
+    limits = layout.limits(model.drive.params)
+    for k, ((name, unit), limit) in enumerate(zip(model.ship.commands.items(), limits, strict=True)):
+        most, size = float(np.abs(limit).max()), np.abs(run.commands[:, k])
+        beyond = size > MOST_THRUST * most
+        if (layout.round and layout.round[k]) or beyond.mean() <= NEGLIGIBLE:
+            continue
+        first = float(run.time[int(np.argmax(beyond))])
+        return (
+            f"{name} reaches {size.max():.4g} {unit} and is more than {MOST_THRUST:g} times its limit, "
+            f"{most:.4g} {unit}, in {int(beyond.sum())} of {len(size)} rows, from {first:.4g} s on: "
+            "it seems to be in another unit there"
+        )
+    return None
 
 
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:

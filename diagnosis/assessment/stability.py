@@ -65,6 +65,7 @@ OPERATING = OperatingRegion()
 # that gains speed by itself has doubled it many times.
 COASTING, COASTING_STEP = 60.0, 0.02  # s
 RUNAWAY = 3.0  # times the speeds of the region
+NOR_NOMINAL = "the nominal model is not held there either"
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class Stability:
         bounded: whether the ship stays within some ship lengths of its target on every reference path;
             of a ship that lacks thrust on an axis, whether it comes to rest without thrust.
         closed_loop: which of the two was judged.
+        from_start: whether the initial model fails wherever the learned one does, and its hull
+            dissipates no more: then nothing that was learned is the reason.
         region: where the learned hull dissipates less than the nominal one, with numbers; None: nowhere.
         notes: further remarks, a sentence each.
     """
@@ -88,11 +91,12 @@ class Stability:
     region: str | None
     notes: tuple[str, ...]
     closed_loop: bool = True
+    from_start: bool = False
 
     @property
     def safe(self) -> bool:
         """Whether the model may be written without ``--allow-unstable``."""
-        return self.mass_definite and self.bounded
+        return self.mass_definite and (self.bounded or self.from_start)
 
 
 def check_stability(
@@ -136,8 +140,10 @@ def check_stability(
     if not model.ship.fully_actuated:
         advance("coming to rest without thrust")
         bounded = mass_definite and comes_to_rest(model, everywhere[-FACES:], region, notes)
+        both = not (bounded or comes_to_rest(nominal, everywhere[-FACES:], region, []))
+        notes += [NOR_NOMINAL] if both else []
     else:
-        bounded = mass_definite and _bounded(model, nominal, advance, notes)
+        bounded, both = _bounded(model, nominal, advance, notes) if mass_definite else (False, False)
     return Stability(
         mass_definite,
         float(before.min()),
@@ -146,6 +152,7 @@ def check_stability(
         "; ".join(worse) or None,
         tuple(dict.fromkeys(notes)),
         model.ship.fully_actuated,
+        both and not _less(after.min(), before.min()),
     )
 
 
@@ -279,9 +286,12 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     return kept
 
 
-def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> bool:
-    """Whether the reference controller keeps the ship on every path; adds to the notes how well."""
-    bounded, bound = True, bound_of(model)
+def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -> tuple[bool, bool]:
+    """Whether the reference controller keeps the ship on every path; adds to the notes how well.
+
+    Then whether the nominal ship is lost wherever this one is.
+    """
+    bounded, both, bound = True, True, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
     for reference, distance in zip(REFERENCES, distances, strict=True):
@@ -296,6 +306,9 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
             notes.append(
                 "it holds without wind, waves and current: they are too strong for the thrusters"
             )
+            both = False
         elif largest_distance(reference, nominal) >= bound:
-            notes.append("the nominal model is not held there either")
-    return bounded
+            notes.append(NOR_NOMINAL)
+        else:
+            both = False
+    return bounded, both and not bounded

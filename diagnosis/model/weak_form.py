@@ -236,7 +236,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
-    driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, nu))
+    driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, halfway(w, nu)))
     driven = driven @ model.effective_thrust.T
     if w.run.name in model.given:
         driven = driven + w.smooth @ model.given[w.run.name].at(eta, nu)
@@ -268,12 +268,27 @@ def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> 
     Args:
         w: windows of the run.
         model: whose thrusters.
-        nu: (n, 3), body-fixed velocity, zero where it is not known; by default the smoothed one.
+        nu: (n, 3), body-fixed velocity, zero where it is not known; by default that halfway.
     """
     model = model.during(w.run.name)
     if nu is None:
-        nu = np.where(w.known[:, None], w.smoothed.nu, 0.0)
+        nu = halfway(w, np.where(w.known[:, None], w.smoothed.nu, 0.0))
     return thrust(w.run, model, _response(w, model), nu)
+
+
+def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
+    """Velocity (n, 3) between each sample of a run and the next, at which a thruster's force is taken.
+
+    A force that goes with speed, as a rudder's, would else come half a sampling period late.
+
+    Args:
+        w: windows of the run.
+        nu: (n, 3), at the samples, zero where it is not known.
+    """
+    both = w.known[:-1] & w.known[1:]
+    middle = nu.copy()
+    middle[:-1][both] += 0.5 * (nu[1:] - nu[:-1])[both]
+    return middle
 
 
 def arriving(w: WeakWindows, model: Model) -> np.ndarray:

@@ -4,17 +4,26 @@ Of each kind one function, which registers itself. It gives the path that one un
 what velocity and yaw rate say, so that the fault is found by least squares together with all others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from fmus.scale import Scale
 
-from .evidence import Evidence
+from .evidence import Evidence, integral
 
 Needs = Literal["velocity", "rate"]
-Kind = Literal["clock_rate", "clock_gap", "scale", "offset", "place", "delay", "wrap"]
+Deviation = Literal["deviation_sin", "deviation_cos", "deviation_sin_2", "deviation_cos_2"]
+Kind = Literal["clock_rate", "clock_gap", "scale", "offset", "place", "delay", "wrap", Deviation]
+# What iron aboard does to a compass, B, C, D and E of its deviation (The American Practical Navigator,
+# Bowditch, chapter on compasses): kind -> function of the heading.
+DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
+    "deviation_sin": np.sin,
+    "deviation_cos": np.cos,
+    "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
+    "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
+}
 # Smaller faults are not told, as they matter in no manoeuvre; metres and seconds are those of CyberShip
 # Enterprise 1, times the scale of the ship. All chosen.
 LEAST_SCALE = 0.005  # of the channel
@@ -141,6 +150,21 @@ def rate_delay(e: Evidence, scale: Scale) -> Column:
     assert e.rate is not None
     path = _path(e, turn=e.rate)
     return Column("r", "delay", "s", "rate", path, LEAST_DELAY * _period(e), False)
+
+
+def deviations(e: Evidence) -> list[Column]:
+    """The heading is measured too large by the value times a function of itself.
+
+    Velocity in the ship's own axes is turned by it. Without a yaw rate nothing shows it.
+    """
+    made = []
+    for kind, law in DEVIATIONS.items() if e.rate is not None else ():
+        path = _path(e, turn=law(e.psi))
+        if e.by == ("u", "v") and e.velocity is not None:
+            across = np.column_stack([e.velocity[:, 1], -e.velocity[:, 0]]) * path[:, 2:]
+            path[:, :2] = integral(e.time, across)
+        made.append(Column("psi", kind, "rad", "rate", path, LEAST_ANGLE, False))
+    return made
 
 
 def _period(e: Evidence) -> float:

@@ -12,7 +12,7 @@ from fmus.scale import Scale
 from ..data import Run
 from ..data.cleaning import noise
 from .clock_path import DRIFT, HEADING, TURN, PathProblem, Solution, integral_of
-from .constants import LEAST_SCALE, Column, columns
+from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
 from .evidence import Evidence, evidence
 from .gaps import Gap, gaps
 from .repairing import Correction, corrected
@@ -21,10 +21,13 @@ from .sensor_finding import Z95, Examined, SensorFinding
 SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
 # Fall of -2 log L by which a clock that wanders is believed: 0.1 % by chance is 10.8 for one variance.
 LIKELIER = 12.0
+DEVIATES = 20.0  # the same for the four coefficients of a compass' deviation: 0.1 % by chance is 18.5
 LEAST_CLOCK = 0.01  # of the rate: a clock that is nearer to one does no harm (chosen)
 STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
 TURNS = 0.02  # standard deviation of the yaw rate's scale up to which turns tell the clock (chosen)
+SWING = 2.0 * np.pi  # rad: headings all round, as a ship is swung to adjust its compass
 CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
+CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
 STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
 LEAST_NOISE = 1e-6  # m, rad; keeps the equations well-posed where nothing is noisy
@@ -38,12 +41,14 @@ class Motion(NamedTuple):
         solution: with a clock that wanders, or without.
         wanders: whether it does.
         kept: constant faults that are sure and matter.
+        either: whether a compass that is off by heading would look like that clock.
     """
 
     problem: PathProblem
     solution: Solution
     wanders: bool
     kept: list[Column]
+    either: bool = False
 
     @property
     def std(self) -> np.ndarray:
@@ -91,10 +96,11 @@ def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFindi
     """What findings say of the run."""
     values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
     rates = [f.value for f in fixes if f.kind == "clock_rate"]
-    if not (found.wanders or rates or jumps):
+    wanders = found.wanders and not found.either
+    if not (wanders or rates or jumps):
         return Correction(values)
     problem, clock = found.problem, found.solution.clock
-    if not found.wanders:
+    if not wanders:
         clock = np.full_like(clock, rates[0] if rates else 1.0)
     true = problem.edges[0] + integral_of(problem.edges, np.where(problem.cut, 1.0, clock))
     return Correction(values, problem.edges, true, jumps)
@@ -114,12 +120,21 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
     wanders = tight.criterion - loose.criterion > LIKELIER
     wanders = wanders and _uneven(Motion(wandering, loose, True, []))
     columns, solution = (free, loose) if wanders else (list(every), tight)
+    swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
+    if e.rate is not None and (
+        swung or wanders
+    ):  # a compass off by heading looks like a wandering clock
+        deviating = [*every, *deviations(e)]
+        told = PathProblem(e, deviating, sizes, cut, without).solve(fixed_clock=True)
+        either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
+        if either and swung:
+            columns, solution, wanders, either = deviating, told, False, False
     while True:
         kept = _sure(columns, solution)
         problem = PathProblem(e, kept, sizes, cut, without)
         solution = problem.solve(fixed_clock=not wanders)
         if len(kept) == len(columns):
-            return Motion(problem, solution, wanders, kept)
+            return Motion(problem, solution, wanders, kept, either)
         columns = kept
 
 
@@ -141,7 +156,8 @@ def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
 def _clock(found: Motion) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     if found.wanders:
-        return [_rate(*stretch) for stretch in _stretches(found)]
+        alike = tuple(DEVIATIONS) if found.either else ()
+        return [replace(_rate(*each), alike=alike, repaired=not alike) for each in _stretches(found)]
     scales = _even(found)
     if scales is None:
         return []
@@ -182,9 +198,11 @@ def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
         if c.kind == "scale" and by_clock:
             continue
         value, half = (1.0 / (1.0 - x), Z95 * s / (1.0 - x) ** 2) if c.kind == "scale" else (x, Z95 * s)
-        alone = c.kind == "scale" and not found.wanders and not turns
+        # No speed tells whether the clock is at fault; nearer to one it does no harm.
+        only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
+        alone = c.kind == "scale" and not found.wanders and (only or not turns)
         alike = ("clock_rate",) if alone else ()
-        text = _told(c, value, e) + (f"; {CLOCK_OR_SCALE}" if alone else "")
+        text = _told(c, value, e) + (f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}" if alone else "")
         interval = value - half, value + half
         made.append(
             SensorFinding(c.channel, c.kind, value, c.unit, interval, begin, end, text, alike, not alone)
@@ -209,6 +227,9 @@ def _told(c: Column, value: float, e: Evidence) -> str:
     if c.kind == "place":
         way = {"x": ("ahead", "aft"), "y": ("to starboard", "to port")}[c.channel][value < 0.0]
         return f"the position is measured {abs(value):.3g} m {way} of where the velocity is"
+    if c.kind in DEVIATIONS:
+        by = c.kind.removeprefix("deviation_").replace("sin_2", "sin 2").replace("cos_2", "cos 2")
+        return f"psi reads {np.degrees(value):.3g}° times {by} ψ too much, as a compass beside iron does"
     if c.unit == "rad":
         return f"{name} and the axes of the velocity differ by {np.degrees(value):.3g}°"
     return f"{name} is {np.degrees(value):.3g}°/s too large"

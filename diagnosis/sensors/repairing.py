@@ -8,6 +8,7 @@ import numpy as np
 from fmus.frames import rotate_to_body, rotate_to_earth
 
 from ..data import Run
+from .constants import DEVIATIONS
 from .evidence import Evidence
 from .gaps import Gap
 
@@ -42,8 +43,12 @@ def corrected(e: Evidence, fix: Correction) -> Run:
     Of a log that was filled between telegrams only the rows with a telegram keep a pose where the clock
     is repaired: others are on no line any more.
     """
-    run, time, psi = e.run, e.time, e.psi.copy()
+    run, time = e.run, e.time
     measured, pose = dict(run.measured), run.pose.copy()
+    deviation = sum(
+        (fix.of("psi", k) * law(e.psi) for k, law in DEVIATIONS.items()), np.zeros(time.size)
+    )
+    psi, pose[:, 2] = e.psi - deviation, pose[:, 2] - deviation
     rate = e.rate
     if rate is not None:
         late = _later(time, rate, fix.of("r", "delay"))
@@ -53,7 +58,7 @@ def corrected(e: Evidence, fix: Correction) -> Run:
         velocity = _punctual(e, fix.of(e.by[0], "delay")) / fix.of(e.by[0], "scale", 1.0)
         heading = fix.of("psi", "offset")
         axes = fix.of(e.by[1], "offset") * (-1.0 if e.by[1] == "y_dot" else 1.0)
-        turned = np.full(time.size, heading or axes)
+        turned = (heading or axes) + (deviation if e.by == ("u", "v") else np.zeros(time.size))
         velocity = np.column_stack(rotate_to_body(turned, *velocity.T))
         if heading and heading_is_off(e, heading):
             psi, pose[:, 2] = psi - heading, pose[:, 2] - heading
