@@ -32,7 +32,16 @@ def broken(promised, present):
     def still(line):
         if line in present or not line.endswith(")"):
             return line in present
-        further = [p[len(line) - 1 : -1].split(", ") for p in present if p.startswith(line[:-1])]
+        name, _, inside = line[:-1].partition("(*, ")
+        if inside:  # by keyword alone, in any order
+            now = [
+                p[:-1].partition("(*, ")[2].split(", ") for p in present if p.startswith(f"{name}(*, ")
+            ]
+            further = [
+                set(p) - set(inside.split(", ")) for p in now if set(p) >= set(inside.split(", "))
+            ]
+        else:
+            further = [p[len(line) - 1 : -1].split(", ") for p in present if p.startswith(line[:-1])]
         return any(all("=" in a or a in ("", "*") for a in arguments) for arguments in further)
 
     return [f"{line.strip()} {ADVICE}" for line in promised if not still(line.removesuffix(MARK))]
@@ -58,6 +67,8 @@ def test_page_of_public_names_is_up_to_date():
         ("f(a, b=1)", "f(a, b=1, c=None)", False),
         ("f(a)", "f(a, *, c=None, d=2)", False),
         ("f()", "f(c=None)", False),
+        ("f(*, a, b)", "f(*, a, c=None, b)", False),
+        ("f(*, a, b)", "f(*, a, c, b)", True),
         ("f(a)", "f(a, b)", True),
         ("f(a)", "f(a, b=1, c)", True),
         ("f(a, b=1)", "f(a, b=2)", True),

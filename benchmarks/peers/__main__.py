@@ -132,7 +132,7 @@ def write(folder: Path, runs: Sequence[str]) -> Path:
     report.text(
         """Errors in the project's windows of the run that nobody learned from, from the same start
         states; behind them geometric means of nominal over own error, and processor time for a run left
-        out [s], search included; what runs left out share is counted once. """
+        out [s], search included. """
         f"{', '.join(f'{p} {version(p)}' for p in packages)}."
     )
     report.table(["method", *runs, "position", "heading", "time"], rows(folder, runs))
