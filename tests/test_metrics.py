@@ -347,6 +347,16 @@ class TestPlots:
                     assert label.width == 0.0 or label.x1 < min(n.x0 for n in numbers)
                     assert panel.get_window_extent().y1 < legend.y0
 
+    @pytest.mark.parametrize("dpi", ["0", "-1", "1001", "many"])
+    def test_a_size_that_is_none_is_refused(self, dpi, tmp_path, capsys):
+        with pytest.raises(SystemExit) as ended:
+            plots_main([str(tmp_path), "--dpi", dpi])
+        assert ended.value.code == 2
+        assert plots_main([str(tmp_path / "nowhere"), "--dpi", "1000"]) == 2, (
+            "allowed, but there is no run"
+        )
+        assert "nowhere" in capsys.readouterr().err
+
     def test_a_picture_is_drawn_once(self, tmp_path, monkeypatch):
         """Measuring its letters, or a first pass for its size, would take as long again."""
         from matplotlib.figure import Figure
