@@ -390,6 +390,7 @@ def test_real_runs_have_the_same_parts(found, tmp_path, monkeypatch, drawn):
     text = told(tmp_path, chapter7.measured, tmp_path)
     assert asked == [([tmp_path / "a.mat"], "smoothed")]
     assert "NTNU's runs run0, run1 in a row" in text
+    assert "limits of Algorithm 4: 1 passes, not at rest, the blocker" in text
     rows = [line for line in text.splitlines() if line.startswith("| PLS1 |")]
     assert rows[0].endswith("| – |")
     for part in ("4 components explain", "| Three factors suffice", "| least squares |"):
