@@ -26,6 +26,7 @@ FOUND, BELIEVED = 0.8, 0.5
 # Confidence at the most where something acts on the axes of an effect that it does not explain: whether
 # it is a cause or stands in for a part of the other is even odds, as long as the other is not known.
 EVEN_ODDS = 0.5
+MAY_BE_NONE = "by the interval of its value it may be nothing"
 BESIDE = "something that it does not explain acts on the same axis"
 
 
@@ -88,11 +89,22 @@ def concluded(found: Findings, runs: Sequence[WeakWindows], unseen: Unseen, star
 
 
 def limited(f: Finding, start: Model) -> Finding:
-    """A finding; with a value at the limit of its range it is none."""
+    """A finding; with a value at the limit of its range it is none.
+
+    One that may as well be nothing at all, by the interval of its only value, is even odds at the most.
+    """
     at = at_limit(start, f.id, f.values)
     if not at:
-        return f
+        return replace(f, confidence=EVEN_ODDS, doubt=MAY_BE_NONE) if _may_be_none(f) else f
     return replace(f, confidence=0.0, together=0.0, doubt=AT_LIMIT.format(" and ".join(at)))
+
+
+def _may_be_none(f: Finding) -> bool:
+    """Whether the 95 % interval of the only value holds zero, though it is more sure than even odds."""
+    if len(f.values) != 1 or not f.confidence > EVEN_ODDS:
+        return False
+    low, high = f.ci95.get(next(iter(f.values)), (np.nan, np.nan))
+    return low <= 0.0 <= high
 
 
 def doubted(learned: Findings, remainder: Remainder, start: Model) -> Findings:

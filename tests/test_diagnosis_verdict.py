@@ -413,6 +413,14 @@ def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     assert ("limit of what was looked for" in seen.doubt) != is_finding
 
 
+@pytest.mark.parametrize(("interval", "sure"), [((-0.01, 0.05), False), ((0.01, 0.05), True)])
+def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
+    f = Finding("lag", {"lag": 0.02}, {"lag": interval}, 0.94, [], 0.9, 0.9, together=0.94)
+    seen = limited(f, Model())
+    assert seen.confidence == (0.94 if sure else 0.5)
+    assert ("may be nothing" in seen.doubt) != sure
+
+
 def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():
     (w, *_) = voyages(**SHORT)
     model = Model()
