@@ -14,6 +14,7 @@ from cosim import InputError
 from diagnosis import Model
 from diagnosis.assessment import free_runs
 from diagnosis.data import Run
+from diagnosis.identification import DEFAULT
 from diagnosis.model import ship_with
 from diagnosis.sensors import examine
 from studies import research_vessel, ship_folds, tanker
@@ -43,7 +44,7 @@ def test_the_nominal_tanker_is_as_wrong_as_published_models_are():
         assert N < 50.0
     assert runs[0].measured["propeller.thrust"].mean() == pytest.approx(41.0, abs=5.0)
     with pytest.raises(InputError, match="no zig-zags"):
-        tanker.study(VESSEL, TANKER, None, True)
+        tanker.study(VESSEL, TANKER, None, "selection", True)
 
 
 @needs_vessel
@@ -66,9 +67,9 @@ def test_the_sea_trial_is_repaired_and_cut_into_its_manoeuvres():
 def test_a_file_with_other_columns_is_refused(tmp_path):
     pd.DataFrame({"t": [0.0], "x": [0.0]}).to_csv(tmp_path / "z_10_10.csv", index=False)
     with pytest.raises(InputError, match="has no column 'y'"):
-        tanker.study(tmp_path, tmp_path / "out", None, False)
+        tanker.study(tmp_path, tmp_path / "out", None, "selection", False)
     with pytest.raises(InputError, match="no trial"):
-        research_vessel.study(tmp_path, tmp_path / "out", None, False)
+        research_vessel.study(tmp_path, tmp_path / "out", None, "selection", False)
 
 
 def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
@@ -83,7 +84,7 @@ def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
     monkeypatch.setattr(ship_folds, "diagnosis_content", lambda found, *_: f"content {found}")
     for folds in (2, 3, None):
         seen.clear()
-        found = list(ship_folds.learn_folds(runs, folds, Model(), lambda _: None))
+        found = list(ship_folds.learn_folds(runs, folds, Model(), "selection", lambda _: None))
         left_out = [name for fold in found for name in fold.left_out]
         assert sorted(left_out) == [w.run.name for w in runs]
         for fold in found:
@@ -93,7 +94,7 @@ def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
             assert not set(rest) & set(out)
             assert len(rest) + len(out) == 5
     with pytest.raises(InputError, match="nothing is left to learn from"):
-        list(ship_folds.learn_folds(runs[:1], None, Model(), lambda _: None))
+        list(ship_folds.learn_folds(runs[:1], None, Model(), "selection", lambda _: None))
 
 
 def test_a_steady_circle_is_measured_by_its_last_half():
@@ -343,7 +344,7 @@ def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
 
     monkeypatch.setattr(diagnosis, "gather", gather)
     monkeypatch.setattr(research_vessel, "learn_folds", lambda runs, folds, *_: [(len(runs), folds)])
-    text = research_vessel.study(tmp_path, tmp_path / "a", 3, False).read_text("utf-8")
+    text = research_vessel.study(tmp_path, tmp_path / "a", 3, "selection", False).read_text("utf-8")
     assert asked["model"].vessel == {"marker_offset_dx": 2.5}
     assert (asked["parts"], asked["folds"]) == (17, [(17, 3)])
     assert asked["horizon"] == research_vessel.HORIZON
@@ -352,7 +353,7 @@ def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
     assert "## 2 trials" in text
     assert "windows of 10 s" in text
     place.kind = "scale"
-    research_vessel.study(tmp_path, tmp_path / "b", None, True)
+    research_vessel.study(tmp_path, tmp_path / "b", None, "selection", True)
     assert asked["model"].vessel == {"marker_offset_dx": 2.0}
     assert asked["parts"] == 6, "a third"
 
@@ -370,9 +371,9 @@ def test_zig_zags_are_learned_from_in_their_order(tmp_path, monkeypatch):
     monkeypatch.setattr(diagnosis, "gather", gather)
     monkeypatch.setattr(tanker, "learn_folds", lambda runs, folds, *_: [folds])
     monkeypatch.setattr(tanker, "write_folds", lambda report, found: asked.append(found))
-    text = tanker.study(tmp_path, tmp_path / "out", 3, False).read_text("utf-8")
+    text = tanker.study(tmp_path, tmp_path / "out", 3, "selection", False).read_text("utf-8")
     assert "5 zig-zags" in text
-    tanker.study(tmp_path, tmp_path / "out", None, True)
+    tanker.study(tmp_path, tmp_path / "out", None, "selection", True)
     assert asked == [["z_1", "z_2", "z_3", "z_4", "z_5"], [3], ["z_1", "z_5"], [None]]
 
 
@@ -389,7 +390,7 @@ def test_command_asks_for_its_folds(module, arguments, folds, quick, monkeypatch
     module.main()
     (work,) = asked
     assert work.func is module.study
-    assert [*work.args] == [tmp_path, tmp_path / "out", folds, quick]
+    assert [*work.args] == [tmp_path, tmp_path / "out", folds, DEFAULT, quick]
     monkeypatch.setattr(sys, "argv", [*command, "--seeds", "3"])
     with pytest.raises(SystemExit):
         module.main()
