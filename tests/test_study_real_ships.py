@@ -76,7 +76,8 @@ def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
     seen = []
     runs = [SimpleNamespace(run=SimpleNamespace(name=f"run {k}")) for k in range(5)]
 
-    def diagnose(rest, out, **_):
+    def diagnose(rest, out, **given):
+        assert given["by"] == "selection"
         seen.append(([w.run.name for w in rest], [w.run.name for w in out]))
         return f"without {len(out)}"
 
@@ -391,6 +392,9 @@ def test_command_asks_for_its_folds(module, arguments, folds, quick, monkeypatch
     (work,) = asked
     assert work.func is module.study
     assert [*work.args] == [tmp_path, tmp_path / "out", folds, DEFAULT, quick]
+    monkeypatch.setattr(sys, "argv", [*command, "--calibrate"])
+    module.main()
+    assert asked.pop().args[3].name == "calibration"
     monkeypatch.setattr(sys, "argv", [*command, "--seeds", "3"])
     with pytest.raises(SystemExit):
         module.main()
