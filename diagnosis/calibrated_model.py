@@ -43,10 +43,9 @@ FEWEST = 4  # runs, from which on constants of each are told from coefficients; 
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
 # (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms; half
 # a unit of X_uuu is three tenths of the resistance of both at their speed.
-LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), 3.0) | {
-    "X_u": 0.5,
-    "X_uuu": 0.5,
-}
+LIFT, RESISTANCE = 3.0, 0.5
+LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
+LEFT_OUT |= dict.fromkeys(("X_u", "X_uuu"), RESISTANCE)
 HEADING, AXIS = "heading_offset", 0.035  # rad, of a heading's axis: two degrees; chosen
 CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
 FLOOR = 0.05  # of the mean square that is missed: what is not linear about a prediction; chosen

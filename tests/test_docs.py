@@ -75,6 +75,7 @@ def constants():
 def modules_with_constants():
     """The modules of the diagnosis in which the constants of the table may stand."""
     yield diagnosis.decision
+    yield diagnosis.calibrated_model
     parts = (diagnosis.smoothing, diagnosis.model, diagnosis.assessment, diagnosis.identification)
     for part in parts:
         for found in pkgutil.iter_modules(part.__path__, f"{part.__name__}."):
