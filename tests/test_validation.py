@@ -15,7 +15,15 @@ from cosim.campaign import Posterior
 from diagnosis import compare
 from diagnosis.prediction_error.push import Push
 from diagnosis.validation import FILES, json_schema, read_criteria, template
-from diagnosis.validation.budget import Budget, Learned, Sources, budget, combined, sources_of
+from diagnosis.validation.budget import (
+    Budget,
+    Learned,
+    Sources,
+    budget,
+    combined,
+    read_learned,
+    sources_of,
+)
 from diagnosis.validation.criterion import Criterion
 from diagnosis.validation.judged_criterion import Predicted, decide, judge
 from diagnosis.validation.pdf import table
@@ -355,3 +363,38 @@ def test_tables_fit_into_their_lines():
     lines = list(table(rows, 60))
     assert max(map(len, lines)) <= 60
     assert "".join(lines).count("words") == 40
+
+
+LEFT = json.dumps({"unrecorded": {"size": [0.1, 0.2, 0.3], "time": [1.0, 2.0, 3.0]}})
+KNOWN = json.dumps({"names": ["vessel.m"], "units": ["kg"], "mean": [15.0], "covariance": [[0.01]]})
+
+
+@pytest.mark.parametrize(
+    ("diagnosis_json", "posterior_json"),
+    [
+        ("{", KNOWN),
+        ("[]", KNOWN),
+        (LEFT.replace("0.1", "null"), KNOWN),
+        (LEFT.replace("1.0", "0.0"), KNOWN),
+        (LEFT, "{"),
+        (LEFT, "[]"),
+        (LEFT, KNOWN.replace("0.01", "-1.0")),
+        (None, KNOWN),
+    ],
+)
+def test_what_is_no_result_of_learn_is_refused_with_one_line(tmp_path, diagnosis_json, posterior_json):
+    if diagnosis_json is not None:
+        (tmp_path / "diagnosis.json").write_text(diagnosis_json)
+    (tmp_path / "posterior.json").write_text(posterior_json)
+    with pytest.raises(InputError) as refused:
+        read_learned(tmp_path)
+    assert "\n" not in str(refused.value)
+
+
+def test_what_learn_wrote_is_read(tmp_path):
+    (tmp_path / "diagnosis.json").write_text(LEFT)
+    assert read_learned(tmp_path).posterior is None, "where nothing was fitted"
+    (tmp_path / "posterior.json").write_text(KNOWN)
+    found = read_learned(tmp_path)
+    assert found.push.size.tolist() == [0.1, 0.2, 0.3]
+    assert list(found.posterior.names) == ["vessel.m"]

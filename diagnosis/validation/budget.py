@@ -57,13 +57,13 @@ def read_learned(folder: str | Path) -> Learned:
     try:
         told = json.loads(path.read_text(encoding="utf-8"))["unrecorded"]
         size, time = (np.array(told[key], float).reshape(3) for key in ("size", "time"))
+        some = other.exists() and json.loads(other.read_text(encoding="utf-8"))["names"]
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
+        raise InputError(f"'{error.filename}' cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise InputError(f"'{path}' does not say which unrecorded force is left") from None
+        raise InputError(f"'{folder}' does not say what 'learn' has left") from None
     if not (np.isfinite([size, time]).all() and (size >= 0.0).all() and (time > 0.0).all()):
         raise InputError(f"'{path}': the unrecorded force has no size and time")
-    some = other.exists() and json.loads(other.read_text(encoding="utf-8")).get("names")
     posterior = read_posterior(other) if some else None
     return Learned(posterior, Push(size, time), (path, *([other] if some else [])))
 
