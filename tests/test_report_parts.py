@@ -114,13 +114,13 @@ def test_what_is_sure_is_a_fact_and_comes_first():
         == "Possibly delay or lag or deadband (50 % for delay): There is delay. But it is at its limit."
     )
     assert headline.told(effect("lag", None)) == "Possibly lag: There is lag."
-    both = headline.headline("found", [unsure, sure], [], [], False)
+    both = headline.headline("found", [unsure, sure], [], [], False, False)
     assert both == f"{headline.told(sure)} {headline.told(unsure)}"
 
 
 def test_headline_of_each_verdict():
-    def said(verdict, possibilities=(), suspects=(), something=False):
-        return headline.headline(verdict, [], list(possibilities), list(suspects), something)
+    def said(verdict, possibilities=(), suspects=(), something=False, calibrated=False):
+        return headline.headline(verdict, [], list(possibilities), list(suspects), something, calibrated)
 
     suspects = [
         SimpleNamespace(name=n, description=d)
@@ -129,6 +129,7 @@ def test_headline_of_each_verdict():
     assert said("none") == headline.NOTHING_FOUND
     assert said("none", something=True) == headline.TOO_LITTLE
     assert said("unexplained") == headline.UNEXPLAINED
+    assert said("unexplained", calibrated=True) != headline.UNEXPLAINED
     assert said("unexplained", [effect("lag", 0.1)]) == headline.NOT_BELIEVED
     assert ", above all a (mass) and b; no effect" in said("coefficients", suspects=suspects[:2])
     assert ", above all b; no effect" in said("coefficients", suspects=suspects[1:2])

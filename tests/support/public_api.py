@@ -11,6 +11,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+from pydantic import BaseModel
+
 PACKAGES = ("cosim", "diagnosis", "fmus")
 PLAIN = (type(None), bool, int, float, str)
 HEAD = """# Public names
@@ -23,6 +25,8 @@ no plain values are shown as `...`. This page is what `python tests/support/publ
 
 def arguments(called: Any) -> str:
     """The arguments of something that can be called, without types."""
+    if isinstance(called, type) and issubclass(called, BaseModel):
+        called.model_rebuild()  # it knows its arguments once it was used
     try:
         signature = inspect.signature(called)
     except (TypeError, ValueError):  # a class of exceptions
