@@ -26,6 +26,8 @@ from .smoothing import Smoothed, smooth
 # that grows evenly to 2 %, with five to 3 %, with three to 23 %.
 FEWEST = 6
 MOST_SPIKES = 0.1  # of the samples; chosen: of a run of the real ship 7 % are spikes, and it can be used
+# A part of a log tells less of its clock than the whole.
+WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
 
 
 def gather(
@@ -122,8 +124,10 @@ def _refuse_unrepaired(examined: Examined) -> None:
     """
     for finding in examined.findings:
         if not finding.repaired:
-            told = "what else is measured does not tell how to repair that"
-            raise InputError(f"run '{examined.run.name}': {finding.sentence}; {told}; {GO_ON}")
+            raise InputError(
+                f"run '{examined.run.name}': {finding.sentence}; what else is measured does not tell how "
+                f"to repair that; if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
+            )
 
 
 def _windows(smoothed: Smoothed, anyway: bool, horizon: float | None) -> WeakWindows:
@@ -162,8 +166,7 @@ def _remedy(s: Smoothed) -> str:
     """What may be done with a run whose pose is not that of a ship."""
     if not s.track.run.measured:
         return "leave the cells of false samples empty"
-    # A part of a log tells less of its clock than the whole.
-    return "repair the whole log by its other channels (cybership repair) and take the part of that"
+    return WHOLE_FIRST
 
 
 def _refuse_spikes(s: Smoothed) -> None:
