@@ -125,8 +125,8 @@ def _refuse_unrepaired(examined: Examined) -> None:
     for finding in examined.findings:
         if not finding.repaired:
             raise InputError(
-                f"run '{examined.run.name}': {finding.sentence}; what else is measured does not tell how "
-                f"to repair that; if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
+                f"run '{examined.run.name}': {finding.sentence}; what else is measured does not tell "
+                f"how to repair that; if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
             )
 
 
