@@ -25,9 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def pca(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .analysis import gather_samples  # only now: it takes a second to import
-    from .analysis.document import write_document, write_json
     from .analysis.outlier_report import analyse, content, document, sentences
     from .model import ship_with
+    from .report.document import write_document, write_json
 
     of = ship_with((), options.ship)
     with together(options.out, FILES) as new:

@@ -29,12 +29,12 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
     recipe = recipes.recipe(options.recipe)
     recipe.transformer()  # before any work: a library may be missing
     from .analysis.constrained_fit import nearest_stable
-    from .analysis.document import write_document, write_json
     from .analysis.into_the_plant import as_model, goes_into_the_plant, thrust_of
     from .analysis.partial_least_squares import regressed
     from .analysis.pls_report import content, document, sentences
     from .analysis.samples import joined, without_outliers
     from .model import ship_with, write_model
+    from .report.document import write_document, write_json
 
     of = ship_with((), options.ship)
     with together(options.out, FILES) as new:

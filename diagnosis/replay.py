@@ -24,10 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def replay(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .analysis.document import write_document, write_json  # only now: it takes a second to import
     from .open_loop import gather_source, loop_of, play
     from .open_loop.replay_report import content, document, sentences, write_series
     from .open_loop.replayed import replayed
+    from .report.document import write_document, write_json  # only now: it takes a second to import
 
     with together(options.out, FILES) as new:
         advance("reading")

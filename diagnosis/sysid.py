@@ -27,9 +27,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def sysid(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .analysis import gather_samples, table_7_1  # only now: it takes a second to import
-    from .analysis.document import write_document, write_json
     from .analysis.sysid_report import content, document, result, sentences
     from .model import write_model
+    from .report.document import write_document, write_json
 
     row = None if options.recipe is None else table_7_1.row(options.recipe)
     if row is None and not options.runs:

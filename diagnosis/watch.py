@@ -24,9 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def watch(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .analysis.document import write_document, write_json  # only now: it takes a second to import
     from .open_loop import gather_source, play, watch_loop
     from .open_loop.thruster_report import WATCH, content, document, sentences
+    from .report.document import write_document, write_json  # only now: it takes a second to import
 
     with together(options.out, FILES) as new:
         advance("reading")

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number, percent
 from . import analysis_figures as pictures
-from .document import Document, Plot, Section, Table, numbers
 from .principal_components import (
     BLOCKS,
     LEVEL,

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number, percent
 from . import analysis_figures as pictures
 from .constrained_fit import Stable
-from .document import Document, Plot, Section, Table, numbers
 from .into_the_plant import goes_into_the_plant, thrust_of
 from .partial_least_squares import AXES, Fitted, Regressed
 from .principal_components import BLOCKS

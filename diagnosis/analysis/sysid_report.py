@@ -8,10 +8,10 @@ import numpy as np
 
 from fmus.controller.models import SURGE
 
+from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number
 from . import analysis_figures as pictures
 from .concurrent_passes import Identified, explained, identify, regressors, thinned
-from .document import Document, Plot, Section, Table, numbers
 from .into_the_plant import EffectiveThrust, effective_thrust
 from .partial_least_squares import AXES
 from .samples import Samples, joined

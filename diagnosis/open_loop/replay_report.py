@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.document import Document, Plot, Section, Table, numbers
+from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number, percent
 from ..report.panels import figure_of
 from ..report.svg import AFTER, BAND, BEFORE

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from .sections import Section
+from ..report.document import Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,11 +56,11 @@ def _pages(lines: Sequence[Line]) -> "Iterator[Figure]":
 
 def _lines(s: Section) -> Iterator[Line]:
     yield Line("")
-    yield Line(s.title, HEADING)
-    for paragraph in s.paragraphs:
+    yield Line(s.heading, HEADING)
+    for paragraph in s.text:
         yield from map(Line, textwrap.wrap(paragraph, WIDE))
-    if s.rows:
-        yield from map(Line, table([s.heads, *s.rows]))
+    for t in s.tables:
+        yield from map(Line, table([t.header, *t.rows]))
 
 
 def table(rows: Sequence[Sequence[str]], wide: int = WIDE) -> Iterator[str]:

@@ -1,21 +1,18 @@
 """The files of a record: the report as HTML and PDF, the record, its signature."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from ..report.page import environment
-from ..report.svg import inline, style
+from ..report.document import Document, Plot, write_document
+from ..report.svg import style
 from ..result_folder import sha256
 from .error_figure import error_figure
 from .judged_criterion import Judgement
 from .pdf import write_pdf
 from .record_keys import FileResult, RecordContent
-from .sections import Section, sections
+from .sections import sections
 from .signature import public_key, sign
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RECORD, PAGE, PDF, SIGNATURE = (f"validation.{kind}" for kind in ("json", "html", "pdf", "sig"))
 FILES = (RECORD, PAGE, PDF, SIGNATURE)
@@ -36,9 +33,11 @@ def write_record(
         content = content.model_copy(update={"public_key": public_key(key)})
     parts = [*sections(content)]
     with style():
-        figures = _figures(judgements)
-        _write_page(folder / PAGE, parts, figures)
-        write_pdf(folder / PDF, TITLE, parts, [figure for figure, _ in figures])
+        plots = _plots(judgements)
+        write_pdf(folder / PDF, TITLE, parts, [p.figure for p in plots])
+        write_document(
+            folder / PAGE, Document(TITLE, sections=[replace(parts[0], plots=plots), *parts[1:]])
+        )
     reports = [FileResult(role="report", path=name, sha256=sha256(folder / name)) for name in FILES[1:3]]
     text = content.model_copy(update={"reports": tuple(reports)}).model_dump_json(indent=2) + "\n"
     (folder / RECORD).write_bytes(text.encode())
@@ -48,21 +47,10 @@ def write_record(
     return [*FILES]
 
 
-def _figures(judgements: Sequence[Judgement]) -> "list[tuple[Figure, str]]":
-    """The errors of each criterion's windows, and a caption."""
+def _plots(judgements: Sequence[Judgement]) -> list[Plot]:
+    """The errors of each criterion's windows."""
     return [
-        (error_figure(j), f"{j.criterion.title}: error of each window, and the tolerance.")
+        Plot(error_figure(j), f"{j.criterion.title}: error of each window, and the tolerance.")
         for j in judgements
         if j.errors.size
     ]
-
-
-def _write_page(path: Path, parts: Sequence[Section], figures: "list[tuple[Figure, str]]") -> None:
-    from markupsafe import Markup
-
-    drawn = [
-        (Markup(inline(figure, f"errors-{k}", caption)), caption)
-        for k, (figure, caption) in enumerate(figures)
-    ]
-    page = environment().get_template("validation.html")
-    path.write_text(page.render(title=TITLE, sections=parts, figures=drawn), encoding="utf-8")

@@ -1,37 +1,30 @@
 """The report of a record as sections with tables, for the page and for the PDF alike."""
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator
 
+from ..report.document import Section, Table
 from ..report.formatting import NO_VALUE, number
-from .record_keys import JudgementResult, RecordContent
+from .record_keys import JudgementResult, RangeResult, RecordContent
 
 NOT_KNOWN = "not known"
 BUDGET = ("u_D", "initial_state", "parameters", "process_noise", "u_input", "u_num", "u_val")
 CALLED = {"u_D": "measurement u_D", "initial_state": "initial state", "process_noise": "process noise"}
 
 
-class Section(NamedTuple):
-    """A heading with paragraphs, and a table: its heads and rows, empty where there is none."""
-
-    title: str
-    paragraphs: Sequence[str] = ()
-    heads: Sequence[str] = ()
-    rows: Sequence[Sequence[str]] = ()
-
-
 def sections(r: RecordContent) -> Iterator[Section]:
     """The report, in order."""
-    yield Section("Verdict", (), ("criterion", "verdict", "why"), [*map(_verdict, r.judgements)])
+    told = Table(("criterion", "verdict", "why"), [*map(_verdict, r.judgements)], words=True)
+    yield Section("Verdict", tables=[told])
     yield _errors(r)
     yield _uncertainty(r)
     yield Section(
         "Validity range",
         ["What the data cover: least, quantiles and greatest over all samples that are used."],
-        ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest"),
         [
-            (v.signal, v.unit, *map(number, (v.least, v.q05, v.median, v.q95, v.greatest)))
-            for v in r.validity
+            Table(
+                ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest"),
+                [*map(_covered, r.validity)],
+            )
         ],
     )
     faults = [f"{s.run}: {s.sentence}" for s in r.sensors]
@@ -45,6 +38,10 @@ def sections(r: RecordContent) -> Iterator[Section]:
 
 def _verdict(j: JudgementResult) -> tuple[str, str, str]:
     return f"{j.criterion}: {j.requirement}", j.outcome, j.reason
+
+
+def _covered(v: RangeResult) -> tuple[str, ...]:
+    return v.signal, v.unit, *map(number, (v.least, v.q05, v.median, v.q95, v.greatest))
 
 
 def _errors(r: RecordContent) -> Section:
@@ -63,7 +60,7 @@ def _errors(r: RecordContent) -> Section:
         "Bounds of the share, or of the RMS, are one-sided at the confidence of the criterion."
     )
     heads = ("criterion", "unit", "tolerance", "E", "RMS", "largest", "windows", "share or RMS")
-    return Section("Comparison error", [told], heads, rows)
+    return Section("Comparison error", [told], [Table(heads, rows)])
 
 
 def _uncertainty(r: RecordContent) -> Section:
@@ -77,7 +74,7 @@ def _uncertainty(r: RecordContent) -> Section:
         "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."
     )
     heads = ("criterion", "unit", *(CALLED.get(name, name) for name in BUDGET))
-    return Section("Uncertainty", [told], heads, rows)
+    return Section("Uncertainty", [told], [Table(heads, rows)])
 
 
 def _known(u: float | None) -> str:
@@ -98,4 +95,4 @@ def _origin(r: RecordContent) -> Section:
     ]
     purpose = [f"Purpose: {c.purpose}."] if c.purpose else []
     told = r.fmu.sentences if r.fmu else []
-    return Section("Made with", [*purpose, *told], ("", ""), rows)
+    return Section("Made with", [*purpose, *told], [Table(("", ""), rows, words=True)])

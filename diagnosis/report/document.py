@@ -1,4 +1,4 @@
-"""The report of an analysis: text, tables and figures in one HTML page, in the style of the report."""
+"""A document of sections with text, tables and figures as one HTML page, in the style of the report."""
 
 import json
 import math
@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cosim
 
-from ..report import formatting
-from ..report.svg import data_uri, inline, style
+from . import formatting
+from .page import environment
+from .svg import inline, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TEMPLATE = "analysis.html"
+TEMPLATE = "document.html"
 
 
 class Table(NamedTuple):
-    """A table: names of the columns, and rows of which the first cell is the row's name."""
+    """A table: names of the columns, and rows of which the first cell is the row's name.
+
+    The other cells hold numbers, or words.
+    """
 
     header: Sequence[str]
     rows: Sequence[Sequence[Any]]
+    words: bool = False
 
 
 class Plot(NamedTuple):
@@ -60,8 +65,8 @@ class Document:
     """
 
     title: str
-    lead: str
-    sections: list[Section] = field(default_factory=list)
+    lead: str = ""
+    sections: Sequence[Section] = field(default_factory=list)
     provenance: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -72,25 +77,17 @@ def write_document(path: Path, document: Document) -> None:
         path: of the file.
         document: its content.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    folders = [Path(__file__).parent, Path(formatting.__file__).parent]
-    environment = Environment(
-        loader=FileSystemLoader(folders),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["data_uri"] = data_uri
     with style():
         drawn = {
             (k, j): Markup(inline(plot.figure, f"plot-{k}-{j}", plot.caption))
             for k, section in enumerate(document.sections)
             for j, plot in enumerate(section.plots)
         }
-    text = environment.get_template(TEMPLATE).render(document=document, drawn=drawn)
+    text = (
+        environment().get_template(TEMPLATE).render(title=document.title, document=document, drawn=drawn)
+    )
     with cosim.atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8")
 
