@@ -19,6 +19,7 @@ __all__ = [
     "FAILED",
     "INTERRUPTED",
     "Output",
+    "command_parser",
     "complain",
     "folder_name",
     "missing_extra",
@@ -73,6 +74,22 @@ def complain(message: object, kind: str = "error: ") -> None:
 def program(module: str) -> str:
     """The name of a command in its usage line: ``cybership NAME`` if that began it."""
     return sys.argv[0] if sys.argv[0].startswith("cybership ") else f"python -m {module}"
+
+
+def command_parser(module: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser of the command that a module is.
+
+    Args:
+        module: ``python -m`` runs it.
+        description: what the command does.
+        epilog: examples and exit codes, line by line.
+    """
+    return argparse.ArgumentParser(
+        prog=program(module),
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 def whole_number(least: int) -> Callable[[str], int]:

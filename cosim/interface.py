@@ -8,10 +8,9 @@ if __name__ == "__main__":
 
     supervised()  # before all other imports, which take a while
 
-import argparse
 from collections.abc import Iterable, Sequence
 
-from .command import BAD_INPUT, Output, complain, printable, program, run_command
+from .command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 from .errors import InputError
 from .fmu.fmu_model import Variable
 from .scenario.load import load_scenario
@@ -21,13 +20,11 @@ from .system.system import System
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.interface"),
-        description="Tables of what each FMU of a scenario gets and gives: names, units, descriptions, "
+    parser = command_parser(
+        "cosim.interface",
+        "Tables of what each FMU of a scenario gets and gives: names, units, descriptions, "
         "and where values come from and go to.",
-        epilog="examples:  %(prog)s scenarios/ellipse.json\n"
-        "           %(prog)s system.ssp > interface.md",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "examples:  %(prog)s scenarios/ellipse.json\n           %(prog)s system.ssp > interface.md",
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file, SSP archive or OSP directory")
     options = parser.parse_args(arguments)

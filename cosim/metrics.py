@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from .command import BAD_INPUT, Output, complain, program, run_command
+from .command import BAD_INPUT, Output, command_parser, complain, run_command
 from .errors import InputError
 from .files import atomic_write
 from .results.log import CSV, Log, read_log
@@ -37,16 +37,15 @@ def _write_csv(file: Path, columns: Mapping[str, np.ndarray]) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.metrics"),
-        description="Performance metrics of a finished run.",
-        epilog="""\
+    parser = command_parser(
+        "cosim.metrics",
+        "Performance metrics of a finished run.",
+        """\
 examples:
   %(prog)s results/ellipse
   %(prog)s results/ellipse --from 20 --to 100
   %(prog)s results/ellipse --json
   %(prog)s results/ellipse --out results/ellipse/over_time.csv""",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folder", metavar="DIR", type=Path, help="results of a run: holds log.csv")
     parser.add_argument(

@@ -9,7 +9,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from .command import BAD_INPUT, complain, printable, program, run_command
+from .command import BAD_INPUT, command_parser, complain, printable, run_command
 from .errors import InputError
 from .results.drawing import draw
 from .results.log import read_log
@@ -19,13 +19,12 @@ from .results.run_options import read_options
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0 done, 2 bad input."""
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.plots"),
-        description="Draw the pictures of finished runs, laid over each other.",
-        epilog="examples:  %(prog)s results/ellipse results/ellipse_bs --out results/both\n"
+    parser = command_parser(
+        "cosim.plots",
+        "Draw the pictures of finished runs, laid over each other.",
+        "examples:  %(prog)s results/ellipse results/ellipse_bs --out results/both\n"
         "           %(prog)s results/ellipse --format pdf --width 3.5 --out figures\n"
         "           %(prog)s results/ellipse --format svg --style ggplot --out figures",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folders", metavar="DIR", nargs="+", type=Path, help="results of a run")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="where they go (.)")

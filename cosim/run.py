@@ -17,10 +17,10 @@ from .command import (
     FAILED,
     INTERRUPTED,
     Output,
+    command_parser,
     complain,
     folder_name,
     printable,
-    program,
     run_command,
     whole_number,
 )
@@ -208,10 +208,10 @@ def _positive(text: str) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.run"),
-        description="Run a co-simulation scenario: log.csv, log.json, metrics.json and pictures.",
-        epilog="examples:  %(prog)s scenarios/ellipse.json\n"
+    parser = command_parser(
+        "cosim.run",
+        "Run a co-simulation scenario: log.csv, log.json, metrics.json and pictures.",
+        "examples:  %(prog)s scenarios/ellipse.json\n"
         "           %(prog)s scenarios/ellipse.json --out /tmp/e --no-plots\n"
         "           %(prog)s scenarios/ellipse.json --parameters model.ssv\n"
         "           %(prog)s ellipse --parameters model.ssv --ensemble 50 --posterior posterior.json\n"
@@ -221,7 +221,6 @@ def _parser() -> argparse.ArgumentParser:
         "           %(prog)s scenarios/ellipse.json --set controller=./mine.fmu\n"
         "           %(prog)s system.ssp --stop 100\n"
         "exit codes: 0 done, 2 bad input, 3 simulation failed (log kept), 130 interrupted (log kept)",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "scenario",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rich.console import Console, RenderableType
 
 from cosim import InputError
-from cosim.command import BAD_INPUT, Output, complain, folder_name, program
+from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
 from cosim.interrupts import Held
 from fmus.ships.naming import DEFAULT
 
@@ -58,11 +58,10 @@ class Done(NamedTuple):
 
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with the options that both commands have."""
-    made = argparse.ArgumentParser(
-        prog=program(f"diagnosis.{name}"),
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
     )
     made.add_argument(
         "--model",
@@ -126,11 +125,10 @@ def analysis_parser(
         estimates: where velocities come from by default.
         fewest: ``+``: one run at the least; ``*``: none.
     """
-    made = argparse.ArgumentParser(
-        prog=program(f"diagnosis.{name}"),
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
     )
     made.add_argument(
         "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
@@ -148,11 +146,10 @@ def analysis_parser(
 
 def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
-    made = argparse.ArgumentParser(
-        prog=program(f"diagnosis.{name}"),
-        description=description,
-        epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
     )
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     made.add_argument(

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
-from cosim.command import printable, program, run_command
+from cosim.command import command_parser, printable, run_command
 from cosim.results import read_options
 from cosim.trials import KINDS, Outcome, draw_trial, executes, outcome, sheet, simulated_trial
 
@@ -82,14 +82,13 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, l
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(
-        prog=program("diagnosis.measure_trial"),
-        description="Measure a manoeuvring trial by the definitions of IMO and ISO: a turning circle, a "
+    made = command_parser(
+        "diagnosis.measure_trial",
+        "Measure a manoeuvring trial by the definitions of IMO and ISO: a turning circle, a "
         "zig-zag, a stop, a spiral; measured, or a run of cosim.",
-        epilog="examples:  %(prog)s results/otter_circle\n"
+        "examples:  %(prog)s results/otter_circle\n"
         "           %(prog)s sea_trial.csv --ship my_ship.toml --trial circle --from 470 --to 684\n"
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     made.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")

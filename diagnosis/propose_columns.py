@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim import InputError
-from cosim.command import printable, program, run_command
+from cosim.command import command_parser, printable, run_command
 
 from .command_line import Done, run
 from .progress import Advance
@@ -60,14 +60,13 @@ def columns(options: argparse.Namespace, advance: Advance) -> Done:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("diagnosis.propose_columns"),
-        description="Look at a measurement, and propose the JSON file beside it: names, units, "
+    parser = command_parser(
+        "diagnosis.propose_columns",
+        "Look at a measurement, and propose the JSON file beside it: names, units, "
         "separator, decimal mark, lines before the names, encoding.",
-        epilog="examples:  %(prog)s my.csv\n"
+        "examples:  %(prog)s my.csv\n"
         "           %(prog)s my.csv --ship otter --write\n"
         "exit codes: 0 done, 2 bad input (nothing is written), 130 interrupted (nothing is written)",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="CSV or Parquet file")
     parser.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")

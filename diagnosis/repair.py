@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim import InputError
-from cosim.command import program, run_command
+from cosim.command import command_parser, run_command
 
 from .command_line import Done, run
 from .progress import Advance
@@ -97,14 +97,13 @@ def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(
-        prog=program("diagnosis.repair"),
-        description="Hold the channels of a measurement that say the same twice against each other, "
+    made = command_parser(
+        "diagnosis.repair",
+        "Hold the channels of a measurement that say the same twice against each other, "
         "and repair what they show to be wrong: clock, scale, offset, place, delay, wraps, units. "
         "No model of the ship is used.",
-        epilog="examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
+        "examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
         "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
     made.add_argument(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim import InputError
-from cosim.command import BAD_INPUT, Output, complain, printable, program, run_command
+from cosim.command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 
 DIFFERS = 1
 TOLD = {True: "holds    ", False: "DIFFERS  ", None: "unknown  "}
@@ -28,13 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(
-        prog=program("diagnosis.verify"),
-        description="Check a validation record: its signature, and whether data, model, criteria and "
+    made = command_parser(
+        "diagnosis.verify",
+        "Check a validation record: its signature, and whether data, model, criteria and "
         "report are those that it names.",
-        epilog="example:  %(prog)s results/comparison/validation.json --key public.pem\n"
+        "example:  %(prog)s results/comparison/validation.json --key public.pem\n"
         "exit codes: 0 all that can be checked holds, 1 something differs, 2 bad input",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument("record", type=Path, metavar="RECORD", help="validation.json")
     made.add_argument(

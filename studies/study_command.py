@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import cosim
-from cosim.command import BAD_INPUT, FAILED, folder_name, run_command, whole_number
+from cosim.command import BAD_INPUT, FAILED, command_parser, folder_name, run_command, whole_number
 
 
 def study_parser(
@@ -26,12 +26,10 @@ def study_parser(
         seeds: how many by default; None where there is nothing to repeat.
         jobs: whether several runs go on at a time.
     """
-    parser = argparse.ArgumentParser(
-        prog=f"python -m studies.{name}",
-        description=description,
-        epilog=f"examples:\n{examples}\n"
-        "exit codes: 0 done, 2 bad input, 3 a run failed, 130 interrupted",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = command_parser(
+        f"studies.{name}",
+        description,
+        f"examples:\n{examples}\nexit codes: 0 done, 2 bad input, 3 a run failed, 130 interrupted",
     )
     out = Path("results") / f"study_{name}"
     parser.add_argument(

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cosim import InputError, SimulationError
-from cosim.command import BAD_INPUT, FAILED, run_command
+from cosim.command import BAD_INPUT, FAILED, command_parser, run_command
 from cosim.errors import nearest
 from studies.study_command import progress
 
@@ -143,17 +143,16 @@ _count, _seed = _integer(1, 100), _integer(0, 99)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.hidden_effects",
-        description="Hide an effect in a ship, and test whether the diagnosis finds it.",
-        epilog="examples:\n"
+    parser = command_parser(
+        "benchmarks.hidden_effects",
+        "Hide an effect in a ship, and test whether the diagnosis finds it.",
+        "examples:\n"
         "  python -m benchmarks.hidden_effects --quick --out /tmp/hidden\n"
         "  python -m benchmarks.hidden_effects --effects X_u 'Y_|v|v' --noise n1 n10 --exact --seeds 3\n"
         "  python -m benchmarks.hidden_effects --cost\n"
         "  python -m benchmarks.hidden_effects --first 50 --seeds 4 --calibrate --out /tmp/calibration\n"
         "Cells that are in DIR/results.csv are not run again: after Ctrl-C, the same command goes on.\n"
         "exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "--effects", nargs="+", default=[], metavar="ID", help="what is hidden (everything)"

@@ -21,10 +21,10 @@ from ..command import (
     BAD_INPUT,
     FAILED,
     Output,
+    command_parser,
     complain,
     folder_name,
     printable,
-    program,
     run_command,
     whole_number,
 )
@@ -179,16 +179,15 @@ def _names(text: str) -> list[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.campaign"),
-        description="Run a scenario many times, and write one table: runs.parquet.",
-        epilog="examples:  %(prog)s scenarios/campaigns/gains.campaign.json\n"
+    parser = command_parser(
+        "cosim.campaign",
+        "Run a scenario many times, and write one table: runs.parquet.",
+        "examples:  %(prog)s scenarios/campaigns/gains.campaign.json\n"
         "           %(prog)s gains.campaign.json --compare controller --plot\n"
         "           %(prog)s campaign.json --stop-when 'controller e_pos_rms 2%%'\n"
         "           %(prog)s campaign.json --scheduler tcp://10.0.0.1:8786\n"
         "exit codes: 0 done, 2 bad input, 3 every run failed or the workers were lost, 130 interrupted\n"
         "A finished run is never made again: the same command goes on where it was interrupted.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "campaign", metavar="CAMPAIGN", type=Path, help="JSON file, see docs/campaign.md"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..command import BAD_INPUT, complain, printable, program, run_command
+from ..command import BAD_INPUT, command_parser, complain, printable, run_command
 from ..errors import InputError
 from ..scenario.load import load_scenario, with_settings
 from ..scenario.shipped import find_parameters
@@ -56,15 +56,14 @@ def _export(system: System, options: argparse.Namespace) -> list[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program("cosim.export"),
-        description="Write a scenario as other tools read it: an SSP archive, an OSP directory, or one "
+    parser = command_parser(
+        "cosim.export",
+        "Write a scenario as other tools read it: an SSP archive, an OSP directory, or one "
         "FMU of the whole system. Parameters are baked into the project's own FMUs.",
-        epilog="examples:  %(prog)s scenarios/setpoint.json --ssp setpoint.ssp\n"
+        "examples:  %(prog)s scenarios/setpoint.json --ssp setpoint.ssp\n"
         "           %(prog)s scenarios/hidden_drag.json --osp hidden_drag --drop-faults\n"
         "           %(prog)s scenarios/ellipse.json --fmu ellipse.fmu --drop-faults\n"
         "exit codes: 0 done, 2 bad input, or something that the format cannot hold",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("scenario", metavar="SCENARIO", help="JSON file")
     target = parser.add_mutually_exclusive_group(required=True)
