@@ -27,6 +27,7 @@ from fmus.effects import STANDARD
 from fmus.ship import Ship
 from fmus.ship import ship as with_effects
 from fmus.signals import Force
+from fmus.vessel.vessel import water_velocity
 
 from .hidden_effects.foreign_physics import shallow_water, slow_gusts, tether
 
@@ -115,7 +116,9 @@ def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) 
             rows.append((k * h, *pose, *now))
         past, given = command_response(past, now, drive, h)
         past, acting = force_response(past, given, drive, h)
-        tau = layout.act(acting, layout.running(s.t + h, s.u, s.v, s.r, given, drive), drive)
+        u_c, v_c = water_velocity(s, b)
+        met = layout.running(s.t + h, s.u - u_c, s.v - v_c, s.r, given, drive)
+        tau = layout.act(acting, met, drive)
         s, _ = ship.vessel.advance(s, Force(*tau), b, h)
     return pd.DataFrame(rows, columns=["time", "x", "y", "psi", *(ship.commands or ())])
 

@@ -23,7 +23,7 @@ from fmus.actuators.steering import believed, commands_at, limits, roles, steer,
 from fmus.build.finding import BuildError, load
 from fmus.controller import heading
 from fmus.ship import ship
-from fmus.signals import Estimate, Target, Velocity
+from fmus.signals import Estimate, Target, VelocityInCurrent
 
 HARD = 0.6
 FROUDE = {"kvlcc2": 0.14, "gunnerus": 0.25, "commanded": 0.2}
@@ -154,7 +154,7 @@ def turn(name, d, U, angle, lengths=14.0, h=0.05):
         i = controller.inputs(Estimate(state.x, state.y, state.psi, state.u, state.v, state.r), aim)
         cs = cs or controller.init(i, controller.params())
         cs, out = controller.advance(cs, i, c, seconds)
-        nu = Velocity(state.u, state.v, state.r)
+        nu = VelocityInCurrent(state.u, state.v, state.r)
         past, acts = thrusters.advance(past, thrusters.inputs(out.commands, nu), drive, seconds)
         tau = vessel.inputs(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N)
         state, _ = vessel.advance(state, tau, hull, seconds)

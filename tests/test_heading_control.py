@@ -16,8 +16,9 @@ from fmus.controller.backstepping import Applied, Inputs
 from fmus.declare import flatten, packer, variables
 from fmus.hull import damping_force, mass_matrix
 from fmus.ship import ship
-from fmus.signals import Estimate, Force, Target, Velocity
+from fmus.signals import Estimate, Force, Target, VelocityInCurrent
 from fmus.sizing import sized
+from fmus.vessel.vessel import water_velocity
 
 HEADING, LOS = COMPONENTS["controller_heading"], COMPONENTS["guidance_los"]
 OTTER = SHIPS["otter"]
@@ -238,7 +239,7 @@ def voyage(d, seconds, legs, mirrored=False, current=(0.0, 0.0), **values):
         cs = cs or controller.init(i, c)
         cs, out = controller.step(cs, i, c, h)
         assert out.demand.tau.tau_Y == 0.0
-        nu = Velocity(state.u, state.v, state.r)
+        nu = VelocityInCurrent(state.u, state.v, state.r, *water_velocity(state, hull))
         past, acts = thrusters.advance(past, thrusters.inputs(out.demand.tau, nu), drive, h)
         told = Applied(acts.tau_cmd_X, acts.tau_cmd_Y, acts.tau_cmd_N)
         tau = Force(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N)

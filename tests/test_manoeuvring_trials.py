@@ -21,7 +21,7 @@ from cosim.trials.trial_outcome import Outcome
 from cosim.trials.trial_picture import draw_trial
 from fmus.declare import flatten, packer, variables
 from fmus.ship import ship
-from fmus.signals import Force, Velocity
+from fmus.signals import Force, VelocityInCurrent
 from fmus.sizing import sized
 
 OTTER = SHIPS["otter"]
@@ -368,9 +368,8 @@ def conducted_stop(d, connect):
         s, told = guidance.step(s, None, p, h)
         rows.append((k * h, state.x, state.y, state.psi, told.order))
         i = thrusters.inputs()
-        i = i._replace(
-            request=i.request._replace(screw_n=told.n), velocity=Velocity(state.u, state.v, state.r)
-        )
+        nu = VelocityInCurrent(state.u, state.v, state.r)
+        i = i._replace(request=i.request._replace(screw_n=told.n), velocity=nu)
         past, acts = thrusters.advance(past, i, drive, h)
         state, _ = vessel.advance(state, Force(acts.tau_act_X, acts.tau_act_Y, acts.tau_act_N), hull, h)
     return passage(*np.array(rows).T)

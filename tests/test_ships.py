@@ -46,10 +46,9 @@ from fmus.hull_functions import cross_flow
 from fmus.ship import ship
 from fmus.ship_description import Value
 from fmus.ships.ship_file import Term
-from fmus.signals import Force, Velocity
+from fmus.signals import Force, VelocityInCurrent
 from fmus.thrusters.allocation import Allocation, thrust
 from fmus.thrusters.allocation import allocate as allocate_three
-from fmus.thrusters.chain import Inputs
 
 speed = st.floats(-2.0, 2.0)
 share = st.floats(0.0, 1.0)
@@ -515,8 +514,7 @@ def sailed(d, tau, seconds, h=0.05):
     request = type(thrusters.inputs().request)(*tau)
     state, past, out = vessel.init(None, p), thrusters.init(None, q), None
     for _ in range(round(seconds / h)):
-        nu = Velocity(state.u, state.v, state.r)
-        given = thrusters.inputs(request, nu)
+        given = thrusters.inputs(request, VelocityInCurrent(state.u, state.v, state.r))
         past, out = thrusters.advance(past, given, thrusters.prepared(q), h)
         acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
         state, _ = vessel.advance(state, acting, vessel.prepared(p), h)
@@ -634,7 +632,8 @@ def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
             outs = []
             for k, s in enumerate((declared, read)):
                 q = s.thrusters.params()
-                given = s.thrusters.inputs(tau, Velocity(*states[k][3:6]))
+                nu = type(s.thrusters.inputs().velocity)(*states[k][3:6])
+                given = s.thrusters.inputs(tau, nu)
                 pasts[k], out = s.thrusters.step(pasts[k], given, q, 0.02)
                 outs.append(out)
                 acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
@@ -669,7 +668,7 @@ def test_power_of_a_cycloidal_propeller_is_an_output_where_it_is_described():
 
     def taken(*tau):
         p = thrusters.params()
-        _, out = thrusters.step(thrusters.init(None, p), Inputs(Force(*tau)), p, 0.01)
+        _, out = thrusters.step(thrusters.init(None, p), thrusters.inputs(Force(*tau)), p, 0.01)
         return out.vsp_power
 
     assert taken(0.0, 0.0, 0.0) == pytest.approx(0.5)

@@ -20,8 +20,7 @@ from fmus.native.tape import Kernels, Tape
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs as ObserverInputs
 from fmus.ops import Number, sqrt
-from fmus.signals import Estimate, Force, Measurement, Nothing, Target, Velocity
-from fmus.thrusters.chain import Inputs as ThrusterInputs
+from fmus.signals import Estimate, Force, Measurement, Nothing, Target
 
 from ..model import Model
 from ..model.ship_model import parameters
@@ -60,13 +59,13 @@ class Loop(NamedTuple):
 
     Attributes:
         states: of vessel, path, observer, controller and thrusters.
-        velocity: of the ship.
+        velocity: of the ship, as its thrusters are told.
         target, estimate: what path and observer give.
         poses: measured, on their way to the observer, the oldest first.
     """
 
     states: tuple[Any, ...]
-    velocity: Velocity
+    velocity: Any
     target: Target
     estimate: Estimate
     poses: tuple[Measurement, ...]
@@ -87,21 +86,20 @@ def closed_loop(
     path = _Part(serving(reference.guidance), {})
     observer = _Part(serving(mdf.COMPONENT), OBSERVER_WEIGHTS)
     controller = _Part(serving(adaptive.COMPONENT), {})
-    drive = _Part(model.ship.thrusters, model.thrusters)
+    drive, told = _Part(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
     s, vessel = ship.begin(Force())
     g, target = path.begin(Nothing())
     measured = ObserverInputs(vessel.measured, Force())
     o, estimate = observer.begin(measured)
     c, _ = controller.begin(ControllerInputs(estimate, target))
-    t, _ = drive.begin(ThrusterInputs())
+    t, _ = drive.begin(told())
     late = max(1, 1 + round(model.clock / h_path))
-    velocity = Velocity(*vessel.velocity)
-    first = Loop((s, g, o, c, t), velocity, target, estimate, (vessel.measured,) * late)
+    first = Loop((s, g, o, c, t), vessel.velocity, target, estimate, (vessel.measured,) * late)
 
     def step(now: Loop, h: float) -> tuple[Loop, Number]:
         s, g, o, c, t = now.states
         c, demand = controller.advance(c, ControllerInputs(now.estimate, now.target), h)
-        t, thrust = drive.advance(t, ThrusterInputs(demand.tau, now.velocity), h)
+        t, thrust = drive.advance(t, told(demand.tau, now.velocity), h)
         acting = Force(thrust.tau_act_X, thrust.tau_act_Y, thrust.tau_act_N)
         s, vessel = ship.advance(s, acting, h_path)
         g, target = path.advance(g, Nothing(), h_path)
@@ -109,8 +107,7 @@ def closed_loop(
         poses = (*now.poses[1:], vessel.measured)
         commanded = Force(thrust.tau_cmd_X, thrust.tau_cmd_Y, thrust.tau_cmd_N)
         o, estimate = observer.advance(o, ObserverInputs(poses[0], commanded), h_path)
-        velocity = Velocity(*vessel.velocity)
-        return Loop((s, g, o, c, t), velocity, target, estimate, poses), sqrt(x * x + y * y)
+        return Loop((s, g, o, c, t), vessel.velocity, target, estimate, poses), sqrt(x * x + y * y)
 
     return first, step
 

@@ -11,7 +11,7 @@ import numpy as np
 from fmus.actuators.actuation import actuators, measurable, output
 
 from ..model import Model, WeakWindows
-from ..model.weak_form import arriving
+from ..model.weak_form import arriving, inflow_along
 
 STEADY = 0.02  # of the mean shaft speed: a spread below which thrust hardly changes by it; chosen
 
@@ -27,9 +27,11 @@ def residual(w: WeakWindows, model: Model, name: str) -> np.ndarray:
     description = model.ship.description
     assert description is not None
     model = model.during(w.run.name)
-    nu = np.where(w.known[:, None], w.smoothed.nu, np.nan)
+    s, known = w.smoothed, w.known[:, None]
+    eta, nu = (np.where(known, x, np.nan) for x in (s.eta, s.nu))
+    met = tuple(inflow_along(w, model, eta, nu).T)
     commands, plant = tuple(arriving(w, model)[0]), model.drive.params.plant
-    return w.run.measured[name] - output(description, name, commands, tuple(nu.T), plant)
+    return w.run.measured[name] - output(description, name, commands, met, plant)
 
 
 def rms(w: WeakWindows, model: Model, name: str) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 from fmus.frames import rotate_to_body
 
 from ..model import GivenForce, Model, WeakWindows
-from ..model.weak_form import acceleration, thrust_along
+from ..model.weak_form import acceleration, inflow_along, thrust_along
 from .fmu_windows import Use, at_samples, whole_run
 from .foreign_fmu import TAU
 from .short_steps import FIRST, LONGEST, SECOND, STEP, ShortSteps
@@ -90,7 +90,7 @@ def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray)
     """Force (n, 3) that a model of a ship lacks in a motion (n, 6)."""
     eta, nu = motion[:, :3], motion[:, 3:]
     free = acceleration(body, w.run.time, eta, nu)
-    return (nu_dot - free) @ body.mass.T - thrust_along(w, body, nu)
+    return (nu_dot - free) @ body.mass.T - thrust_along(w, body, inflow_along(w, body, eta, nu))
 
 
 def _acceleration(steps: ShortSteps, use: Use, signals: Mapping[str, float]) -> np.ndarray:

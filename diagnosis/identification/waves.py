@@ -14,10 +14,11 @@ from scipy.ndimage import median_filter
 from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
+from fmus.vessel.vessel import State
 
 from ..data import Run
 from ..model import Model
-from ..model.thrust import Response, thrust
+from ..model.thrust import Response, inflow, thrust
 from ..model.weak_form import acceleration, by_mass
 from ..parallel import for_each
 from ..smoothing import Motion, Smoothed, without_commands
@@ -197,7 +198,8 @@ def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
     u, v, r = nu.T
     nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, eta_ddot[:, 2]])
     between = Response(run, model).between_samples
-    driven = by_mass(model, thrust(run, model, between, np.nan_to_num(nu)))
+    met = inflow(State._make([*eta.T, *nu.T, run.time]), model)
+    driven = by_mass(model, thrust(run, model, between, np.nan_to_num(np.column_stack(met))))
     free = acceleration(model, run.time, eta, nu)
     return (nu_dot - free - driven) @ model.reference_mass.T
 

@@ -19,7 +19,7 @@ from fmus.vessel import vessel
 from ..data.reading import Run
 from ..smoothing import Smoothed, idle
 from .ship_model import Model
-from .thrust import Integral, Response, commanded_shares, drive_of
+from .thrust import Integral, Response, commanded_shares, drive_of, inflow
 
 # s, times the scale of the ship; of the integration, where its error is far below the noise of any
 # measurement
@@ -183,7 +183,7 @@ def propagate(
         with np.errstate(all="ignore"):
             if power is not None:
                 thrusters = layout.powered(drive, power[k])
-            now = layout.running(s.t + h, s.u, s.v, s.r, tuple(given), thrusters)
+            now = layout.running(s.t + h, *inflow(s, model), tuple(given), thrusters)
             tau = Force(*layout.act(tuple(shares), now, thrusters))
             if beside is None:
                 s = moved(s, tau, body, h)

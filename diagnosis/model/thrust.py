@@ -14,6 +14,7 @@ import numpy as np
 
 from fmus.actuators.response import Prepared, at_rest, command_response, force_response
 from fmus.effects import Memory
+from fmus.vessel.vessel import State, water_velocity
 
 from ..data.reading import Run
 from .ship_model import Model
@@ -46,6 +47,17 @@ def full_thrust(model: Model) -> np.ndarray:
     return np.array(model.drive.effects.layout.full(model.drive.params))
 
 
+def inflow(s: State, model: Model) -> tuple[Any, Any, Any]:
+    """u, v, r of a ship as the FMU of its thrusters meets the water [m/s, m/s, rad/s].
+
+    That of CyberShip Enterprise 1 knows the velocity over ground alone.
+    """
+    if model.ship.description is None:
+        return s.u, s.v, s.r
+    u_c, v_c = water_velocity(s, model.hull)
+    return s.u - u_c, s.v - v_c, s.r
+
+
 def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """tau (n, 3) [N, N, N m] that acts from each sample to the next.
 
@@ -53,7 +65,7 @@ def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.nd
         run: its time and power.
         model: whose thrusters act.
         between: (1 to 3, k, n), what becomes of the commands, :attr:`Response.between_samples`.
-        nu: (n, 3), body-fixed velocity.
+        nu: (n, 3), body-fixed velocity, of :func:`inflow`.
     """
     drive = drive_of(run, model)
     layout = drive.effects.layout

@@ -24,7 +24,7 @@ from ..smoothing import Smoothed
 from ..smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
 from .ship_model import Model
-from .thrust import Response, step_together, thrust
+from .thrust import Response, inflow, step_together, thrust
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s
@@ -232,11 +232,15 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
     measured = tuple((name, model.vessel.get(name, 0.0)) for name in names)
     ship = (measured, tuple(sorted(model.vessel.items())))
-    drive = (measured, tuple(sorted(model.thrusters.items())), model.clock)
+    water = model.hull.params.water
+    drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
     eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
-    driven = w.recall("driven", drive, lambda: w.held @ thrust_along(w, model, halfway(w, nu)))
+    def drives() -> np.ndarray:
+        return w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
+
+    driven = w.recall("driven", drive, drives)
     driven = driven @ model.effective_thrust.T
     if w.run.name in model.given:
         driven = driven + w.smooth @ model.given[w.run.name].at(eta, nu)
@@ -262,17 +266,24 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     return force
 
 
+def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Velocity (n, 3) with which a ship's thrusters meet the water, at its pose and velocity (n, 3)."""
+    return np.column_stack(inflow(vessel.State._make([*eta.T, *nu.T, w.run.time]), model))
+
+
 def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
     """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
 
     Args:
         w: windows of the run.
         model: whose thrusters.
-        nu: (n, 3), body-fixed velocity, zero where it is not known; by default that halfway.
+        nu: (n, 3), of :func:`inflow_along`; by default that of the smoothed motion, halfway.
     """
     model = model.during(w.run.name)
     if nu is None:
-        nu = halfway(w, np.where(w.known[:, None], w.smoothed.nu, 0.0))
+        s, known = w.smoothed, w.known[:, None]
+        eta, nu = (np.where(known, x, 0.0) for x in (s.eta, s.nu))
+        nu = halfway(w, inflow_along(w, model, eta, nu))
     return thrust(w.run, model, _response(w, model), nu)
 
 

@@ -21,8 +21,7 @@ from ..declare import Component, Variable, bundle, group_of, redeclared, variabl
 from ..effects import EffectSet
 from ..ops import Number, finite, when
 from ..ship_description import Description
-from ..signals import Velocity
-from .chain import Inputs
+from ..signals import Force, VelocityInCurrent
 
 
 class Applied(NamedTuple):
@@ -68,10 +67,8 @@ def described(effects: EffectSet, ship: Description) -> Component:
     told = variables(commands) if ship.allocates else ()
     beside = measurable(ship)
     outputs: Any = group_of("Outputs", [*told, *variables(Applied), *variables(outputs_of(ship))])
-    if ship.allocates:
-        inputs: type[Any] = Inputs
-    else:
-        inputs = bundle("Inputs", request=commands(), velocity=Velocity())
+    request = Force() if ship.allocates else commands()
+    inputs = bundle("Inputs", request=request, velocity=VelocityInCurrent())
 
     def prepare(p: Any) -> Prepared:
         plant = p.plant
@@ -84,16 +81,17 @@ def described(effects: EffectSet, ship: Description) -> Component:
 
     def prepared_step(s: Past, i: Any, b: Prepared, h: Number) -> tuple[Past, Any]:
         p = b.params
-        u, v, r = (finite(x, 0.0) for x in i.velocity)
+        u, v, r, u_c, v_c = (finite(x, 0.0) for x in i.velocity)
+        through_water = u - u_c, v - v_c, r
         asked = tuple([finite(x, 0.0) for x in i.request])
         given = allocate(ship, asked, (u, v, r), p.allocation) if ship.allocates else asked
         past, arriving = command_response(s, given, b, h)
         past, acting = force_response(past, arriving, b, h)
-        tau = shape.act(acting, shape.running(s.t + h, u, v, r, arriving, b), b)
+        tau = shape.act(acting, shape.running(s.t + h, *through_water, arriving, b), b)
         possible = total(forces(ship, given, (u, v, r), p.allocation))
         after = when(h > 0.0, lambda: past, lambda: s)
         shown = given if ship.allocates else ()
-        found = [output(ship, name, acting, (u, v, r), p.plant) for name in beside]
+        found = [output(ship, name, acting, through_water, p.plant) for name in beside]
         return after, outputs(*shown, *possible, *tau, *found)
 
     def step(s: Past, i: Any, p: Any, h: Number) -> tuple[Past, Any]:

@@ -41,7 +41,7 @@ from ..hull_functions import FUNCTIONS
 from ..ops import Condition, Number, finite, when, wrap
 from ..scale import REFERENCE_LENGTH
 from ..ship_description import Description, Part, Value
-from ..signals import Force, Measurement, Velocity
+from ..signals import Force, Measurement, Velocity, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 _TOWED = len(TowedDamping._fields)
@@ -119,6 +119,7 @@ class Prepared(NamedTuple):
         effects: of the vessel.
         hull: with all changes applied.
         changes, outside, measurement: for each effect of the group, whether it acts.
+        flows: whether the water moves.
         changed, disturbed, heavier: whether a damping coefficient is changed, anything from outside or a
             current acts, the inertia is changed.
     """
@@ -129,6 +130,7 @@ class Prepared(NamedTuple):
     changes: tuple[Condition, ...]
     outside: tuple[Condition, ...]
     measurement: tuple[Condition, ...]
+    flows: Condition
     changed: Condition
     disturbed: Condition
     heavier: Condition
@@ -136,6 +138,7 @@ class Prepared(NamedTuple):
 
 def prepared(p: Any, effects: VesselEffects) -> Prepared:
     """Everything that a step needs of the parameters."""
+    flows = effects.water.any_acts(p.water)
     return Prepared(
         p,
         effects,
@@ -143,8 +146,9 @@ def prepared(p: Any, effects: VesselEffects) -> Prepared:
         effects.changes.acting(p.change),
         effects.outside.acting(p.outside),
         effects.measurement.acting(p.measurement),
+        flows,
         effects.changes.any_acts(p.change),
-        effects.outside.any_acts(p.outside) | effects.water.any_acts(p.water),
+        effects.outside.any_acts(p.outside) | flows,
         effects.inertia.any_acts(p.heavier),
     )
 
@@ -157,6 +161,11 @@ def through_water(s: State, b: Prepared) -> tuple[Motion, Any, Any]:
         du, dv = member.effect(s, *b.params.water[member.parameters])
         u_c, v_c = u_c + du, v_c + dv
     return s._replace(u=s.u - u_c, v=s.v - v_c), u_c, v_c
+
+
+def water_velocity(s: State, b: Prepared) -> tuple[Number, Number]:
+    """The water's body-fixed velocity [m/s, m/s]; zero at once where it does not move."""
+    return when(b.flows, lambda: through_water(s, b)[1:], lambda: (0.0, 0.0))
 
 
 def nominal(s: State, tau: Force, b: Hull) -> Triple:
@@ -298,7 +307,8 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         measurement=groups.measurement.params(),
         start=start,
     )
-    outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
+    moving = {} if ship is None else {"velocity": VelocityInCurrent()}
+    outputs = bundle("Outputs", Outputs, **moving, change=unchanged, outside=undisturbed)
 
     def init(i: Force, p: Any) -> State:
         return State(*p.start)
@@ -321,9 +331,10 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
         u_dot, v_dot, r_dot = nu_dot
         omega_X, omega_Y, omega_N = omega
+        nu = Velocity(after.u, after.v, after.r)
         return after, outputs(
             Pose(after.x, after.y, after.psi),
-            Velocity(after.u, after.v, after.r),
+            nu if ship is None else VelocityInCurrent(*nu, *water_velocity(after, b)),
             u_dot,
             v_dot,
             r_dot,
