@@ -302,9 +302,9 @@ def off_route(log, points):
         ("otter_waypoints", (0.1, 0.05), 3.1, 6.6, 0.1),
         ("otter_los", (0.0, 0.0), 0.8, 1.9, 0.1),
         ("otter_waypoints", (0.0, 0.0), 0.4, 1.9, 0.1),
-        ("kvlcc2_waypoints", (0.1, 0.08), 3.7, 13.7, 0.1),
+        ("kvlcc2_waypoints", (0.1, 0.08), 3.7, 13.6, 0.1),
         ("kvlcc2_waypoints", (0.0, 0.0), 3.5, 13.1, 0.1),
-        ("gunnerus_waypoints", (0.3, 0.2), 15.0, 47.0, 1.0),
+        ("gunnerus_waypoints", (0.3, 0.2), 14.0, 45.0, 1.0),
         ("gunnerus_waypoints", (0.0, 0.0), 13.0, 48.0, 1.0),
     ],
 )
