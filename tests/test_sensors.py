@@ -89,6 +89,16 @@ def test_a_unit_of_the_rate_is_named():
     assert "deg/s in place of rad/s" in found["r", "scale"].sentence
 
 
+def test_sway_with_the_other_sign_is_no_place_of_the_antenna():
+    run = made()
+    ahead = np.column_stack([*rotate_to_earth(run.pose[:, 2], 0.3, 0.0), 0.0 * run.time])
+    found = examine(beside(replace(run, pose=run.pose + ahead), v=-run.measured["v"]), REFERENCE)
+    assert [(f.channel, f.kind) for f in found.findings] == [("v", "scale"), ("x", "place")]
+    assert found.findings[0].value == pytest.approx(-1.0, abs=0.05)
+    assert found.findings[1].value == pytest.approx(0.3, abs=0.02)
+    assert closure(found.run, 30.0, 10.0).position < 0.02
+
+
 def swung(deviation=0.0):
     """A run all round the compass, which is off by heading as iron makes it."""
     run = made()

@@ -10,13 +10,14 @@ from .motion import motion
 from .receivers import receivers
 from .sensor_finding import Examined
 from .through_water import through_water
-from .unit_faults import units
+from .unit_faults import sway, units
 from .wraps import wraps
 
 # Each receives a run and the ship's scale; in the order in which one needs what others repair.
 CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
     wraps,
     units,
+    sway,
     receivers,
     motion,
     accelerations,

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.scale import Scale
 
 from ..data import Run
 from ..data.unit_factors import UNITS
-from .evidence import Evidence, evidence
+from .blocked_fit import SURE, blocked_fit
+from .evidence import Evidence, evidence, integral
 from .sensor_finding import Z95, Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
@@ -18,6 +20,7 @@ NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen
 FEWEST = 8  # windows; chosen
 SIGN = "the other sign"  # and nothing else
 AGREED = 0.7  # correlation from which on two channels tell of the same (chosen)
+OPPOSITE = "its sign is the other one"
 
 
 def unit_factors(quantity: str) -> dict[str, float]:
@@ -42,18 +45,44 @@ def units(run: Run, scale: Scale) -> Examined:
     return found
 
 
+def sway(run: Run, scale: Scale) -> Examined:
+    """A sway velocity with the other sign, which looks like a position measured elsewhere aboard.
+
+    What surge and sway alone move the ship by and that place are fitted together to the way of windows:
+    what a place adds comes with the yaw rate, sway later.
+    """
+    e = evidence(run)
+    if e is None or e.velocity is None or e.by != ("u", "v"):
+        return Examined(run)
+    still, one = np.zeros_like(e.time), np.ones_like(e.time)
+    surge, _ = rotate_to_body(e.psi, *e.velocity.T)
+    ahead = integral(e.time, np.column_stack(rotate_to_earth(e.psi, surge, still)))
+    places = (np.column_stack(rotate_to_earth(e.psi, *at)) for at in ((one, still), (still, one)))
+    way, *said = _windows(e, _position(e), ahead, e.gone - ahead, *places)
+    if len(way) < FEWEST:
+        return Examined(run)
+    columns = np.column_stack([x.T.ravel() for x in said])
+    value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
+    if not value[1] < -SURE * std[1]:
+        return Examined(run)
+    half = Z95 * std[1] / value[1] ** 2
+    factor, ends = 1.0 / value[1], (float(e.time[0]), float(e.time[-1]))
+    text = f"v is {factor:.3g} times what the pose says: {OPPOSITE}"
+    finding = SensorFinding("v", "scale", factor, "1", (factor - half, factor + half), *ends, text)
+    return Examined(replace(run, measured=dict(run.measured) | {"v": -run.measured["v"]}), (finding,))
+
+
 def _position(e: Evidence) -> np.ndarray:
     """(n, 2), position in all rows [m]."""
     at, time = e.rows, e.time
     return np.column_stack([np.interp(time, time[at], e.run.pose[at, k]) for k in (0, 1)])
 
 
-def _windows(e: Evidence, pose: np.ndarray, said: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What pose and channel say of each window, (k, d) both."""
+def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:
+    """What pose and channels say of each window, (k, d) each."""
     rows = e.rows
     apart = max(1, round(WINDOW / float(np.median(np.diff(e.time[rows])))), 10)
-    at = rows[::apart]
-    return np.diff(pose[at], axis=0), np.diff(said[at], axis=0)
+    return [np.diff(path[rows[::apart]], axis=0) for path in paths]
 
 
 def _judged(
@@ -86,13 +115,7 @@ def _judged(
     name, factor = _nearest(abs(value), unit_factors(quantity))
     true = np.copysign(factor, value) if name else value
     text = f"{told} is {value:.4g} times what the pose says"
-    text += (
-        f": {name}"
-        if name and abs(true) != 1.0
-        else ": its sign is the other one"
-        if value < 0.0
-        else ""
-    )
+    text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
     measured = dict(found.run.measured) | {n: found.run.measured[n] / true for n in names}
     begin, end = float(e.time[0]), float(e.time[-1])
     finding = SensorFinding(
