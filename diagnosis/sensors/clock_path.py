@@ -37,6 +37,9 @@ BEGIN = np.array(
 # Of the noise, and of it over the whole run; what is less makes no difference to the path.
 LEAST, LEAST_WALK = 1e-2, np.array([1e-3, 1e-3, 1e-4])
 SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
+STILL = (
+    1e-6  # relative change of all deviations in a sweep that ends them; chosen: no digit told changes
+)
 PROBES = 6  # random vectors that estimate traces (Hutchinson 1990)
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is left out
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
@@ -171,7 +174,7 @@ class PathProblem:
                 steps = np.diff(path, axis=0) * (np.diff(run) / np.diff(self.evidence.time))[:, None]
                 path = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
             for begin, a, start, end in self.parts:
-                made[begin : begin + end.size, k] = (a * (path[end] - path[start])).sum(axis=1)
+                made[begin : begin + end.size, k] = np.einsum("ij,ij->i", a, path[end] - path[start])
         return made
 
     def solve(self, fixed_clock: bool = False) -> Solution:
@@ -188,7 +191,7 @@ class PathProblem:
         clock, rng = np.ones(self.nodes.size - 1), np.random.default_rng(0)
         probes = rng.choice([-1.0, 1.0], (self.right.size, PROBES))
         for _ in range(SWEEPS):
-            system = _System(self, std, clock)
+            system, before = _System(self, std, clock), std.copy()
             clock = system.unknown[3::4][:-1]
             share = system.leverage(probes)
             for g in self.present:
@@ -197,6 +200,8 @@ class PathProblem:
                 of = self.group == g
                 free = max(of.sum() - share[of].mean(axis=1).sum(), 1.0)
                 std[g] = max(std[g] * np.sqrt((system.residual[of] ** 2).sum() / free), floor[g])
+            if (np.abs(std - before) <= STILL * before).all():
+                break
         system = _System(self, std, clock)
         return Solution(
             system.unknown[3::4][:-1].copy(),
@@ -222,34 +227,27 @@ class _System:
 
     def __init__(self, p: PathProblem, std: np.ndarray, clock: np.ndarray) -> None:
         weight = 1.0 / (np.append(std, 1.0)[p.group] * p.steps)
-        self.weighted = csr_array(p.matrix.multiply(weight[:, None]))
+        entries = np.repeat(weight, np.diff(p.matrix.indptr)) * p.matrix.data
+        self.weighted = csr_array((entries, p.matrix.indices, p.matrix.indptr), p.matrix.shape)
+        self._turned = self.weighted.T
         right, self.border = p.right * weight, p.border(clock) * weight[:, None]
-        normal = csr_array(self.weighted.T @ self.weighted)
+        normal = self._turned @ self.weighted
         band = np.zeros((BAND, 4 * p.nodes.size))
         for k in range(BAND):
             band[k, : band.shape[1] - k] = normal.diagonal(-k)
         self.factor = cholesky_banded(band, lower=True)
-        mixed = self.weighted.T @ self.border
+        mixed = self._turned @ self.border
         self.mixed = self.solve(mixed)
         schur = self.border.T @ self.border - mixed.T @ np.asarray(self.mixed)
         self.covariance = np.linalg.pinv(schur, hermitian=True)
-        plain = self.solve(self.weighted.T @ right)
+        plain = self.solve(self._turned @ right)
         self.constants = self.covariance @ (self.border.T @ right - mixed.T @ plain)
         self.unknown = plain - self.mixed @ self.constants
         self.residual = right - self.weighted @ self.unknown - self.border @ self.constants
         other = p.group < CLOCK  # the walk of the clock and its anchor are one prior
         determinant = np.log(self.factor[0]).sum() - np.log(weight[other]).sum()
-        determinant -= 0.5 * self._prior(p)
+        determinant -= 0.5 * _prior(p, weight**2)
         self.criterion = float(2.0 * determinant + (self.residual**2).sum())
-
-    def _prior(self, p: PathProblem) -> float:
-        """log |Q| of the precision Q of the rates of the clock before anything is measured."""
-        own = csr_array(self.weighted[(p.group == CLOCK) | (p.group == RATE)][:, 3::4])
-        precision = csr_array(own.T @ own)
-        band = np.zeros((2, p.nodes.size))
-        for k in range(2):
-            band[k, : p.nodes.size - k] = precision.diagonal(-k)
-        return float(2.0 * np.log(cholesky_banded(band, lower=True)[0]).sum())
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """N^-1 times columns."""
@@ -257,10 +255,7 @@ class _System:
 
     def leverage(self, probes: np.ndarray) -> np.ndarray:
         """(equations, probes): whose mean is the leverage of each equation."""
-        group_wise = np.empty_like(probes)
-        for k in range(probes.shape[1]):
-            group_wise[:, k] = self.weighted @ self.solve(self.weighted.T @ probes[:, k])
-        return group_wise * probes
+        return (self.weighted @ self.solve(self._turned @ probes)) * probes
 
     def mean_clock(self, weights: np.ndarray) -> np.ndarray:
         """(k,): standard deviation of weighted means (k, m) of the clock's rate at the nodes."""
@@ -271,6 +266,17 @@ class _System:
         variance = (right * found).sum(axis=0)
         variance += (by_constants * (self.covariance @ by_constants)).sum(axis=0)
         return np.sqrt(variance)
+
+
+def _prior(p: PathProblem, precision: np.ndarray) -> float:
+    """log |Q| of the precision Q of the rates of the clock before anything is measured."""
+    walk, j = precision[p.group == CLOCK], p.pairs
+    band = np.zeros((2, p.nodes.size))
+    band[0] = precision[p.group == RATE]
+    band[0, j] += walk
+    band[0, j + 1] += walk
+    band[1, j] = -walk
+    return float(2.0 * np.log(cholesky_banded(band, lower=True)[0]).sum())
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:

@@ -112,30 +112,31 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), LEAST_NOISE), max(float(sigma[2]), LEAST_NOISE)
     free = _without_level(e, every)
-    problem = PathProblem(e, free, sizes, cut)
-    without = problem.outliers(problem.solve())
-    wandering = PathProblem(e, free, sizes, cut, without)
+    wandering = PathProblem(e, free, sizes, cut)
     loose = wandering.solve()
-    tight = PathProblem(e, every, sizes, cut, without).solve(fixed_clock=True)
-    wanders = tight.criterion - loose.criterion > LIKELIER
+    if without := wandering.outliers(loose):
+        wandering = PathProblem(e, free, sizes, cut, without)
+        loose = wandering.solve()
+    problem = PathProblem(e, every, sizes, cut, without)
+    columns, solution = list(every), problem.solve(fixed_clock=True)
+    wanders = solution.criterion - loose.criterion > LIKELIER
     wanders = wanders and _uneven(Motion(wandering, loose, True, []))
-    columns, solution = (free, loose) if wanders else (list(every), tight)
+    if wanders:
+        problem, columns, solution = wandering, free, loose
     swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
     if e.rate is not None and (
         swung or wanders
     ):  # a compass off by heading looks like a wandering clock
         deviating = [*every, *deviations(e)]
-        told = PathProblem(e, deviating, sizes, cut, without).solve(fixed_clock=True)
+        even = PathProblem(e, deviating, sizes, cut, without)
+        told = even.solve(fixed_clock=True)
         either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
         if either and swung:
-            columns, solution, wanders, either = deviating, told, False, False
-    while True:
-        kept = _sure(columns, solution)
-        problem = PathProblem(e, kept, sizes, cut, without)
+            problem, columns, solution, wanders, either = even, deviating, told, False, False
+    while len(kept := _sure(columns, solution)) < len(columns):
+        problem, columns = PathProblem(e, kept, sizes, cut, without), kept
         solution = problem.solve(fixed_clock=not wanders)
-        if len(kept) == len(columns):
-            return Motion(problem, solution, wanders, kept, either)
-        columns = kept
+    return Motion(problem, solution, wanders, columns, either)
 
 
 def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
