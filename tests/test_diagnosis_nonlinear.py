@@ -11,7 +11,6 @@ from diagnosis import Model, Windows, omega
 from diagnosis.identification import profile
 from diagnosis.identification.candidates import additions, candidate, covered, model_error
 from diagnosis.identification.multistart import Landscape, best_values
-from diagnosis.identification.segmentation import programmed
 from diagnosis.model import read_model, weak_windows, write_model
 from fmus.declare import Range, Variable
 from fmus.effects import STANDARD, effect
@@ -120,21 +119,6 @@ def test_what_is_dead_most_of_the_time_is_no_outage():
     assert not candidate(
         [w, *rest], model, model_error([w, *rest], model), STANDARD["vsp_outage"]
     ).shapes
-
-
-def test_dynamic_programming_gives_the_least_sum():
-    """Against all ways to place up to one interval, and up to what is charged for more."""
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        gain = rng.normal(0.0, 3.0, 12)
-        ways = [
-            (sum(gain[a:b]) - 2.0 * (1 + (b < 12)), [(a, b)])
-            for a in range(12)
-            for b in range(a + 1, 13)
-        ]
-        best = max([(0.0, []), *ways], key=lambda way: way[0])
-        assert programmed(gain, 2.0, 1) == best[1]
-    assert programmed(np.array([9.0, -9.0, 9.0, -9.0]), 2.0, 8) == [(0, 1), (2, 3)]
 
 
 def test_the_shape_of_an_effect_is_found_far_from_its_start():
