@@ -49,10 +49,6 @@ class Fit(NamedTuple):
     beta: np.ndarray
     penalty: np.ndarray
 
-    def of(self, k: int) -> "Fit":
-        """One of several."""
-        return Fit(self.used, self.left[k], self.beta[k], self.penalty[k])
-
     def loss(self, grams: np.ndarray) -> np.ndarray:
         """Sum of squares left in each of some Gram matrices (..., p, p)."""
         part = grams[..., self.used[:, None], self.used]
@@ -167,7 +163,8 @@ def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Folds) -> 
     fits = [o.fitted(folds.train) for o in options]
     best = np.argmin([f.loss(folds.train) + f.penalty for f in fits], axis=0)
     for k, held in enumerate(folds.held):
-        found[held] = fits[best[k]].of(k).loss(t.grams[held])
+        fit = fits[best[k]]
+        found[held] = fit._replace(left=fit.left[k]).loss(t.grams[held])
     return found
 
 

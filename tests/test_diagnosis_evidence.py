@@ -1,0 +1,328 @@
+"""What is told of a finding, a prediction or a remainder, in closed form: confidence, bands, words, ranges."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from diagnosis import decision
+from diagnosis.assessment import remainder_text
+from diagnosis.assessment.bands import POINTS, Bands, quantile
+from diagnosis.assessment.recurrence import Recurrence
+from diagnosis.assessment.remainder import AxisRemainder
+from diagnosis.assessment.windows import WindowErrors, Windows, between_steps
+from diagnosis.decision import concluded
+from diagnosis.identification.conclusion import interval, laplace_std, suspected
+from diagnosis.identification.confidence import Evidence, confidence, evidence, variation
+from diagnosis.identification.findings import Finding, Findings
+from diagnosis.identification.gram import Nuisance
+from diagnosis.identification.multistart import Landscape, linear_ones, same
+from diagnosis.identification.prior import NominalPrior
+from diagnosis.model import Model
+from diagnosis.model.uncertainty import NOISE_TOLERANCE
+from fmus.declare import Range, Variable
+from fmus.scale import Scale
+
+
+def drawn(*shape, seed=0):
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+# Confidence
+
+
+def test_confidence_is_even_odds_where_a_third_is_left_or_the_size_varies_by_as_much():
+    assert confidence(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
+    third = 4.6 / 14.0
+    for left, varies in ((third, 0.0), (0.0, third), (0.5 * third, 0.5 * third)):
+        assert confidence(Evidence(0.8, left, varies)) == pytest.approx(0.4)
+
+
+def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_an_axis():
+    ones, one_block = np.ones((60, 3)), np.zeros(60, int)
+    left, std = ones * [0.5, 0.1, 9.0], ones * [0.2, 0.1, 1.0] / NOISE_TOLERANCE
+    e = evidence(0.7, ones * [2.0, 1.0, 0.0], left, std, one_block)
+    weight = np.array([2.0**2 / 0.2**2, 1.0 / 0.1**2])
+    assert e.left == pytest.approx(np.sqrt(weight @ [(0.5**2 - 0.2**2) / 2.0**2, 0.0] / weight.sum()))
+    assert (e.bagged, e.varies) == (0.7, 0.0)
+    assert evidence(0.7, 0.0 * ones, left, std, one_block).left == 0.0
+
+
+def test_the_size_of_an_effect_varies_by_its_spread_less_that_of_noise():
+    force, blocks = np.full((40, 3), 2.0), np.arange(40) // 10
+    size = np.array([0.2, -0.3, 0.5, 0.1])
+    weight = 10 * 3 * 2.0**2
+    found = variation(force, size[blocks, None] * force, blocks)
+    assert found == pytest.approx(np.sqrt(size.var(ddof=1) - 1.0 / weight))
+    two = np.where(np.arange(40) < 10, 3, 7)
+    h = 1.0 / (1.0 / weight + 1.0 / (3 * weight))
+    found = variation(force, np.where(two == 3, 0.4, 0.0)[:, None] * force, two)
+    assert found == pytest.approx(np.sqrt((0.4**2 * h - 1.0) / (2.0 * h)))
+    assert variation(force, 0.01 * force, two) == 0.0
+    assert variation(force * (two == 3)[:, None], force, two) == 0.0, "of one block nothing varies"
+
+
+def test_intervals_and_deviations_are_those_of_a_normal_distribution():
+    assert interval(3.0, 0.5) == pytest.approx((3.0 - 0.98, 3.0 + 0.98), abs=1e-4)
+    columns, weight = drawn(50, 3, 2), np.array([2.0, 1.0, 0.5])
+    A = (columns * weight[:, None]).reshape(-1, 2)
+    prior = np.diag([0.0, 9.0])
+    n = Nuisance(columns, prior, np.zeros(2), np.ones(2))
+    exact = np.sqrt(np.diag(np.linalg.inv(A.T @ A + prior)))
+    assert laplace_std(SimpleNamespace(weight=weight), n) == pytest.approx(exact, rel=1e-6)
+    three = NominalPrior({"a": 10.0, "b": -2.0, "c": 1.0}, {"a": 1.0, "b": 0.5, "c": 0.1})
+    found = suspected(three, np.array([1.0, -3.0, 0.5]), np.array([0.1, 0.1, 10.0]))
+    assert [(s.name, s.z, s.value) for s in found] == [("b", -3.0, -3.5), ("a", 1.0, 11.0)]
+
+
+# Bands, and errors of windows
+
+
+def bands(covariance):
+    """Two windows of three steps of 2 s, and samples at 1 s and 4 s of the first, 3 s of the second."""
+    windows = SimpleNamespace(since=np.array([1.0, 4.0, 3.0]), sample_window=np.array([0, 0, 1]))
+    predicted = np.arange(18.0).reshape(2, 3, 3)
+    return Bands(windows, np.array([0.0, 2.0, 4.0]), predicted, covariance)
+
+
+def test_bands_have_the_covariance_of_their_time_and_the_probability_of_their_level():
+    for level in (0.5, 0.9, 0.99):
+        for dof in (1, 2):
+            assert quantile(level, dof) == pytest.approx(chi2.ppf(level, dof))
+    V = np.array([[4.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.25]])
+    size = np.array([[1.0, 2.0, 5.0], [1.0, 3.0, 4.0]])
+    b = bands(size[..., None, None] * V)
+    assert b.at_samples == pytest.approx(np.array([1.5, 5.0, 3.5])[:, None, None] * V)
+    step = np.sqrt(quantile(0.9, 1) * 0.25 * np.array([1.0, 3.0, 4.0]))
+    assert b.headings(1, 0.9) == pytest.approx(b.predicted[1, :, 2] + np.array([[-1.0], [1.0]]) * step)
+    ellipses = b.ellipses(1, 0.5)
+    assert ellipses.shape == (3, POINTS, 2)
+    assert ellipses[:, 0] == pytest.approx(ellipses[:, -1])
+    off = ellipses - b.predicted[1, :, None, :2]
+    squares = np.einsum("tpi,ij,tpj->tp", off, np.linalg.inv(V[:2, :2]), off)
+    assert squares == pytest.approx(np.tile(quantile(0.5, 2) * size[1][:, None], POINTS))
+    for share, within in ((0.99, True), (1.01, False)):
+        root = np.linalg.cholesky(V[:2, :2]) @ [0.6, -0.8]
+        place = share * np.sqrt(quantile(0.9, 2) * np.array([1.5, 5.0, 3.5]))[:, None] * root
+        heading = share * np.sqrt(quantile(0.9, 1) * 0.25 * np.array([1.5, 5.0, 3.5]))
+        residuals = np.column_stack([place, heading])
+        assert b.inside(residuals, 0.9).tolist() == [[within] * 2] * 3
+        assert b.coverage(residuals) == b.coverage(-residuals) == float(within)
+        assert b.coverage(residuals * [1.0, 1.0, 0.0]) == (1.0 if within else 0.5)
+        assert b.coverage(residuals, 0.999) == 1.0
+
+
+def test_errors_of_windows_are_root_mean_squares_by_their_samples():
+    w = object.__new__(Windows)
+    w.run, w.start, w.sample_window = np.array([0, 0, 1]), np.array([0.0, 8.0, 0.0]), np.array([0, 0, 1, 2, 2])  # fmt: skip
+    off = drawn(5, 3)
+    e = w.summary(off)
+    assert e.samples.tolist() == [2, 1, 2]
+    assert e.position[0] == pytest.approx(np.sqrt(np.square(off[:2, :2]).sum() / 2.0))
+    assert e.heading == pytest.approx([np.sqrt(np.mean(off[k, 2] ** 2)) for k in ([0, 1], [2], [3, 4])])
+    for run, rows in ((None, slice(None)), (0, slice(3)), (1, slice(3, None))):
+        position, heading = e.over_all(run)
+        assert position == pytest.approx(np.sqrt(np.square(off[rows, :2]).sum(axis=1).mean()))
+        assert heading == pytest.approx(np.sqrt(np.mean(off[rows, 2] ** 2)))
+    two = w.summary(np.stack([off, 2.0 * off]))
+    assert two.position[1] == pytest.approx(2.0 * e.position)
+    off[1, 0] = np.nan
+    lost = w.summary(off)
+    assert np.isinf(lost.position).tolist() == [True, False, False]
+    assert lost.heading == pytest.approx(e.heading)
+    none = WindowErrors(*np.zeros((3, 0)), np.zeros(0), np.zeros(0)).over_all()
+    assert np.isnan(none).all()
+
+
+def test_poses_between_steps_are_on_a_line_and_headings_on_the_short_way():
+    steps = np.zeros((3, 3, 2, 2))
+    steps[:, 0] = np.array([0.0, 2.0, 6.0])[:, None, None] * [[1.0, 10.0], [2.0, 20.0]]
+    steps[:, 2] = np.array([3.0, -3.0, -2.0])[:, None, None]
+    found = between_steps(steps, np.array([0, 1, 0, 1]), np.array([0.5, 1.25, 2.0, 3.0]))
+    assert found.shape == (2, 4, 3)
+    assert found[0, :, 0] == pytest.approx([1.0, 30.0, 6.0, 100.0]), "beyond the last step goes on"
+    assert found[1, :, 0] == pytest.approx(2.0 * found[0, :, 0])
+    assert found[0, :2, 2] == pytest.approx([3.0 + 0.5 * (2.0 * np.pi - 6.0), -2.75])
+
+
+# The remainder in words
+
+LEFT = AxisRemainder(0.5, 0.1, 0.04, 0.3, 1e-9, 0.2, True)
+SLIGHT = replace(LEFT, significant=False)
+NOTHING = replace(SLIGHT, p_value=0.5)
+
+
+def repeats(best=None, lasts=10.0, in_part=False):
+    shares = dict.fromkeys(("place", "motion", "command", "time"), 0.0)
+    return Recurrence(shares | ({best: 0.6} if best else {}), lasts, in_part)
+
+
+@pytest.mark.parametrize(
+    ("how", "scale", "comes", "cause"),
+    [
+        (repeats("place"), 1.0, "repeats with the place", "a bank"),
+        (repeats("place", in_part=True), 1.0, "repeats with the place", "a bank"),
+        (repeats("motion"), 1.0, "speed, drift and turn", "a force on the hull"),
+        (repeats("motion", in_part=True), 1.0, "in proportion to the command", "fails and comes back"),
+        (repeats("command"), 1.0, "with the commands", "another force than the model"),
+        (repeats("time"), 1.0, "since a run began", "a drift"),
+        (repeats(lasts=3.1), 1.0, "lasts for about 3 s", "gusts"),
+        (repeats(lasts=2.9), 1.0, "soon over", "waves"),
+        (
+            repeats(lasts=5.9),
+            4.0,
+            "soon over",
+            "waves",
+        ),  # a ship of four times the length, twice the time
+        (repeats(lasts=6.1), 4.0, "lasts for about 6 s", "gusts"),
+    ],
+)
+def test_what_a_remainder_repeats_with_suggests_its_cause(how, scale, comes, cause):
+    axes = {"X": LEFT, "Y": NOTHING, "N": replace(LEFT, share=1.0)}
+    place = SimpleNamespace(axis="N", phrase="in the north")
+    text = remainder_text.remainder_sentence(axes, [how] * 3, [place], False, Scale(scale))
+    assert text.startswith("Surge: 0.5 N (uncertainty 0.1, 20 % of the first error) and Yaw: 0.5 N m (uncertainty 0.1)")  # fmt: skip
+    assert "not explained, most in the north. It " in text
+    assert "Sway" not in text
+    assert comes in text
+    assert cause in text
+    apart = remainder_text.remainder_sentence(axes, [how, how, repeats("time")], [], True, Scale(scale))
+    assert ("and Yaw" in apart) == (how.best == "time")
+    assert ", most" not in apart
+    assert apart.endswith("which no model can foretell.")
+
+
+def test_little_and_nothing_are_left():
+    axes = dict.fromkeys("XYN", NOTHING)
+    said = [remainder_text.remainder_sentence(a, None, [], False) for a in (axes, axes | {"N": SLIGHT})]
+    assert said == [remainder_text.NOTHING_LEFT, remainder_text.LITTLE_LEFT]
+    assert [a.beyond_chance for a in (NOTHING, SLIGHT, replace(LEFT, p_value=0.01 / 6.0))] == [False, True, False]  # fmt: skip
+
+
+# Coefficients alone, in place of effects that are not believed
+
+START = Model()
+OTHER = START.plus({"delta_X_u": -1.0})
+
+
+@pytest.mark.parametrize(
+    ("changes", "refitted"),
+    [
+        ({}, True),
+        ({"together": 0.5}, False),  # a finding is believed
+        ({"left_at_first": False}, False),  # nothing was missing
+        ({"left_with": True}, False),
+        ({"plausible": False}, False),
+        ({"judges": False}, False),
+        ({"harms": {"first"}}, False),
+        ({"harms": {"found"}}, False),
+        ({"effects": False}, True),
+        ({"effects": False, "harms": {"first"}}, False),
+        ({"refit": False}, False),
+    ],
+)
+def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatch, changes, refitted):
+    case = {
+        "together": 0.49,
+        "left_at_first": True,
+        "left_with": False,
+        "plausible": True,
+        "judges": True,
+    }
+    case |= {"harms": set(), "effects": True, "refit": True} | changes
+    alone = Findings(refitted=OTHER, model=START, moved={"X_u": 1.0 if case["plausible"] else 99.0})
+    assert alone.plausible == case["plausible"]
+    effects = [Finding("X_u", {}, {}, 0.3, [], 0.5, 0.5, together=case["together"])]
+    found = replace(alone, effects=effects if case["effects"] else [], refit=(lambda ids: alone) if case["refit"] else None)  # fmt: skip
+    names = {id(found): "found", id(START): "first"}
+    monkeypatch.setattr(decision, "without", lambda f, ids, start: alone)
+    monkeypatch.setattr(decision, "harm", lambda now, each: each in case["harms"])
+    monkeypatch.setattr(
+        decision,
+        "something_left",
+        lambda runs, start, m: case["left_at_first" if m is START else "left_with"],
+    )
+    unseen = SimpleNamespace(
+        judges=lambda f: case["judges"],
+        losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
+    )
+    c = concluded(found, [], unseen, START)
+    assert c.refitted == refitted
+    if refitted:
+        assert c.learned.model is OTHER
+        assert list(c.dropped) == list(found.effects)
+    elif case["effects"]:
+        assert c.learned is found
+        assert not c.dropped
+    else:
+        assert c.learned.model is START
+        assert c.learned.suspects == []
+
+
+# Ranges in which parameters are tried
+
+
+def declared(name, unit, low=None, high=None):
+    return Variable(name, unit, name, 1.0, Range(low, high), False)
+
+
+def landscape(force=lambda v: np.ones(4), values=None, shape=("s",), coefficients=("k",), **ranges):
+    names = dict.fromkeys([*shape, *coefficients])
+    parameters = tuple(declared(n, *ranges.get(n, ("1",))) for n in names)
+    effect = SimpleNamespace(parameters=parameters, shape_parameters=shape, coefficients=coefficients)
+    return Landscape(effect, force, np.ones(4), 20.0, values or dict.fromkeys(names, 0.0), {"k": 5.0})
+
+
+@pytest.mark.parametrize(
+    ("range_", "value", "places"),
+    [
+        (("1", 2.0, 6.0), 0.0, [2.0, 3.0, 4.0, 6.0]),
+        (("1", 0.01, 100.0), 0.0, [0.01, 0.1, 1.0, 100.0]),  # over the logarithm
+        (("1", 1.0, 100.0), 0.0, [1.0, 25.75, 50.5, 100.0]),
+        (
+            ("1",),
+            2.0,
+            [-18.0, 2.0 - 2.0 * np.sinh(0.5 * np.arcsinh(10.0)), 2.0, 22.0],
+        ),  # ten times itself
+        (("m",), 0.5, [-39.5, 0.5 - 4.0 * np.sinh(0.5 * np.arcsinh(10.0)), 0.5, 40.5]),  # of the way
+        (("m", 0.0), 0.5, [0.0, 0.0, 0.5, 40.5]),
+        (("rad",), 0.0, [-np.pi, -0.1 * np.pi * np.sinh(0.5 * np.arcsinh(10.0)), 0.0, np.pi]),
+        (("1", None, 3.0), 0.0, [-30.0, -3.0 * np.sinh(0.5 * np.arcsinh(10.0)), 0.0, 3.0]),
+        (("1",), 0.0, [-10.0, -np.sinh(0.5 * np.arcsinh(10.0)), 0.0, 10.0]),
+    ],
+)
+def test_values_are_tried_over_the_limits_or_far_to_both_sides(range_, value, places):
+    of = landscape(values={"s": value, "k": 0.0}, s=range_)
+    (p,) = of.declared(["s"])
+    assert [of.within(p, share) for share in (0.0, 0.25, 0.5, 1.0)] == pytest.approx(places)
+    tried = [v["s"] for v in of.points(["s"])]
+    assert tried[0] == value
+    assert len(tried) == 33
+    assert of.within(p, 31.0 / 32.0) == pytest.approx(max(tried[1:]))
+    assert same(of, {"s": 1.0}, {"s": 1.0 + 0.0099 * of.scale(p)})
+    assert not same(of, {"s": 1.0}, {"s": 1.0 + 0.0101 * of.scale(p)})
+
+
+def test_coefficients_are_linear_idle_or_neither():
+    x = np.array([1.0, 2.0, -1.0, 0.5])
+
+    def force(v):
+        return v["a"] * x + np.tanh(v["b"]) * x**2 + v["c"] * v["a"] + 1e-10 * v["d"] * x
+
+    none = dict.fromkeys("sabcd", 0.0)
+    of = landscape(lambda v: force({**none, **v}), none, ("s",), tuple("abcd"))
+    assert linear_ones(of) == (["a"], ["c", "d"])
+    assert of.columns({"s": 0.0}, ["a", "b"]) == pytest.approx(np.column_stack([x, np.tanh(1.0) * x**2]))
+    assert of.size({"a": 2.0}) == pytest.approx(2.0 * np.sqrt(np.mean(x**2)))
+    line = np.ones(4) - x * (x.sum() / (x @ x))
+    assert of.left({"s": 0.0}, ["a"]) == pytest.approx(line)
+    assert of.left({"a": 0.5}, []) == pytest.approx(np.ones(4) - 0.5 * x)
+    lost = landscape(lambda v: np.full(4, np.nan))
+    assert lost.left({"s": 0.0}, ["k"]) == pytest.approx(np.ones(4))
+    assert [landscape(k=r).unit("k") for r in (("1",), ("1", None, 4.0), ("1", None, 40.0))] == [
+        5.0,
+        2.0,
+        5.0,
+    ]
