@@ -41,6 +41,7 @@ OPERATIONS = {
     "and": lambda a, b: a & b,
     "or": lambda a, b: a | b,
 }
+FACTORS = {"mul": 2, "div": 1}  # how many arguments of an operation make it 0 where they are
 
 
 class TraceError(Exception):
@@ -181,29 +182,33 @@ def evaluate(results: Sequence[Any], values: dict[str, Any]) -> list[Any]:
 
 def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
     """Names of the variables that each result depends on; a factor that is exactly 0 cuts."""
-    known: dict[int, frozenset[str] | float] = {}
-    nothing: frozenset[str] = frozenset()
+    names: list[str] = []
+    followed: dict[int, int] = {}  # bit k stands for names[k]; none is set where the value is constant
+    constant: dict[int, Any] = {}
 
-    def of(arg: Any) -> frozenset[str] | float:
-        return known[id(arg)] if isinstance(arg, Symbol) else arg
+    def of(arg: Any) -> tuple[int, Any]:
+        return (followed[id(arg)], constant.get(id(arg))) if isinstance(arg, Symbol) else (0, arg)
 
     for node in ordered(results):
         if node.operation == "variable":
-            known[id(node)] = frozenset(node.args)
+            followed[id(node)] = 1 << len(names)
+            names += node.args
             continue
-        args = [of(a) for a in node.args]
-        if all(not isinstance(a, frozenset) for a in args):
-            known[id(node)] = OPERATIONS[node.operation](*args)
-        elif 0.0 in {"mul": args, "div": args[:1]}.get(node.operation, ()):
-            known[id(node)] = 0.0
-        elif node.operation == "where" and not isinstance(args[0], frozenset):
-            known[id(node)] = args[1] if args[0] else args[2]
-        elif node.operation == "and" and any(a is False for a in args):
-            known[id(node)] = False
-        else:
-            known[id(node)] = nothing.union(*[a for a in args if isinstance(a, frozenset)])
-    found = [of(r) for r in results]
-    return [r if isinstance(r, frozenset) else nothing for r in found]
+        args = [of(arg) for arg in node.args]
+        bits, value = 0, None
+        for more, _ in args:
+            bits |= more
+        if not bits:
+            value = OPERATIONS[node.operation](*[x for _, x in args])
+        elif any(x == 0.0 for _, x in args[: FACTORS.get(node.operation, 0)]):
+            bits, value = 0, 0.0
+        elif node.operation == "where" and not args[0][0]:
+            bits, value = args[1] if args[0][1] else args[2]
+        elif node.operation == "and" and any(x is False for _, x in args):
+            bits, value = 0, False
+        followed[id(node)], constant[id(node)] = bits, value
+    masks = [of(result)[0] for result in results]
+    return [frozenset(name for k, name in enumerate(names) if mask >> k & 1) for mask in masks]
 
 
 def output_dependencies(component: Component) -> list[frozenset[str]]:
