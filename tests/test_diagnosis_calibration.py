@@ -17,13 +17,19 @@ from diagnosis.prediction_error.fit import fit_to, shootings
 
 DRAG = -2.0  # N s/m, hidden
 MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded
+STREAM_EAST = 0.04  # m/s
 PRIOR = NominalPrior.of(Model())
 
 
 @cache
-def runs(drag=DRAG):
-    """Runs of a ship that may have more drag than the model, each turned by a constant of its own."""
-    ships = [{"delta_X_u": drag, "body_bias_N": moment if drag else 0.0} for moment in MOMENTS]
+def runs(drag=DRAG, east=0.0):
+    """Runs of a ship that may have more drag than the model, each turned by a constant of its own.
+
+    The water goes east [m/s].
+    """
+    ships = [
+        {"delta_X_u": drag, "body_bias_N": moment if drag else 0.0, "V_e": east} for moment in MOMENTS
+    ]
     tracks = [smoothed(sail(seed=k, ship=ship)[0]) for k, ship in enumerate(ships)]
     named = [
         replace(s, track=replace(s.track, run=replace(s.track.run, name=f"run {k}")))
@@ -62,7 +68,7 @@ def test_the_drag_is_found_beside_constants_of_each_run():
     )
     assert after - true < 0.3 * (before - true)
     assert [model.value(n) for n in CONSTANTS] == [0.0, 0.0]
-    assert len(problem.without_each_run(fitted.estimate, problem.information(fitted.estimate))) == 4
+    assert len(problem.without_each_run(fitted.estimate)) == 4
 
 
 @pytest.mark.slow
@@ -82,6 +88,15 @@ def test_it_is_kept_where_runs_left_out_are_predicted_better():
     assert not out.findings.effects
     assert not out.findings.suspects
     assert "vessel.X_u" in out.posterior.names
+    assert abs(out.findings.model.value("V_e")) < 1e-3, "still water"
+
+
+@pytest.mark.slow
+def test_a_current_is_in_the_calibrated_model_where_runs_left_out_show_it():
+    out = calibrated(nothing_found(), runs(east=STREAM_EAST), [], Model(), PRIOR)
+    assert out is not None
+    water = [out.findings.model.value(n) for n in ("V_n", "V_e")]
+    assert water == pytest.approx([0.0, STREAM_EAST], abs=0.15 * STREAM_EAST)
 
 
 @pytest.mark.slow
