@@ -16,6 +16,7 @@ from support.command import command
 
 import cosim
 import diagnosis.assessment
+import diagnosis.calibrated_model
 import diagnosis.decision
 import diagnosis.identification
 import diagnosis.model
