@@ -128,7 +128,7 @@ class Covering:
     def _measure(self, files: Sequence[str], processes: int) -> dict[str, float]:
         """Seconds of each quick test that passes, of some files or of all."""
         self.out.mkdir(parents=True, exist_ok=True)
-        settings, report = self.out / "coverage.ini", self.out / "junit.xml"
+        settings, report = self.out / "settings.ini", self.out / "junit.xml"
         session = self.out / "changed" if files else self.cache.parent
         settings.write_text(COVERAGE, encoding="utf-8")
         copy = self.out / "copy"

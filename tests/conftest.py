@@ -9,6 +9,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import settings
 from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
@@ -22,6 +23,10 @@ from cosim.system import own_fmus
 from fmus.build import build
 from fmus.build.cached_fmu import cache_folder
 from fmus.build.platforms import native_targets
+
+# The clock of one example tells what else the machine does, and what traces the test.
+settings.register_profile("by no clock", deadline=None)
+settings.load_profile("by no clock")
 
 # Reasons to skip that are no matter of what is installed; with CYBERSHIP_REQUIRE=all any other one fails.
 ACCEPTED = (

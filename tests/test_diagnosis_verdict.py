@@ -450,6 +450,7 @@ def test_one_block_with_most_of_the_loss_hides_no_gain_in_the_others():
     assert not lower_throughout(np.zeros(31), np.append(-np.ones(30), 1000.0)), "in one block alone"
     assert not lower_throughout(np.append(np.zeros(30), 1000.0), np.append(np.ones(30), 0.0))
     assert not lower_throughout(before, before)
+    assert lower_throughout(np.zeros(31), 1e-3 * before), "however small the unit"
 
 
 def test_a_gain_by_chance_is_seldom_shown():

@@ -167,7 +167,7 @@ def test_a_ship_that_is_not_there_is_told(name: str, says: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_file_that_is_cut_or_garbled_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     whole = (ROOT / "ships" / "otter.toml").read_bytes()

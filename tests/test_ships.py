@@ -620,7 +620,7 @@ def test_the_file_of_cse1_says_what_the_components_declare():
     assert SHIPS["cse1"].scale.length == 1.0
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.lists(st.tuples(*[st.floats(-0.9, 0.9)] * 3), min_size=3, max_size=3))
 def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
     declared, read = ship(), ship(description=SHIPS["cse1"])
