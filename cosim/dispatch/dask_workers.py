@@ -15,6 +15,7 @@ from queue import Empty, Queue
 from threading import Thread
 from typing import Any
 
+from dask.config import set as settings
 from distributed import (
     Client,
     Future,
@@ -45,6 +46,12 @@ ANSWER = 10.0
 WITHOUT_WORKERS, GLANCE = 120.0, 1.0
 # How often the workers of a task may die here before it is suspected; chosen: once by chance.
 DEATHS = 1
+# What Dask watches beside the tasks took 9 % of a core with two workers that did nothing, and takes 1 %.
+LIGHT = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+}
 LOST, KEPT = "the workers were lost", "finished runs are kept"
 
 
@@ -90,7 +97,7 @@ class DaskWorkers:
             if address is None:
                 self._program.enter_context(without_program())  # also for workers that start again
                 # A Ctrl-C is for this process alone; the workers end with it.
-                with UninterruptedProcesses():
+                with UninterruptedProcesses(), settings(LIGHT):
                     self._cluster = LocalCluster(
                         n_workers=workers or os.cpu_count() or 1,
                         threads_per_worker=1,  # FMUs of one process cannot run side by side

@@ -252,8 +252,9 @@ def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.nda
     except ImportError:
         raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
     try:
-        wanted = _wanted(parquet.read_schema(path).names, columns, path)
-        table = parquet.read_table(path, columns=wanted)
+        with parquet.ParquetFile(path) as file:  # read_table would import pandas
+            wanted = _wanted(file.schema_arrow.names, columns, path)
+            table = file.read(columns=wanted)
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a log: {error}") from error
     return {name: table[name].to_numpy() for name in wanted}
