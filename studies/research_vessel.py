@@ -24,7 +24,7 @@ from diagnosis.model import ship_with
 from diagnosis.progress import silent
 from diagnosis.sensors import Examined, examine
 
-from .ship_folds import Fold, folds_command, learn_folds, write_folds
+from .ship_folds import Fold, folds_command, learn_folds, titled, write_folds
 from .study_report import Report
 
 HORIZON = 60.0  # s, of predictions: the ship goes ten lengths
@@ -194,7 +194,7 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
     parts = [p for run, e in trials for p in cut(run, e, MANOEUVRES[run.name])]
     parts = parts[::3] if quick else parts
     runs = diagnosis.gather(parts, model=model, anyway=True, horizon=HORIZON)
-    report = Report(out, "R/V Gunnerus: sea trial")
+    report = Report(out, titled("R/V Gunnerus: sea trial", by))
     report.text(
         f"{len(runs)} manoeuvres; the nominal model is the published one (`ships/gunnerus.toml`), the "
         f"position measured {ahead:.3g} m ahead of the centre of gravity. Predictions over "

@@ -73,6 +73,11 @@ def folds_command(
     run_study(partial(study, options.data, options.out, folds, by, options.quick))
 
 
+def titled(title: str, by: str | Method) -> str:
+    """The title of a report, with the method where it is not the usual one."""
+    return title if isinstance(by, str) else f"{title}, by {by.name} alone"
+
+
 def learn_folds(
     runs: Sequence[WeakWindows],
     folds: int | None,

@@ -18,7 +18,7 @@ from diagnosis.identification import Method
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 
-from .ship_folds import folds_command, learn_folds, write_folds
+from .ship_folds import folds_command, learn_folds, titled, write_folds
 from .study_report import Report
 
 # Column of the files -> signal, factor to SI. The angle of the rudder has the opposite sign there.
@@ -55,7 +55,7 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
     model = Model(ship=ship_with((), "kvlcc2"))
     chosen = files[::4] if quick else files
     runs = diagnosis.gather([read(f, model) for f in chosen], model=model, anyway=True)
-    report = Report(out, "KVLCC2, a tanker of 7 m: free-running zig-zags")
+    report = Report(out, titled("KVLCC2, a tanker of 7 m: free-running zig-zags", by))
     report.text(
         f"{len(runs)} zig-zags; the nominal model is that of the MMG standard method "
         f"(`ships/kvlcc2.toml`). Predictions over {runs[0].horizon:.3g} s; model error in windows of "
