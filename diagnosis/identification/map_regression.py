@@ -164,7 +164,9 @@ def held_out_loss(t: GramTable, options: Sequence[Regression], folds: Folds) -> 
     best = np.argmin([f.loss(folds.train) + f.penalty for f in fits], axis=0)
     for k, held in enumerate(folds.held):
         fit = fits[best[k]]
-        found[held] = fit._replace(left=fit.left[k]).loss(t.grams[held])
+        # In one step: whole Gram matrices of the blocks would be copied, of which few columns are used.
+        part = t.grams[held[:, None, None], fit.used[:, None], fit.used]
+        found[held] = _form(part, fit.left[k])
     return found
 
 

@@ -116,8 +116,7 @@ class Estimate:
 
 def timed(ship: Ship, name: str) -> Effect | None:
     """The effect of a ship that a value is a time within a run of; None: it is none."""
-    parameter, _ = parameter_and_run(name)
-    return next((e for e in ship.effects.values() if parameter in e.search.times), None)
+    return ship.effects.timed.get(parameter_and_run(name)[0])
 
 
 def bounded(start: Model, name: str, addition: float) -> float:

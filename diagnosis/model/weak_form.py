@@ -110,6 +110,11 @@ class WeakWindows:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
+    @cached_property
+    def half_known(self) -> np.ndarray:
+        """(n - 1, 1), a half where a sample and the next have a smoothed state, else zero."""
+        return np.where(self.known[:-1] & self.known[1:], 0.5, 0.0)[:, None]
+
     def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
@@ -237,8 +242,11 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
+    def met() -> np.ndarray:
+        return halfway(w, inflow_along(w, model, eta, nu))
+
     def drives() -> np.ndarray:
-        return w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
+        return w.held @ thrust_along(w, model, w.recall("met", (measured, water), met))
 
     driven = w.recall("driven", drive, drives)
     driven = driven @ model.effective_thrust.T
@@ -296,9 +304,8 @@ def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
         w: windows of the run.
         nu: (n, 3), at the samples, zero where it is not known.
     """
-    both = w.known[:-1] & w.known[1:]
     middle = nu.copy()
-    middle[:-1][both] += 0.5 * (nu[1:] - nu[:-1])[both]
+    middle[:-1] += w.half_known * np.diff(nu, axis=0)
     return middle
 
 

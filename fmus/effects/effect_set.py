@@ -22,6 +22,9 @@ class EffectSet(Mapping[str, Effect]):
         effects: the effects.
         files: users' files that some of them are from.
 
+    Attributes:
+        timed: parameter that is a time within a run -> its effect.
+
     Raises:
         DeclarationError: an id or a parameter is declared twice.
     """
@@ -39,6 +42,10 @@ class EffectSet(Mapping[str, Effect]):
                     raise DeclarationError(f"'{p.name}' is a parameter of the effect '{owner}' already")
                 taken[p.name] = e.id
             self._effects[e.id] = e
+        self.timed = {name: e for e in self._effects.values() for name in e.search.times}
+        self._kinds: dict[Kind, list[Effect]] = {}
+        for e in self._effects.values():
+            self._kinds.setdefault(e.kind, []).append(e)
 
     def __getitem__(self, name: str) -> Effect:
         if name not in self._effects:
@@ -63,7 +70,7 @@ class EffectSet(Mapping[str, Effect]):
 
     def of_kind(self, *kinds: Kind) -> list[Effect]:
         """The effects of some kinds: kind by kind, in the order of declaration."""
-        return [e for kind in kinds for e in self.values() if e.kind == kind]
+        return [e for kind in kinds for e in self._kinds.get(kind, ())]
 
     def plus(self, effects: Iterable[Effect], file: Path | None = None) -> "EffectSet":
         """The set with further effects, of a user's file.
