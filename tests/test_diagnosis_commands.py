@@ -25,6 +25,7 @@ from support.shared import once
 import diagnosis
 from cosim import InputError
 from diagnosis import compare, learn, result_folder, session
+from diagnosis.assessment.stability import OPERATING, least_dissipation
 from diagnosis.report import result_keys
 from diagnosis.result_folder import together
 from fmus.effects import STANDARD
@@ -153,6 +154,53 @@ def test_json_has_every_key_of_the_format(learned):
         assert content["data"][name] == sum(r[name] for r in content["data"]["runs"])
     stable = {"nominal_min_dissipation", "learned_min_dissipation", "bounded", "region"}
     assert stable <= set(content["stability"])
+
+
+def test_the_files_agree_with_each_other_and_with_the_model(learned):
+    out, _, _ = learned
+    content, posterior = strict(out / "diagnosis.json"), strict(out / "posterior.json")
+    start, last, deviation = diagnosis.Model(), model(out), np.sqrt(np.diag(posterior["covariance"]))
+    std = dict(zip(posterior["names"], deviation, strict=True))
+    assert [c["name"] for c in content["coefficients"][:2]] == ["vessel.m", "vessel.I_z"]
+    known = {c["name"] for c in content["coefficients"]}
+    assert known >= {f"{start.owner(n)}.{n}" for n in start.ship.coefficients if start.value(n)}
+    for c in content["coefficients"]:
+        name = c["name"].partition(".")[2]
+        assert (c["before"], c["unit"]) == (start.value(name), start.declared(name).unit)
+        assert c["after"] == pytest.approx(last.value(name))
+        half = 1.96 * std[c["name"]]
+        assert c["ci95"] == pytest.approx((c["after"] - half, c["after"] + half))
+        assert (c["origin"] == "learned") == (name == "delta_X_u")
+    (effect,) = content["effects"]
+    assert effect["coefficients"]["delta_X_u"]["ci95"] == pytest.approx(c["ci95"], rel=1e-4)
+    table = pd.read_csv(out / "coefficients.csv")
+    assert [*table.columns] == ["name", "unit", "before", "after", "ci95_low", "ci95_high", "origin"]
+    rows = [[c["before"], c["after"], *c["ci95"]] for c in content["coefficients"]]
+    np.testing.assert_allclose(table[["before", "after", "ci95_low", "ci95_high"]], rows)
+    assert (out / "coefficients.tex").read_text(encoding="utf-8").count(r"\\") == len(table) + 1
+    correlation = np.array(content["correlation"]["matrix"])
+    assert correlation * np.outer(deviation, deviation) == pytest.approx(
+        np.array(posterior["covariance"])
+    )
+    assert [(r["run"], r["seconds"], r["samples"]) for r in content["data"]["runs"]] == [("a", 96.0, 1920), ("b", 48.0, 960)]  # fmt: skip
+    assert content["windows"] == {"prediction": 8.0, "model_error": 3.0}
+    assert (content["runs"], content["model"], content["seed"], content["prior"]) == (["a", "b"], None, 0, None)  # fmt: skip
+    assert content["files"] == ["diagnosis.json", "model.ssv", "posterior.json", "report.html", "coefficients.csv", "coefficients.tex"]  # fmt: skip
+    assert content["versions"]["numpy"] == np.__version__
+    scores = [r["score"] for r in content["ranking"]]
+    assert scores == sorted(scores)
+    assert [r["behind"] for r in content["ranking"]] == pytest.approx([s - scores[0] for s in scores])
+    for axis, left in content["remainder"]["axes"].items():
+        for key, total in (("where_after", left["rms"]), ("where", left["rms"] / left["share"] ** 0.5)):
+            profiles = [p for p in content[key]["profiles"] if (p["axis"], p["run"]) == (axis, None)]
+            assert profiles
+            for p in profiles:
+                squares = [
+                    n * (x or 0.0) ** 2 for n, x in zip(p["share_of_time"], p["rms"], strict=True)
+                ]
+                assert math.sqrt(sum(squares)) == pytest.approx(total)
+    for key, of in (("nominal", start), ("learned", last)):  # over the region of the data
+        assert least_dissipation(of, OPERATING) < content["stability"][f"{key}_min_dissipation"] < 0.0
 
 
 def test_terminal_tells_what_the_file_tells_within_80_columns(learned):

@@ -15,7 +15,9 @@ from diagnosis import Run
 from diagnosis import repair as command
 from diagnosis.data.telegrams import filled
 from diagnosis.sensors import closure, examine, motion
+from diagnosis.sensors.accelerations import accelerations
 from diagnosis.sensors.clock_path import integral_of
+from diagnosis.sensors.receivers import receivers
 from diagnosis.sensors.wraps import unwrapped
 from diagnosis.smoothing import measured_rates
 from fmus.frames import rotate_to_earth
@@ -212,23 +214,43 @@ def test_rows_between_telegrams_do_not_count():
     assert not filled(t, line + 0.01 * rng.normal(size=line.shape)).any()
 
 
-def test_a_second_antenna_has_its_place():
-    run = made()
+def second(run, ahead=0.0, aside=0.0, late=0.0, turned=0.0):
+    """The run with a second antenna, and a second heading."""
     x, y, psi = run.pose.T
     c, s = np.cos(psi), np.sin(psi)
-    second = {"x_2": x + 0.5 * c + 0.2 * s, "y_2": y + 0.5 * s - 0.2 * c, "psi_2": psi + 0.03}
-    found = told(beside(run, **second))
-    assert found["x_2", "place"].value == pytest.approx(0.5, abs=0.01)
-    assert found["y_2", "place"].value == pytest.approx(-0.2, abs=0.01)
-    assert found["psi_2", "offset"].value == pytest.approx(0.03, abs=1e-3)
+    x, y = x + ahead * c - aside * s, y + ahead * s + aside * c
+    x, y = (np.interp(run.time - late, run.time, column) for column in (x, y))
+    return beside(run, x_2=x, y_2=y, psi_2=psi + turned)
 
 
-def test_a_second_antenna_that_is_late_is_told_by_how_much():
-    run, late = made(), 0.4
-    x, y = (np.interp(run.time - late, run.time, column) for column in run.pose.T[:2])
-    found = told(beside(run, x_2=x, y_2=y))
-    assert found["x_2", "delay"].value == pytest.approx(late, rel=0.1)
-    assert ("x_2", "place") not in found
+@pytest.mark.parametrize("late", [0.0, 0.4])
+@pytest.mark.parametrize("turned", [0.0, 0.03, -0.03])
+@pytest.mark.parametrize(("ahead", "aside"), [(0.0, 0.0), (0.5, -0.2), (0.0, 0.7)])
+def test_a_second_antenna_has_its_place_and_delay_and_a_second_heading_its_offset(
+    ahead, aside, turned, late
+):
+    run = made()
+    found = receivers(second(run, ahead, aside, late, turned), REFERENCE)
+    true = {
+        ("x_2", "place", "m"): (ahead, 0.02),
+        ("y_2", "place", "m"): (aside, 0.02),
+        ("x_2", "delay", "s"): (late, 0.05),
+        ("psi_2", "offset", "rad"): (turned, 1e-3),
+    }
+    told = {(f.channel, f.kind, f.unit): f for f in found.findings}
+    assert told.keys() == {key for key, (value, _) in true.items() if value}
+    for key, f in told.items():
+        assert f.value == pytest.approx(true[key][0], abs=true[key][1])
+        assert f.value - f.ci95[0] == pytest.approx(f.ci95[1] - f.value)
+        assert (f.start, f.end) == (0.0, SECONDS)
+        assert f"{np.degrees(f.value) if f.unit == 'rad' else f.value:.3g}" in f.sentence
+    right = second(run)
+    for name, off in (("x_2", 0.02), ("y_2", 0.02), ("psi_2", 1e-3)):
+        np.testing.assert_allclose(
+            found.run.measured[name][10:-10], right.measured[name][10:-10], atol=off
+        )
+    few = second(run, 0.5, -0.2, turned=0.03).rows(run.time < 5.8)
+    assert not receivers(few, REFERENCE).findings
 
 
 def test_stretches_of_a_clock_are_off_in_one_sense_and_have_the_mean_of_their_time(monkeypatch):
@@ -281,35 +303,50 @@ def test_the_command_writes_a_measurement_without_the_fault(tmp_path, capsys):
     assert command.main([str(tmp_path / "a.csv"), "--out", str(tmp_path / "b.csv")]) == 2
 
 
-def with_acceleration(run, ahead=0.0):
-    """The run with the acceleration of a place ahead, from its true motion."""
+def accelerated(run, ahead=0.0, starboard=0.0, turned=0.0, scale=1.0, a_x=0.0, a_y=0.0):
+    """The run with the acceleration of another place, of axes turned to port, and with offsets."""
     t = run.time
     u, v = 0.25 + 0.08 * np.sin(0.21 * t), 0.03 * np.sin(0.37 * t + 1.0)
     r = 0.12 * np.sin(0.29 * t) + 0.05 * np.sin(0.11 * t)
     r_dot = 0.12 * 0.29 * np.cos(0.29 * t) + 0.05 * 0.11 * np.cos(0.11 * t)
-    a_x = 0.08 * 0.21 * np.cos(0.21 * t) - v * r - ahead * r**2
-    a_y = 0.03 * 0.37 * np.cos(0.37 * t + 1.0) + u * r + ahead * r_dot
-    noise = 2e-3 * np.random.default_rng(5).standard_normal((2, t.size))
-    return beside(run, a_x=a_x + noise[0], a_y=a_y + noise[1])
+    x = 0.08 * 0.21 * np.cos(0.21 * t) - v * r - ahead * r**2 - starboard * r_dot
+    y = 0.03 * 0.37 * np.cos(0.37 * t + 1.0) + u * r + ahead * r_dot - starboard * r**2
+    x, y = np.array([x, y]) + 2e-3 * np.random.default_rng(5).standard_normal((2, t.size))
+    c, s = scale * np.cos(turned), scale * np.sin(turned)
+    return beside(run, a_x=c * x - s * y + a_x, a_y=s * x + c * y + a_y)
 
 
-def test_the_acceleration_is_held_against_the_velocity():
-    run = with_acceleration(made())
-    assert not told(run)
-    a_x, a_y = run.measured["a_x"], run.measured["a_y"]
-    scaled = told(beside(run, a_x=1.1 * a_x, a_y=1.1 * a_y))
-    assert [*scaled] == [("a_x", "scale")]
-    assert scaled["a_x", "scale"].value == pytest.approx(1.1, rel=0.03)
-    offset = examine(beside(run, a_x=a_x + 0.02), REFERENCE)
-    assert [(f.channel, f.kind, f.unit) for f in offset.findings] == [("a_x", "offset", "m/s2")]
-    assert offset.findings[0].value == pytest.approx(0.02, rel=0.1)
-    assert np.mean(offset.run.measured["a_x"] - a_x) == pytest.approx(0.0, abs=2e-3)
-    turned = told(beside(run, a_x=a_x - 0.1 * a_y, a_y=a_y + 0.1 * a_x))
-    assert [(key, f.unit) for key, f in turned.items()] == [(("a_y", "offset"), "rad")]
-    assert abs(turned["a_y", "offset"].value) == pytest.approx(0.1, rel=0.2)
-    place = told(with_acceleration(made(), 1.0))
-    assert [*place] == [("a_x", "place")]
-    assert place["a_x", "place"].value == pytest.approx(1.0, rel=0.2)
+@pytest.mark.parametrize(
+    ("fault", "key", "unit"),
+    [
+        ({}, None, None),
+        ({"scale": 1.1}, ("a_x", "scale"), "1"),
+        ({"a_x": 0.02}, ("a_x", "offset"), "m/s2"),
+        ({"a_y": -0.03}, ("a_y", "offset"), "m/s2"),
+        ({"turned": 0.15}, ("a_y", "offset"), "rad"),
+        ({"turned": -0.15}, ("a_y", "offset"), "rad"),
+        ({"ahead": 1.0}, ("a_x", "place"), "m"),
+        ({"starboard": -1.0}, ("a_y", "place"), "m"),
+    ],
+)
+def test_the_acceleration_is_held_against_the_velocity(fault, key, unit):
+    run, right = accelerated(made(), **fault), accelerated(made())
+    found = accelerations(run, REFERENCE)
+    assert [(f.channel, f.kind) for f in found.findings] == ([key] if fault else [])
+    assert not accelerations(made(), REFERENCE).findings, "without one, nothing is held"
+    if fault:
+        (finding,), ((_, value),) = found.findings, fault.items()
+        assert finding.unit == unit
+        assert finding.value == pytest.approx(value, rel=0.2)
+        assert finding.ci95[0] < value < finding.ci95[1]
+        assert (finding.start, finding.end) == (0.0, SECONDS)
+        assert f"{finding.value:.3g}" in finding.sentence or key == ("a_x", "scale")
+        if key[1] != "place":
+            for name in ("a_x", "a_y"):
+                np.testing.assert_allclose(found.run.measured[name], right.measured[name], atol=5e-3)
+        short = run.rows(run.time < 100.0)
+        assert not accelerations(short, REFERENCE).findings, "of fewer windows nothing is told"
+        assert not accelerations(run, Scale(4.0)).findings, "which are longer on a larger ship"
 
 
 def test_the_speed_through_water_is_held_against_that_over_ground():

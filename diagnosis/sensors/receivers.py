@@ -29,9 +29,9 @@ def receivers(run: Run, scale: Scale) -> Examined:
             late = next((f.value for f in found if f.kind == "delay"), 0.0)
             c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
             ahead, aside = arm.get("x_2", 0.0), arm.get("y_2", 0.0)
-            moved = two["x_2"] - c * ahead + s * aside, two["y_2"] - s * ahead - c * aside
-            for name, values in zip(("x_2", "y_2"), moved, strict=True):
-                repaired[name] = np.interp(run.time + late, run.time, values) if late else values
+            at = run.time + late
+            x, y = (np.interp(at, run.time, two[n]) if late else two[n] for n in ("x_2", "y_2"))
+            repaired |= {"x_2": x - c * ahead + s * aside, "y_2": y - s * ahead - c * aside}
     if "psi_2" in two:
         apart = np.angle(np.exp(1j * (two["psi_2"] - pose[:, 2])))
         there = np.isfinite(apart)
