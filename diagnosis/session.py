@@ -35,7 +35,7 @@ from .prediction_error.refit import to_predictions
 from .prediction_error.unrecorded import Unrecorded
 from .progress import Advance, silent
 from .unseen import harm
-from .withdrawal import Unseen, Withdrawn, unique_shares, withdraw
+from .withdrawal import NOTHING, Unseen, Withdrawn, unique_shares, withdraw
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
@@ -253,11 +253,14 @@ def diagnose(
     if held_out and harm(*unseen.losses(fit.findings.model, start)):
         # The fit by the model error was held against these runs already.
         fit = fit.about(learned)
+    left = {f.id for f in fit.findings.effects}
+    withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
+    refitted = refitted or (something and not left)
     if use is None and not any(believed(f) for f in fit.findings.effects):
         advance("calibration")
         alone = calibrated(fit.findings, train, held_out, start, NominalPrior.of(start, prior))
         if alone is not None:
-            dropped, refitted, something, fit = [*dropped, *learned.effects], True, True, alone
+            dropped, refitted, something, fit = [*dropped, *fit.findings.effects], True, True, alone
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
     comparison = evaluate(train, start, final, held_out, advance)

@@ -22,6 +22,7 @@ from .unseen import Losses, Part, gain, harm, losses
 ALONE = "with it {harm}"
 WHOLE_SET = "with it and what was found before it {harm} than at first"
 AT_LIMIT = "{0} is at the limit of what was looked for"
+NOTHING = "fitted to predictions it is nothing"
 DRIVES = "with it the hull drives the ship on, and {where} do not show that it does"
 
 

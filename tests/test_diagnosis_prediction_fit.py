@@ -12,6 +12,7 @@ from support.measured import commands, sail, smoothed
 
 from diagnosis.assessment.windows import Windows
 from diagnosis.identification.candidates import model_error
+from diagnosis.identification.findings import Finding, Findings
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.identification.refinement import Estimate
 from diagnosis.model import Model, weak_windows
@@ -22,7 +23,7 @@ from diagnosis.prediction_error.fit import fit_predictions, shootings
 from diagnosis.prediction_error.joint_posterior import Posterior
 from diagnosis.prediction_error.predicted_bands import prediction_bands
 from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
-from diagnosis.prediction_error.refit import fit_model_error
+from diagnosis.prediction_error.refit import fit_model_error, to_predictions
 from diagnosis.prediction_error.shooting import Linear, Shooting
 from diagnosis.prediction_error.unrecorded import box, unrecorded
 from fmus.vessel import vessel
@@ -232,6 +233,22 @@ def test_fit_finds_what_was_hidden_within_its_interval():
     before = Windows([hidden().smoothed]).errors(Model()).over_all()[0]
     after = Windows([hidden().smoothed]).errors(fit.estimate.model(prior)).over_all()[0]
     assert after < 0.1 * before
+
+
+def test_an_effect_that_predictions_take_back_to_nothing_is_none():
+    """Of commands that are logged late, so that the thrusters seem to act before they are told to."""
+    run = sail(ship={"delta_X_u": DRAG})[0]
+    w = weak_windows(smoothed(replace(run, tau_cmd=np.roll(run.tau_cmd, 3, axis=0))))
+    values = {"delta_X_u": -0.5, "lag": 0.3}
+    names = {"X_u": "delta_X_u", "lag": "lag"}
+    prior = NominalPrior.of(Model(), 0.0)
+    at = Estimate(Model(), np.zeros(prior.size), values, np.zeros((2, 2)))
+    effects = [Finding(i, {n: values[n]}, {}, 0.9, [], 0.5, 0.5, Model()) for i, n in names.items()]
+    learned = to_predictions(Findings(effects, estimate=at, searched=prior), [w], prior, True).findings
+    assert [f.id for f in learned.effects] == ["X_u"]
+    assert learned.effects[0].model is learned.model
+    assert learned.model.value("lag") == 0.0
+    assert learned.model.value("delta_X_u") == pytest.approx(DRAG, rel=0.2)
 
 
 @pytest.mark.slow

@@ -65,7 +65,8 @@ def to_predictions(
     for f in found.effects:
         values = {n: at.values.get(n, v) for n, v in f.values.items()}
         own = {n: interval(v, std[n]) for n, v in values.items() if n in std}
-        effects.append(replace(f, values=values, ci95=dict(f.ci95) | own))
+        if any(values.values()):  # predictions may take an effect back to nothing
+            effects.append(replace(f, values=values, ci95=dict(f.ci95) | own))
     if effects:
         effects[-1] = replace(effects[-1], model=model)
     share = np.array([std.get(n, 0.0) / s if s else 0.0 for n, s in prior.std.items()])
