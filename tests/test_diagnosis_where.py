@@ -30,13 +30,20 @@ def of(axis, regions):
     return [r for r in regions if r.axis == axis]
 
 
-@pytest.mark.parametrize("level", in_part([1.0, 4.0, 10.0], keep=[4.0]))
+FAR = (
+    40.0,
+    40.0,
+    0.2,
+)  # a position to centimetres beside a good heading: the sway velocity is uncertain
+
+
+@pytest.mark.parametrize("level", in_part([1.0, 4.0, 10.0, FAR], keep=[4.0, FAR]))
 def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level):
     """With the true model and the same motion under other noise, the model error left is that of the noise."""
     run, _ = sail(48.0, noise=0.0)
     left, stated = [], []
     for seed in range(6):
-        noise = level * NOISE * np.random.default_rng(seed).standard_normal(run.pose.shape)
+        noise = np.multiply(level, NOISE) * np.random.default_rng(seed).standard_normal(run.pose.shape)
         pose = run.pose + noise
         pose[:, 2] = np.angle(np.exp(1j * pose[:, 2]))
         w = windows(replace(run, pose=pose))

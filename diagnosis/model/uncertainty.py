@@ -1,16 +1,23 @@
 """Standard deviation of the model error of each window, from the noise of the measurement.
 
 In weak form the inertia force of a window is the integral of the pose times the second derivative of the
-kernel, and that carries nearly all of the noise. The smoothing spline passes the angular frequency w by
-H = 1 / (1 + (w / w0)^6); of noise with the density R it leaves R H uncertain, including the jerk that it
-suppresses (N. Wiener, Extrapolation, Interpolation, and Smoothing of Stationary Time Series, 1949). The
-corner frequency w0 follows from the variance of the smoothed pose, R w0 / 3, known at every time.
+kernel, and that carries nearly all of the noise where a pose is measured to millimetres. The smoothing
+spline passes the angular frequency w by H = 1 / (1 + (w / w0)^6); of noise with the density R it leaves
+R H uncertain, including the jerk that it suppresses (N. Wiener, Extrapolation, Interpolation, and
+Smoothing of Stationary Time Series, 1949). The corner frequency w0 follows from the variance of the
+smoothed pose, R w0 / 3, known at every time.
+
+Where a position is known to half a metre, the force of hull and thrusters is as uncertain as the
+velocity that it goes with: a yaw moment by sway far more than the yaw acceleration. With
+nu = B eta' + A eta, where B turns the axes and A has what an error of the heading does to u and v, a
+mass M and the slope F of the force by nu make of an error of the pose at the frequency w
+(-w^2 M B + i w (M A - F B) - F A) of it; the last term is counted as if it were independent.
 """
 
 import numpy as np
 
 from .ship_model import Model
-from .weak_form import WIDTH, WeakWindows, kernel
+from .weak_form import WIDTH, WeakWindows, kernel, modelled_force
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
@@ -28,19 +35,21 @@ NOISE_TOLERANCE = 1.3
 SHARE_OF_COMMAND = 0.02
 SMALLEST_SHARE = 0.05  # of a window's time that samples cover; chosen
 SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
+LEAST_STEP = 1e-4  # m/s, m/s, rad/s: the step of a slope by the velocity, where that is known better
 
 
-def _noise_gain() -> np.ndarray:
-    """For each corner frequency: integral of |kernel's second derivative|^2 H over frequency [s-5]."""
+def _noise_gain(order: int) -> np.ndarray:
+    """For each corner frequency: integral of w^order |kernel|^2 H over frequency [s^-(order + 1)]."""
     t = np.linspace(-WIDTH / 2, WIDTH / 2, KERNEL_POINTS)
     w = kernel(t / (WIDTH / 2)) / (WIDTH / 2)
     transform = np.trapezoid(w * np.cos(FREQUENCIES[:, None] * t), t, axis=1)
-    density = FREQUENCIES**4 * transform**2 / np.pi
+    density = FREQUENCIES**order * transform**2 / np.pi
     H = 1.0 / (1.0 + (FREQUENCIES / CORNERS[:, None]) ** 6)
     return np.asarray(np.trapezoid(density * H, FREQUENCIES, axis=1))
 
 
-NOISE_GAIN = _noise_gain()
+ORDERS = (4, 2, 0)  # of the acceleration, the velocity, the pose
+NOISE_GAIN = {order: _noise_gain(order) for order in ORDERS}
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
@@ -53,7 +62,8 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     Returns:
         (K, 3) [N, N, N m].
     """
-    s, mass = w.smoothed, (model or Model()).reference_mass
+    model = model or Model()
+    s, mass = w.smoothed, model.reference_mass
     time = s.scale.time
     used = s.used.astype(float)
     gap = np.gradient(s.time)
@@ -64,11 +74,34 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     density = s.noise**2 * s.track.period / share[:, None]
     variance = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
     corner = np.clip(3.0 * variance / density * time, CORNERS[0], CORNERS[-1])
-    gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN))) / time**5
-    x, y, psi = (density * gain).T
-    heading = s.eta[:, 2]
     # Weights of samples at uneven distances sum to a little more or less than one.
-    c2 = np.clip(w.smooth @ np.where(w.known, np.cos(heading) ** 2, 0.0), 0.0, 1.0)
-    surge, sway = c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y
-    floor = FLOOR * s.scale.forces
-    return np.sqrt(np.column_stack([surge, sway, psi]) @ (mass**2).T + floor**2)
+    c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
+
+    def in_axes(order: int) -> np.ndarray:
+        """(K, 3), variance of that derivative of the pose in the ship's axes, averaged over windows."""
+        gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN[order])))
+        x, y, psi = (density * gain / time ** (order + 1)).T
+        return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
+
+    acceleration, velocity, pose = map(in_axes, ORDERS)
+    nu = np.where(w.known[:, None], s.nu, 0.0)
+    slope, turned = _slope(w, model, nu), np.zeros((w.middle.size, 3, 3))
+    turned[:, :2, 2] = (w.smooth @ nu)[:, [1, 0]] * [1.0, -1.0]
+    variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
+    for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
+        variance += np.einsum("kij,kj->ki", by**2, of)
+    return np.sqrt(variance)
+
+
+def _slope(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
+    """Force and moment (K, 3, 3) by u, v, r at the velocity (n, 3), over steps as large as its error."""
+    error = np.median(w.smoothed.nu_std[w.known], axis=0)
+    steps = np.maximum(error, np.multiply(LEAST_STEP, w.smoothed.scale.speeds))
+    first = modelled_force(w, model, nu)
+    return np.stack(
+        [
+            (modelled_force(w, model, nu + step) - first) / h
+            for h, step in zip(steps, np.diag(steps), strict=True)
+        ],
+        axis=2,
+    )

@@ -255,6 +255,15 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 
+def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
+    model = model.during(w.run.name)
+    eta = np.where(w.known[:, None], w.smoothed.eta, 0.0)
+    hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
+    through = halfway(w, inflow_along(w, model, eta, nu))
+    return hull + w.held @ thrust_along(w, model, through) @ model.effective_thrust.T
+
+
 def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
 
