@@ -28,6 +28,7 @@ MADE = {"results", "site"}  # folders of the project itself
 OURS = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
 # Results of this code lie in caches: the test that runs it need not be the one that uses the result.
 CACHED = ("fmus/", "cosim/compiled/")
+PHASE = r"(\|\w+| \(\w+\))$"  # of a test, at the end of its name
 EACH = 0.05  # s, pytest's own time for a test
 # Processes that a test starts are measured under its name; the source inside of an FMU counts as ours.
 COVERAGE = """
@@ -151,15 +152,18 @@ class Covering:
         return seconds
 
     @cached_property
-    def _lines(self) -> dict[str, dict[int, list[str]]]:
-        """Module -> line -> tests."""
+    def _lines(self) -> dict[str, dict[int, dict[str, bool]]]:
+        """Module -> line -> tests, and whether each executes it itself, not only its fixtures."""
         data = CoverageData(str(self.out / "coverage"))
         data.read()
-        found: dict[str, dict[int, list[str]]] = {}
+        found: dict[str, dict[int, dict[str, bool]]] = {}
         for file in data.measured_files():
             name = file.removeprefix(f"{self.out / 'copy'}{os.sep}").replace(os.sep, "/")
             found[name] = {
-                line: sorted({re.sub(r"(\|\w+| \(\w+\))$", "", context) for context in contexts})
+                line: {
+                    re.sub(PHASE, "", context): "setup" not in context[-7:]
+                    for context in sorted(contexts, key=lambda c: "setup" not in c[-7:])
+                }
                 for line, contexts in data.contexts_by_lineno(file).items()
             }
         return found
@@ -191,7 +195,10 @@ class Covering:
         executed = lines if module in self.moved else [each for each in around if each in lines]
         names = {name for each in executed for name in lines[each]}
         fallback = module.startswith(CACHED) or not inside or names <= {""}
-        tests = self._one_of_each_first(names & self.seconds.keys())
+        # A fixture that tests share takes far longer than the test that is said to have made it.
+        itself = {name for each in executed for name, does in lines[each].items() if does}
+        tests = self._one_of_each_first(itself & self.seconds.keys())
+        tests += self._one_of_each_first((names - itself) & self.seconds.keys())
         if fallback:
             steps = self._importing.get(module, {})
             beside = [t for t in self.seconds if t.partition("::")[0] in steps and t not in names]

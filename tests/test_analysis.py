@@ -153,6 +153,13 @@ class TestBases:
         x = np.linspace(s.low, s.high, 57)
         assert org.ContinuousNominal.basis(x, s) @ nodes == pytest.approx(x)
 
+    def test_ranges_are_those_of_table_1_with_the_limits_of_y_in_order(self):
+        low, high, parts = zip(*org.TABLE_1.values(), strict=True)
+        assert [*org.TABLE_1] == [*("x", "y", "psi"), *NU, *(f"{n}_dot" for n in NU), *TAU]
+        assert low == (3.5, -2.5, -np.pi, -0.02, -0.15, -0.4, -0.02, -0.02, -0.1, -1.2, -3.8, -2.0)
+        assert high == (6.5, 2.5, np.pi, 0.3, 0.15, 0.4, 0.1, 0.02, 0.1, 1.2, 3.8, 2.0)
+        assert parts == (10,) * 6 + (5, 5, 3) + (5,) * 3
+
     def test_bins_of_the_printed_example(self):
         """(3.18), corrected: ten bins of [0, 10]."""
         s = org.StateRange(0.0, 10.0, 10)

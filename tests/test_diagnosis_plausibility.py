@@ -12,7 +12,7 @@ from support.command import command
 from support.measured import DATA, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Run, compare, read, weak_windows
-from diagnosis.assessment.gains import gains
+from diagnosis.assessment.gains import Gains, _own, gains
 from diagnosis.assessment.plausibility import likeliest_mistake, refuse_implausible, same_columns
 
 COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
@@ -76,6 +76,53 @@ def test_mistake_is_told_with_the_line_that_mends_it(mistake, line, edits, tmp_p
     assert mistake in text
     assert f"put {json.dumps({'columns': line})} into" in text
     assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("value", "told", "wrong", "close"),
+    [
+        ([1.0, 1.1, 0.9], [1, 1, 1], [0, 0, 0], True),
+        ([1.0, 2.6, 0.9], [1, 1, 1], [0, 0, 0], False),  # within three standard errors
+        ([1.0, 2.9, 0.9], [1, 1, 1], [0, 1, 0], False),
+        ([1.0, 2.9, 0.9], [1, 0, 1], [0, 0, 0], True),  # of what is not told, nothing is said
+        ([1.0, 0.2, 0.9], [1, 1, 1], [0, 0, 0], False),  # a weak thruster is the diagnosis' matter
+        ([1.0, 0.05, 0.9], [1, 1, 1], [0, 1, 0], False),
+        ([0.2, 0.25, 0.2], [1, 1, 1], [1, 1, 1], False),  # all of them are not
+        ([0.2, 0.25, np.nan], [1, 1, 0], [1, 1, 0], False),
+        ([0.2, 0.25, 0.2], [1, 1, 0], [0, 0, 0], False),
+        ([-1.0, 1.0, 1.0], [1, 1, 1], [1, 0, 0], False),
+        ([np.nan] * 3, [0, 0, 0], [0, 0, 0], False),
+    ],
+)
+def test_gains_beyond_two_and_a_half_or_of_hardly_anything_are_wrong(value, told, wrong, close):
+    value = np.array(value)
+    g = Gains(value, np.abs(value) * [0.01, 0.04, 0.02], np.array(told, bool))
+    assert g.wrong.tolist() == [bool(w) for w in wrong]
+    assert g.sound == (not any(wrong))
+    assert g.close == close
+    known = [k for k in range(3) if wrong[k] and value[k] > 0.0]
+    if known:
+        weight = np.array([0.01, 0.04, 0.02])[known] ** -2.0
+        assert g.mean == pytest.approx(np.exp(weight @ np.log(value[known]) / weight.sum()))
+    else:
+        assert g.mean is None
+
+
+@pytest.mark.parametrize("k", [0.3, 1.0, 4.0])
+def test_the_gain_is_how_many_times_the_commanded_force_acts(k):
+    w = weak_windows(smoothed(edited(commands=lambda tau: tau / k)))
+    g = gains(w, Model())
+    assert g.value == pytest.approx([k] * 3, rel=0.1)
+    assert (np.abs(g.value - k) < 4.0 * g.error).all()
+    assert (g.error < 0.1 * k).all()
+    assert g.told.all()
+
+
+def test_own_is_the_share_of_a_command_that_follows_from_no_other():
+    a, b = np.random.default_rng(0).standard_normal((2, 5000))
+    assert _own(a, []) == pytest.approx(1.0)
+    assert _own(7.0 + 3.0 * a + 4.0 * b, [1e6 * a]) == pytest.approx(16.0 / 25.0, rel=0.05)
+    assert _own(2.0 * a - b, [a, b]) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_commands_that_follow_those_of_another_axis_tell_no_gain_of_their_own():
