@@ -31,8 +31,18 @@ class Fault(Strict):
     """A fault, with the signals on which it acts together."""
 
     stage: ClassVar[int]
+    by_signal: ClassVar[str] = ""  # name of the option that is one number, or one for each signal
 
     signals: list[str] = Field(min_length=1, description="inputs, as instance.variable")
+
+    @model_validator(mode="after")
+    def _check_by_signal(self) -> "Fault":
+        value, count = getattr(self, self.by_signal, None), len(self.signals)
+        if isinstance(value, list) and len(value) != count:
+            raise ValueError(
+                f"'{self.by_signal}' needs one number, or one for each of the {count} signals"
+            )
+        return self
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -86,22 +96,13 @@ def _each(value: float | list[float], count: int) -> list[float]:
     return list(value) if isinstance(value, list) else [value] * count
 
 
-def _one_per_signal(value: float | list[float], signals: list[str], name: str) -> None:
-    if isinstance(value, list) and len(value) != len(signals):
-        raise ValueError(f"'{name}' needs one number, or one for each of the {len(signals)} signals")
-
-
 class Bias(Fault):
     """A constant added to each signal."""
 
     kind: Literal["bias"]
     stage = 1
+    by_signal = "value"
     value: float | list[float] = Field(description="what is added, in the signal's unit")
-
-    @model_validator(mode="after")
-    def _check(self) -> "Bias":
-        _one_per_signal(self.value, self.signals, "value")
-        return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return Add(slots, _each(self.value, len(slots)))
@@ -112,14 +113,10 @@ class Noise(Fault):
 
     kind: Literal["noise"]
     stage = 2
+    by_signal = "std"
     std: Annotated[float, Field(ge=0.0)] | list[Annotated[float, Field(ge=0.0)]] = Field(
         description="standard deviation, in the signal's unit"
     )
-
-    @model_validator(mode="after")
-    def _check(self) -> "Noise":
-        _one_per_signal(self.std, self.signals, "std")
-        return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         return Add(slots, WhiteNoise(_each(self.std, len(slots)), rng))
@@ -130,12 +127,8 @@ class Spikes(Timed):
 
     kind: Literal["spikes"]
     stage = 3
+    by_signal = "size"
     size: float | list[float] = Field(description="how far off, in the signal's unit")
-
-    @model_validator(mode="after")
-    def _check(self) -> "Spikes":
-        _one_per_signal(self.size, self.signals, "size")
-        return self
 
     def bind(self, slots: Sequence[int], step: float, rng: np.random.Generator) -> Effect:
         sizes = _each(self.size, len(slots))
