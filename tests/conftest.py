@@ -14,7 +14,7 @@ from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
 from support.shared import keep_in, once, shared_folder
-from support.slow_tests import slow_tests
+from support.slow_tests import PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
 from cosim.fmu import LocalInstance, Model, archive_check
@@ -62,6 +62,17 @@ def pytest_collection_modifyitems(items):
             item.add_marker("slow")
     yield
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """Processor time of a test [s], its processes included, for ``--junitxml``: other work hardly changes it."""
+    before = os.times()
+    try:
+        return (yield)
+    finally:
+        used = sum(os.times()[:4]) - sum(before[:4])
+        item.user_properties.append((PROCESSOR, f"{used:.2f}"))
 
 
 @pytest.hookimpl(optionalhook=True)

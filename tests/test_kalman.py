@@ -70,11 +70,11 @@ def ship(seconds, tau, extra=(0.0, 0.0, 0.0), h=0.01, noise=2e-4, seed=0):
     rng = random.Random(seed)
     vessel = COMPONENTS["vessel"]
     p = vessel.params()
-    state = vessel.init(Force(), p)
+    state, ready = vessel.init(Force(), p), vessel.prepared(p)
     rows, nu, nu_dot = [], [], []
     for k in range(round(seconds / h)):
         known = tau(k * h)
-        state, out = vessel.step(state, Force(*map(sum, zip(known, extra, strict=True))), p, h)
+        state, out = vessel.advance(state, Force(*map(sum, zip(known, extra, strict=True))), ready, h)
         x, y, psi = out.pose
         psi = math.remainder(psi + rng.gauss(0, 1.5 * noise), math.tau)
         rows.append([x + rng.gauss(0, noise), y + rng.gauss(0, noise), psi, *known])

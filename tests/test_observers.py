@@ -171,11 +171,11 @@ def test_luenberger_without_measurement_is_the_model():
     pack, force = packer(component.inputs), packer(vessel.inputs)
     params, p = component.params(), vessel.params()
     h, tau = 0.001, [0.5, -0.2, 0.05]
-    ship = vessel.init(None, p)
+    ship, ready = vessel.init(None, p), vessel.prepared(p)
     state = component.init(pack([ship.x, ship.y, ship.psi, *tau]), params)
     for _ in range(2000):
         state, estimate = component.step(state, pack([math.nan] * 3 + tau), params, h)
-        ship, _ = vessel.step(ship, force(tau), p, h)
+        ship, _ = vessel.advance(ship, force(tau), ready, h)
     assert estimate[3:6] == pytest.approx((ship.u, ship.v, ship.r), rel=0.01)
     assert estimate[:3] == pytest.approx((ship.x, ship.y, ship.psi), abs=1e-3)
     assert estimate.frozen == 1.0

@@ -511,13 +511,14 @@ def sailed(d, tau, seconds, h=0.05):
     s = ship(description=d)
     vessel, thrusters = s.vessel, s.thrusters
     p, q = vessel.params(), thrusters.params()
+    hull, drive = vessel.prepared(p), thrusters.prepared(q)
     request = type(thrusters.inputs().request)(*tau)
     state, past, out = vessel.init(None, p), thrusters.init(None, q), None
     for _ in range(round(seconds / h)):
         given = thrusters.inputs(request, VelocityInCurrent(state.u, state.v, state.r))
-        past, out = thrusters.advance(past, given, thrusters.prepared(q), h)
+        past, out = thrusters.advance(past, given, drive, h)
         acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
-        state, _ = vessel.advance(state, acting, vessel.prepared(p), h)
+        state, _ = vessel.advance(state, acting, hull, h)
     return state, out
 
 
@@ -624,6 +625,8 @@ def test_the_file_of_cse1_says_what_the_components_declare():
 @given(st.lists(st.tuples(*[st.floats(-0.9, 0.9)] * 3), min_size=3, max_size=3))
 def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
     declared, read = ship(), ship(description=SHIPS["cse1"])
+    hulls = [s.vessel.prepared(s.vessel.params()) for s in (declared, read)]
+    drives = [s.thrusters.prepared(s.thrusters.params()) for s in (declared, read)]
     states = [s.vessel.init(None, s.vessel.params()) for s in (declared, read)]
     pasts = [s.thrusters.init(None, s.thrusters.params()) for s in (declared, read)]
     for commands in pushes:
@@ -631,13 +634,12 @@ def test_a_ship_of_the_file_of_cse1_moves_as_the_built_in_one(pushes):
         for _ in range(50):
             outs = []
             for k, s in enumerate((declared, read)):
-                q = s.thrusters.params()
                 nu = type(s.thrusters.inputs().velocity)(*states[k][3:6])
                 given = s.thrusters.inputs(tau, nu)
-                pasts[k], out = s.thrusters.step(pasts[k], given, q, 0.02)
+                pasts[k], out = s.thrusters.advance(pasts[k], given, drives[k], 0.02)
                 outs.append(out)
                 acting = Force(out.tau_act_X, out.tau_act_Y, out.tau_act_N)
-                states[k], _ = s.vessel.step(states[k], acting, s.vessel.params(), 0.02)
+                states[k], _ = s.vessel.advance(states[k], acting, hulls[k], 0.02)
             assert outs[1] == pytest.approx(outs[0], abs=1e-12)
     assert states[1] == pytest.approx(states[0], rel=1e-12, abs=1e-12)
 

@@ -36,6 +36,7 @@ class Roles(NamedTuple):
     steers: tuple[float, ...]
 
 
+@cache
 def believed(ship: Description) -> tuple[Number, ...]:
     """The parameters of a ship's actuators, as its description has them."""
     return tuple([parameters(a, "", False)() for a in actuators(ship)])
