@@ -72,6 +72,22 @@ def test_time_stamps_that_repeat_or_go_backwards_are_left_out():
     assert "4 rows left out" in track.notes[0]
 
 
+@pytest.mark.parametrize("every", [2, 3, 4])
+def test_rows_that_straight_lines_have_filled_are_no_measurements(every):
+    """The heading is measured in every row, the position in some of them alone."""
+    run, rows = base(), np.arange(0, N, every)
+    rows = np.append(rows, N - 1)
+    pose = run.pose.copy()
+    pose[:, :2] = np.column_stack([np.interp(run.time, run.time[rows], x[rows]) for x in run.pose.T[:2]])
+    track = clean(replace(run, pose=pose))
+    assert np.flatnonzero(track.valid).tolist() == rows.tolist()
+    assert (track.between == ~track.valid).all()
+    assert tuple(track.counts()) == (rows.size, 0, 0, 0, rows.size)
+    assert track.period == pytest.approx(every * 0.02)
+    assert "filled by straight lines" in track.notes[0]
+    assert np.isnan(track.pose[track.between]).all()
+
+
 def test_gap_is_told():
     keep = np.r_[0:400, 500:N]
     track = clean(base().rows(keep))
