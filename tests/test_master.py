@@ -5,7 +5,7 @@ import gc
 import json
 import math
 import os
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from support.project import COMPONENTS
 import cosim
 from cosim.compiled.row_text import Rows
 from cosim.fmu import component
+from cosim.master.algorithm import Master
 from cosim.results.log import LogWriter
 from fmus.signals import Force
 
@@ -486,3 +487,57 @@ def test_log_does_not_write_into_a_file_that_took_its_place(tmp_path):
     os.close(other)
     assert (tmp_path / "other").read_bytes() == b""
     assert (tmp_path / "log.csv").read_text().count("\n") == 2
+
+
+class CalledStepper:
+    """Notes its calls; steps every so many base steps."""
+
+    def __init__(self, number, every, calls):
+        self.number, self.every = number, every
+        for name in ("exchange", "begin", "settle", "advance"):
+            setattr(self, name, lambda t, *_, name=name: calls.append((number, name, round(t, 9))))
+
+
+def mastered(algorithm):
+    """A master of three FMUs that step every 1, 2 and 3 base steps of 0.1 s, and what it calls."""
+    calls = []
+    master = object.__new__(Master)
+    master.system = SimpleNamespace(steps=6, scenario=SimpleNamespace(algorithm=algorithm, step=0.1))
+    master.steppers = [CalledStepper(k, k + 1, calls) for k in range(3)]
+    master._events = []
+    return master, calls
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])
+def test_an_fmu_steps_from_its_last_step_with_the_inputs_of_its_algorithm(algorithm):
+    master, calls = mastered(algorithm)
+    assert list(master.run()) == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    jacobi = algorithm == "jacobi"
+    for number, every in enumerate((1, 2, 3)):
+        ends = [k for k in range(1, 7) if k % every == 0]
+        mine = [(name, t) for n, name, t in calls if n == number]
+        for name, back in (("exchange", 1 if jacobi else 0), ("advance", every)):
+            assert [t for called, t in mine if called == name] == pytest.approx(
+                [0.1 * (k - back) for k in ends]
+            )
+        assert [t for called, t in mine if called == "begin"] == pytest.approx(
+            [0.1 * (k - every) for k in ends if jacobi]
+        )
+    last = [(n, name) for n, name, t in calls[-9 if jacobi else -6 :]]
+    order = [(n, name) for name in ("exchange", "begin", "advance") for n in range(3)]
+    assert last == (
+        order if jacobi else [(n, name) for n in range(3) for name in ("exchange", "advance")]
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss_seidel"])
+@pytest.mark.parametrize(("k", "after"), [(6, [1, 2]), (5, []), (4, [1]), (3, [2])])
+def test_the_rest_of_a_step_in_which_the_compiled_loop_has_stopped(algorithm, k, after):
+    master, calls = mastered(algorithm)
+    master.finish_step(k, master.steppers[0], 0, False)
+    assert calls[0] == (0, "settle", round(0.1 * (k - 1), 9))
+    assert [(n, t) for n, name, t in calls if name == "advance"] == [
+        (n, round(0.1 * (k - n - 1), 9)) for n in after
+    ]
+    exchanged = [] if algorithm == "jacobi" else [(n, round(0.1 * k, 9)) for n in after]
+    assert [(n, t) for n, name, t in calls if name == "exchange"] == exchanged
