@@ -123,6 +123,14 @@ def test_a_compass_off_by_heading_is_no_clock_that_wanders():
     assert np.std(repaired - swung().pose[:, 2]) < 0.006
 
 
+@pytest.mark.parametrize("either", [True, False])
+def test_a_clock_that_a_compass_would_look_like_is_told_with_it(monkeypatch, either):
+    monkeypatch.setattr(motion, "_stretches", lambda found: [(0.0, 60.0, 1.1, 0.01)])
+    (found,) = motion._clock(SimpleNamespace(wanders=True, either=either))
+    assert ("compass" in found.sentence) == ("deviation_sin" in found.alike) == either
+    assert found.repaired != either
+
+
 def test_without_a_speed_clock_and_scale_of_the_rate_are_one():
     run = beside(made(), r=1.06 * made().measured["r"])
     alone = replace(run, measured={"r": run.measured["r"]})

@@ -27,6 +27,7 @@ STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell
 TURNS = 0.02  # standard deviation of the yaw rate's scale up to which turns tell the clock (chosen)
 SWING = 2.0 * np.pi  # rad: headings all round, as a ship is swung to adjust its compass
 CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
+CLOCK_OR_COMPASS = "a compass that is off by heading would look the same"
 CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
 STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
@@ -157,8 +158,14 @@ def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
 def _clock(found: Motion) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
     if found.wanders:
-        alike = tuple(DEVIATIONS) if found.either else ()
-        return [replace(_rate(*each), alike=alike, repaired=not alike) for each in _stretches(found)]
+        stretches = [_rate(*each) for each in _stretches(found)]
+        if not found.either:
+            return stretches
+        alike, or_else = tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}"
+        return [
+            replace(each, alike=alike, repaired=False, sentence=each.sentence + or_else)
+            for each in stretches
+        ]
     scales = _even(found)
     if scales is None:
         return []
