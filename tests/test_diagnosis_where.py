@@ -13,6 +13,7 @@ from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME
 from diagnosis.assessment.regions import _Design, find_regions
 from diagnosis.model import omega, weak_windows
+from diagnosis.model.ship_model import GivenForce
 from diagnosis.model.weak_form import halfway
 
 
@@ -52,6 +53,17 @@ def test_uncertainty_is_the_spread_over_realisations_of_the_noise(level):
     spread = np.sqrt(np.mean(np.square(left), axis=(0, 1)))
     expected = np.sqrt(np.mean(np.square(stated), axis=(0, 1)))
     np.testing.assert_allclose(expected, spread, rtol=0.3)
+
+
+def test_a_force_is_as_uncertain_as_its_velocity_whether_a_coefficient_or_given():
+    run = sail(48.0)[0]
+    w = windows(run)
+    slope = np.zeros((run.time.size, 3, 6))
+    slope[:, 2, 4] = 5.0  # N m by v
+    given = Model(given={run.name: GivenForce(np.zeros((run.time.size, 3)), slope)})
+    a, b, without = (omega_std(w, m) for m in (given, Model({"delta_N_v": 5.0}), Model()))
+    np.testing.assert_allclose(a, b, rtol=1e-6)
+    assert (a[:, 2] > without[:, 2]).all()
 
 
 def test_a_force_that_goes_with_speed_is_taken_halfway_between_samples():

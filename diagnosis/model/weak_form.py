@@ -248,10 +248,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     def drives() -> np.ndarray:
         return w.held @ thrust_along(w, model, w.recall("met", (measured, water), met))
 
-    driven = w.recall("driven", drive, drives)
-    driven = driven @ model.effective_thrust.T
-    if w.run.name in model.given:
-        driven = driven + w.smooth @ model.given[w.run.name].at(eta, nu)
+    driven = _acting(w, model, w.recall("driven", drive, drives), eta, nu)
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
 
 
@@ -260,8 +257,17 @@ def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
     model = model.during(w.run.name)
     eta = np.where(w.known[:, None], w.smoothed.eta, 0.0)
     hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
-    through = halfway(w, inflow_along(w, model, eta, nu))
-    return hull + w.held @ thrust_along(w, model, through) @ model.effective_thrust.T
+    driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
+    return hull + _acting(w, model, driven, eta, nu)
+
+
+def _acting(
+    w: WeakWindows, model: Model, driven: np.ndarray, eta: np.ndarray, nu: np.ndarray
+) -> np.ndarray:
+    """Force (K, 3) on the hull, for that of the thrusters over the windows, with what is given."""
+    force = driven @ model.effective_thrust.T
+    given = model.given.get(w.run.name)
+    return force if given is None else force + w.smooth @ given.at(eta, nu)
 
 
 def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
