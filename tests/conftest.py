@@ -85,6 +85,12 @@ def pytest_xdist_make_scheduler(config, log):
     return WorkStealingScheduling(config, log)
 
 
+def pytest_collection_finish():
+    """The tests and their modules stay to the end: no search for garbage goes through them."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport():
     """An unexpected skip fails where all tools must be installed, as on the machine of the gate."""
