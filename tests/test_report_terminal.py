@@ -1,11 +1,15 @@
-"""What the diagnosis says on a terminal, of a result that is made up."""
+"""What the diagnosis says on a terminal and in a notebook, of a result that is made up."""
 
 from io import StringIO
+from types import SimpleNamespace
 
 import pytest
+from matplotlib.figure import Figure
 from rich.console import Console
 
-from diagnosis.report import ComparisonContent, DiagnosisContent
+from cosim import InputError
+from diagnosis.report import ComparisonContent, DiagnosisContent, figures, notebook, tracks
+from diagnosis.report.profiles import QUANTITIES
 from diagnosis.report.terminal import has_learned, show_comparison, show_diagnosis, summary
 
 COUNTS = {"samples": 100, "frozen": 1, "dropped": 2, "spikes": 3, "used": 94}
@@ -264,3 +268,70 @@ def test_a_summary_has_ten_lines_at_the_most():
     assert len(text) == 9
     assert text[-1] == "  and 2 more runs"
     assert summary(DiagnosisContent(**NOTHING)).splitlines()[1] == "  In short."
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Names and arguments of the figures that are made, in place of these."""
+    made = []
+    for module, name in (
+        (figures, "profile"),
+        (figures, "model_error"),
+        (tracks, "track"),
+        (figures, "ranking"),
+    ):
+        monkeypatch.setattr(
+            module, name, lambda *given, name=name: made.append((name, *given)) or Figure()
+        )
+    monkeypatch.setattr(notebook, "binned_errors", lambda *given: given)
+    return made
+
+
+@pytest.mark.parametrize("learned", [False, True])
+def test_pictures_of_a_notebook_are_those_of_their_run(drawn, learned):
+    a, b = (SimpleNamespace(before=0, after=k if learned else 0) for k in range(2))
+    compared = SimpleNamespace(evaluations=[a, b], omega_std=["of a", "of b"])
+    plots = notebook.Plots(DiagnosisContent(**FOUND), compared)
+    last = QUANTITIES[-1]
+    shown = [
+        plots.where(),
+        plots.where(last.name),
+        plots.omega(),
+        plots.omega(1),
+        plots.track(),
+        plots.track(1),
+    ]
+    assert all("<svg" in picture._repr_svg_() for picture in shown)
+    errors = [a, b], ["of a", "of b"]
+    assert drawn == [
+        ("profile", QUANTITIES[0], (QUANTITIES[0], *errors), learned),
+        ("profile", last, (last, *errors), learned),
+        ("model_error", a, "of a", learned),
+        ("model_error", b, "of b", learned),
+        ("track", a, learned),
+        ("track", b, learned),
+    ]
+    plots.ranking()
+    assert [r.id for r in drawn[-1][1]] == ["sure", "b", "c", "d", "e", "f"]
+    with pytest.raises(InputError, match=f"no quantity 'x'; there are {QUANTITIES[0].name}, "):
+        plots.where("x")
+    with pytest.raises(InputError, match="no candidates"):
+        notebook.Plots(DiagnosisContent(**FOUND | {"ranking": []}), compared).ranking()
+
+
+def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
+    compared = SimpleNamespace(evaluations=[SimpleNamespace(before=0, after=0)], omega_std=["of a"])
+    content = DiagnosisContent(**FOUND | {"sentence": "1 < 2."})
+    text = notebook.as_html(content, notebook.Plots(content, compared))
+    assert (
+        "<b>Something is missing, and more than one cause fits</b></p><p>1 &lt; 2.</p><p>Little is left.</p>"
+        in text
+    )
+    assert (
+        "<tr><td>doubtful</td><td>X = doubtful</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text
+    )
+    assert "<th>position over 8 s [mm]</th><th>heading over 8 s [°]</th>" in text
+    assert "<tr><td>a</td><td>126 → 0.73</td>" in text
+    assert "<tr><td>b (held out)</td><td>252 → 1.46</td>" in text
+    assert [name for name, *_ in drawn] == ["profile", "model_error"]
+    assert text.count("<svg") == 2
