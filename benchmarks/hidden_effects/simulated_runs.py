@@ -3,8 +3,6 @@
 240 s at 50 Hz. Noise, freezes of up to 1 s and spikes are on the pose that the controller gets, too.
 """
 
-import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +12,8 @@ import numpy as np
 
 import cosim
 from diagnosis import Run
+from fmus.build import BuildError, native_targets
+from fmus.build import build as build_fmus
 
 from .manoeuvres import GUIDANCE, Manoeuvre
 
@@ -152,14 +152,10 @@ def scenario(manoeuvre: Manoeuvre, hidden: Hidden, noise: float, seed: int, fmus
 
 
 def build(folder: Path) -> None:
-    """Put all FMUs that runs need into a folder.
-
-    Raises:
-        InputError: one of them cannot be built.
-    """
+    """Put all FMUs that runs need into a folder."""
     names = ["vessel", "thrusters", "observer_kalman", "controller_abs", *GUIDANCE]
-    files = [str(HERE / f"{name}.py") for name in OTHER]
-    command = [sys.executable, "-m", "fmus.build", *names, *files, "--out", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise cosim.InputError(done.stderr.strip() or "the FMUs could not be built")
+    files = [HERE / f"{name}.py" for name in OTHER]
+    try:
+        build_fmus([*names, *files], folder, native=native_targets())
+    except BuildError:  # no compiler
+        build_fmus([*names, *files], folder)
