@@ -3,9 +3,9 @@
 The ellipse with faults and metrics, over seeds: the same runs in a bare loop of one process (FMUs loaded
 once and reset), as a campaign in this process, on one worker and on two; and in bare loops of two
 processes at once, each with half of the runs, which tells what the second core of this machine is worth.
-Repeats are interleaved; wall time, and processor time of all processes, when the first run of a campaign
-had ended, and how many runs a second the others made until the end. Then what a run costs beside its
-steps, and the memory of a process over many short runs.
+Repeats are interleaved; wall time, processor time of all processes and of this one, when the first run of
+a campaign had ended, and how many runs a second the others made until the end. Then what a run costs
+beside its steps, and the memory of a process over many short runs.
 """
 
 import argparse
@@ -30,10 +30,11 @@ SHORT, WARM = 200, 20
 
 
 class Taken(NamedTuple):
-    """Time [s] that some runs took: by the clock, of the processors, and until the first had ended."""
+    """Time [s] of some runs: by the clock, of the processors, of it here, until the first had ended."""
 
     wall: float
     processor: float
+    here: float
     first: float
 
 
@@ -51,19 +52,21 @@ def ellipse(folder: Path, native: bool, stop: float, **keys: Any) -> Path:
     return path
 
 
-def processor() -> float:
-    """Processor time [s] of this process and of those that it has waited for."""
-    whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    found = [resource.getrusage(who) for who in whom]
-    return sum(used.ru_utime + used.ru_stime for used in found)
+def processor(whose: int) -> float:
+    """Processor time [s] of this process, or of those that it has waited for."""
+    used = resource.getrusage(whose)
+    return used.ru_utime + used.ru_stime
 
 
 def timed(work: Callable[[], float | None]) -> Taken:
     """Time of some work, which tells when its first run had ended, if it knows."""
-    started, used = time.perf_counter(), processor()
+    whom = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    started, before = time.perf_counter(), [processor(whose) for whose in whom]
     first = work()
     ended = time.perf_counter()
-    return Taken(ended - started, processor() - used, math.nan if first is None else first - started)
+    here, others = (processor(whose) - used for whose, used in zip(whom, before, strict=True))
+    until = math.nan if first is None else first - started
+    return Taken(ended - started, here + others, here, until)
 
 
 def campaign(content: dict[str, Any], workers: int) -> float:
@@ -165,11 +168,11 @@ def compare(folder: Path, native: bool, options: argparse.Namespace) -> None:
     kind = "native" if native else "Python"
     print(f"{kind} FMUs, {options.runs} runs of {options.stop:g} s; medians")
     head = f"{'':28}{'wall s':>9}{'runs/s':>9}{'processor s':>13}{'a run, s':>10}"
-    print(f"{head}{'first, s':>10}{'then/s':>9}")
+    print(f"{head}{'here, s':>9}{'first, s':>10}{'then/s':>9}")
     for name, each in taken.items():
-        wall, used, first = (statistics.median(column) for column in zip(*each, strict=True))
+        wall, used, here, first = (statistics.median(column) for column in zip(*each, strict=True))
         told = f"{name:28}{wall:9.2f}{options.runs / wall:9.3f}{used:13.2f}{used / options.runs:10.3f}"
-        print(f"{told}{first:10.2f}{(options.runs - 1) / (wall - first):9.3f}")
+        print(f"{told}{here:9.2f}{first:10.2f}{(options.runs - 1) / (wall - first):9.3f}")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
