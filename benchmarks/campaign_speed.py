@@ -3,8 +3,8 @@
 The ellipse with faults and metrics, over seeds: the same runs in a bare loop of one process (FMUs loaded
 once and reset), as a campaign in this process, on one worker and on two; and in bare loops of two
 processes at once, each with half of the runs, which tells what the second core of this machine is worth.
-Repeats are interleaved; wall time, processor time of all processes and of this one, when the first run of
-a campaign had ended, and how many runs a second the others made until the end. Then what a run costs
+Repeats are interleaved; wall time, processor time of all processes and of this one, when the first run
+of a campaign had ended, and how many runs a second the others made until the end. Then what a run costs
 beside its steps, and the memory of a process over many short runs.
 """
 
