@@ -1,6 +1,7 @@
 """The detector of failing thrusters: its statistic, in a closed loop, and on a file of the same run."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from support.project import ROOT
 import cosim
 from benchmarks.watch_delay import Told, outcome
 from benchmarks.watched_runs import cases
+from diagnosis.open_loop import thruster_report
 from diagnosis.watch import main
 from fmus.controller.backstepping import Applied, Inputs
 from fmus.signals import Force
@@ -162,3 +164,73 @@ def test_dead_bow_thruster_is_told_in_the_loop_and_from_its_log(tmp_path):
     assert found["time"] == pytest.approx(90.0, abs=3.0)
     assert found["confidence"] == pytest.approx(log["watch.failed_bow"].max())
     assert "<svg" in (tmp_path / "out" / "report.html").read_text()
+
+
+def watched(vsp, bow=()):
+    """A run from 1000 s on, of 100 s, in which failures (from, to, probability, share) are told."""
+    time = np.arange(0.0, 100.0)
+    log = {"time": time, "controller.since": np.maximum(time - 5.0, 0.0)}
+    for name, stretches in (("vsp", vsp), ("bow", bow)):
+        for what in ("failed", "lost"):
+            log[f"controller.{what}_{name}"] = np.full(100, 0.01)
+        for first, last, sure, share in stretches:
+            log[f"controller.failed_{name}"][first : last + 1] = [
+                *np.linspace(0.6, sure, last - first),
+                0.55,
+            ]
+            log[f"controller.lost_{name}"][last - 1] = share
+    track = SimpleNamespace(run=SimpleNamespace(time=1000.0 + time))
+    source = SimpleNamespace(name="trial", track=track)
+    loop = SimpleNamespace(observer={"path": "observer.fmu"})
+    return SimpleNamespace(log=log, source=source, loop=loop, notes=["a note"])
+
+
+def test_failures_are_told_by_their_surest_instant_the_longest_first():
+    played = watched([(10, 20, 0.9, 0.25)], [(40, 80, 0.99, 1.0)])
+    bow, vsp = thruster_report.alarms(played)
+    assert (bow.thruster, bow.since, bow.noticed, bow.until) == ("bow", 1074.0, 1040.0, 1080.0)
+    assert (vsp.thruster, vsp.since, vsp.noticed, vsp.until) == ("vsp", 1014.0, 1010.0, 1020.0)
+    assert (bow.confidence, bow.lost, vsp.confidence, vsp.lost) == (0.99, 1.0, 0.9, 0.25)
+    assert [*thruster_report.sentences(played)] == [
+        "Run trial: the bow thruster lost 100 % of its force at 1074 s (probability 0.99, noticed at 1040 s, "
+        "told until 1080 s).",
+        "Run trial: the VSP lost 25 % of its force at 1014 s (probability 0.9, noticed at 1010 s, told until "
+        "1020 s).",
+        "a note",
+    ]
+    content = thruster_report.content(played)
+    assert content["alarms"] == [vars(bow), vars(vsp)]
+    first = {k: content[k] for k in ("thruster", "time", "noticed", "confidence", "lost")}
+    assert first == {
+        "thruster": "bow",
+        "time": 1074.0,
+        "noticed": 1040.0,
+        "confidence": 0.99,
+        "lost": 1.0,
+    }
+    assert (content["run"], content["observer"]["path"], content["notes"]) == (
+        "trial",
+        "observer.fmu",
+        ["a note"],
+    )
+    (section,) = thruster_report.document(played).sections
+    (table,) = section.tables
+    assert [row[0] for row in table.rows] == ["the bow thruster", "the VSP"]
+    for plot, what in zip(section.plots, ("failed", "lost"), strict=True):
+        (panel,) = plot.figure.axes
+        lines = {line.get_label(): line for line in panel.get_lines()}
+        for label, name in (("the VSP", "vsp"), ("the bow thruster", "bow")):
+            assert lines[label].get_xdata() == pytest.approx(1000.0 + np.arange(100.0))
+            assert lines[label].get_ydata() == pytest.approx(played.log[f"controller.{what}_{name}"])
+        assert panel.get_ylim() == (-0.1, 1.1)
+
+
+def test_of_a_run_without_a_failure_the_largest_probability_is_told():
+    played = watched([])
+    assert [*thruster_report.sentences(played)] == [
+        "Run trial: no thruster seems to fail (probability 0.01 at most).",
+        "a note",
+    ]
+    content = thruster_report.content(played)
+    assert (content["thruster"], content["time"], content["confidence"]) == (None, None, 0.01)
+    assert content["alarms"] == thruster_report.document(played).sections[0].tables == []
