@@ -14,6 +14,7 @@ from diagnosis.analysis import principal_components as pc
 from diagnosis.analysis.outlier_report import analyse, sentences
 from diagnosis.analysis.recipes import RECIPES, recipe
 from diagnosis.analysis.samples import NU, TAU, Samples, model_error
+from diagnosis.report.document import numbers
 from diagnosis.report.formatting import number
 
 NAMES = list("abcdef")
@@ -311,6 +312,23 @@ def test_a_regression_is_told_in_sentences():
     assert first.endswith("by 3 factors.")
     assert "Coefficients within two of their standard deviations" in " ".join(rest)
     assert pls_report.thrust_of(found).sentence in rest
+    page = pls_report.document(found, "an observer")
+    fit, *parts = page.sections
+    assert (page.lead, fit.text, page.provenance["estimates"]) == (first, rest, "an observer")
+    for part, section in zip(found.parts, parts, strict=True):
+        factors, coefficients = section.tables
+        assert [row[1] for row in factors.rows] == numbers([q[0] for q in part.by_factors], 4)
+        assert [row[0] for row in coefficients.rows] == [*found.columns]
+        for row, value in zip(coefficients.rows, part.B[0], strict=True):
+            assert row[1].startswith(f"{number(value)} ± ")
+        told = [" of other sign" in row[1] for row in coefficients.rows]
+        assert told == [bool(n) for n in part.sign_changes[0]]
+        points, names = pls_report.correlations(found, part)
+        both = np.column_stack([found.X, found.samples.omega[:, part.axes]])
+        scores = part.model.transform(found.X)[:, :2]
+        count = both.shape[1]
+        assert points == pytest.approx(np.corrcoef(both.T, scores.T)[:count, count:])
+        assert names == [*found.columns, *(f"omega_{'XYN'[k]}" for k in part.axes)]
     clipped = list(pls_report.sentences(pls.regressed(made(), recipe("continuous"))))
     assert "Outside of the ranges of Table 1, and clipped: u " in " ".join(clipped)
 

@@ -18,6 +18,7 @@ from diagnosis.decision import doubted, limited, verdict
 from diagnosis.identification.acceptance import lower_throughout, worse
 from diagnosis.identification.confidence import confidence, credible, evidence
 from diagnosis.identification.findings import Finding, Findings
+from diagnosis.identification.gram import block_folds
 from diagnosis.identification.map_regression import Scored, first_share
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.model.correlation import correlated_windows
@@ -26,7 +27,7 @@ from diagnosis.model.uncertainty import omega_std
 from diagnosis.model.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
-from diagnosis.unseen import Losses, harm
+from diagnosis.unseen import Losses, Part, harm
 from diagnosis.withdrawal import Unseen, withdraw, without
 
 SHORT = {"count": 2, "seconds": 90.0}
@@ -247,6 +248,20 @@ def test_less_dissipation_needs_unseen_data_that_show_it():
     unseen = Unseen([], runs, start, found.sigma)
     assert withdraw(found, unseen, start, lambda a, b: False)[1] == []
     assert [w.id for w in withdraw(found, unseen, start, lambda a, b: True)[1]] == ["N_uv"]
+
+
+def test_the_stretches_of_a_run_miss_together_what_it_misses():
+    (w, *_), sigma = voyages(**SHORT), np.array([0.1, 0.2, 0.05])
+    model = Model().plus({"delta_X_u": -1.0})
+    (whole,) = Part(w).losses([model], sigma)
+    assert whole.omega.sum() == pytest.approx(np.sum((omega(w, model) / sigma) ** 2))
+    parts = [Part(w, blocks).losses([model], sigma)[0] for blocks in block_folds([w])]
+    assert np.concatenate([p.omega for p in parts]) == pytest.approx(whole.omega)
+    positions = np.concatenate([p.position for p in parts])
+    assert 0 < positions.size < whole.position.size, (
+        "windows begin and end in a stretch, or do not count"
+    )
+    assert np.isin(positions, whole.position).all()
 
 
 def misses(omega=1.0, position=1.0, heading=1.0, seed=0):
