@@ -10,8 +10,8 @@ from support.measured import NOISE, sail, smoothed
 
 from diagnosis import Model, omega_std
 from diagnosis.assessment.clusters import cluster_mean, welch_p_value
-from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME
-from diagnosis.assessment.regions import _Design, find_regions
+from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
+from diagnosis.assessment.regions import Region, _Design, find_regions
 from diagnosis.model import omega, weak_windows
 from diagnosis.model.ship_model import GivenForce
 from diagnosis.model.weak_form import halfway
@@ -183,3 +183,34 @@ def test_which_intervals_a_region_may_be(covariate, count):
     if covariate is SPEED:
         assert all(first == 0 or after == 4 for first, after in tried)
     assert any(after > 4 for _, after in tried) == (covariate is HEADING)
+
+
+@pytest.mark.parametrize(
+    ("covariate", "low", "high", "phrase"),
+    [
+        (TIME, 10.0, None, "after 10 s"),
+        (SPEED, 0.05, 0.1, "at surge speeds of 0.05 to 0.1 m/s"),
+        (YAW_RATE, None, 0.1, "at turn rates below 5.73°/s"),
+        (THRUST, 0.25, None, "while its thrust is above 25 % of the most"),
+        (THRUST, 0.25, 0.5, "while its thrust is 25 to 50 % of the most"),
+        (HEADING, -0.5 * np.pi, 0.25 * np.pi, "on headings from -90° to 45°"),
+        (NORTH, None, -2.0, "south of -2 m"),
+        (EAST, 2.0, None, "east of 2 m"),
+    ],
+)
+def test_a_region_in_words(covariate, low, high, phrase):
+    region = Region("N", covariate, None, low, high, 0.31, 0.122, 0.25, 1e-3, 1.0)
+    assert region.phrase == phrase
+    assert (
+        region.sentence == f"Yaw: worst {phrase}: 0.31 N m against 0.12 N m elsewhere, 25 % of the time."
+    )
+    assert replace(region, run="b").phrase == f"in run b {phrase}"
+
+
+def test_bins_are_eighths_of_the_windows_of_the_circle_or_fifteen_seconds():
+    assert SPEED.bin_edges(np.arange(81.0) ** 2) == pytest.approx((10.0 * np.arange(9.0)) ** 2)
+    assert SPEED.bin_edges(np.ones(81)).tolist() == [1.0]
+    assert HEADING.bin_edges(np.zeros(3)) == pytest.approx(0.25 * np.pi * np.arange(-4, 5))
+    for seconds, bins in ((14.0, 1), (29.0, 1), (31.0, 2), (100.0, 6), (1e4, 16)):
+        edges = TIME.bin_edges(7.0 + np.array([0.0, 0.3, 1.0]) * seconds)
+        assert edges == pytest.approx(np.linspace(7.0, 7.0 + seconds, bins + 1))
