@@ -110,11 +110,6 @@ class WeakWindows:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
-    @cached_property
-    def half_known(self) -> np.ndarray:
-        """(n - 1, 1), a half where a sample and the next have a smoothed state, else zero."""
-        return np.where(self.known[:-1] & self.known[1:], 0.5, 0.0)[:, None]
-
     def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
@@ -320,7 +315,8 @@ def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
         nu: (n, 3), at the samples, zero where it is not known.
     """
     middle = nu.copy()
-    middle[:-1] += w.half_known * np.diff(nu, axis=0)
+    half = np.where(w.known[:-1] & w.known[1:], 0.5, 0.0)
+    middle[:-1] += half[:, None] * np.diff(nu, axis=0)
     return middle
 
 
