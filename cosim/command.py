@@ -126,6 +126,16 @@ class Output(Console):
         raise BrokenPipeError
 
 
+def _code_of(main: Callable[[], int]) -> int:
+    """Exit code of a command; argparse raises its own after it has written help or what is wrong."""
+    try:
+        return main()
+    except SystemExit as request:
+        if request.code is None or isinstance(request.code, int):
+            return request.code or 0
+        return FAILED
+
+
 def run_command(main: Callable[[], int]) -> NoReturn:
     """Run a command's ``main`` and exit with its code; an exception becomes one line on standard error.
 
@@ -135,8 +145,9 @@ def run_command(main: Callable[[], int]) -> NoReturn:
     try:
         raise_on_interrupt()
         try:
-            code = main()
+            done = _code_of(main)
             sys.stdout.flush()
+            code = done
         finally:
             ignore_interrupts()
     except KeyboardInterrupt as interrupt:
@@ -145,8 +156,6 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         # CPython ends by the signal itself if KeyboardInterrupt left an exec(), as of a named tuple that
         # was being made, though it was caught; making another one clears that mark.
         namedtuple("Cleared", ())
-    except SystemExit as request:  # of argparse, which has said why
-        code = request.code if isinstance(request.code, int) else 0 if request.code is None else FAILED
     except BrokenPipeError:
         code = 0
     except OSError as error:

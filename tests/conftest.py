@@ -44,9 +44,10 @@ def pytest_configure(config):
     """Settings of this process, and through the environment of the workers and of what the tests start.
 
     A shell that starts the tests in the background makes them deaf to Ctrl-C. Without byte code on the disk,
-    each of the hundreds of processes compiles the project anew.
+    each of the hundreds of processes compiles the project anew. Users' output is buffered.
     """
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONUNBUFFERED"):
+        os.environ.pop(name, None)
     if getattr(config.option, "numprocesses", None):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the worker processes take the cores
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
