@@ -12,13 +12,13 @@ from support.cases import slow
 from support.project import COMPONENTS
 from support.ships import PARTS
 from support.ships import component as part_of_ship
+from support.traced import evaluated
 
 from fmus import ops
 from fmus.base_units import base_exponents
 from fmus.declare import Component, DeclarationError, flatten, packer, rebuild, variables
 from fmus.fmi.trace import (
     TraceError,
-    evaluate,
     initial_dependencies,
     output_dependencies,
     trace_init,
@@ -72,10 +72,9 @@ def test_traced_component_computes_what_the_plain_one_does(name):
     component = component_of(name)
     trace = trace_step(component)
     rng = random.Random(name)
-    for _ in range(20):
-        params, inputs, state = arguments(component, rng)
-        got = evaluate(trace.state + trace.outputs, values_of(params, inputs, state, 0.01))
-        assert got == directly(component, params, inputs, state, 0.01)
+    points = [(*arguments(component, rng), 0.01) for _ in range(15)]
+    traced = evaluated(trace.state + trace.outputs, [values_of(*point) for point in points])
+    assert list(traced) == [directly(component, *point) for point in points]
 
 
 @every_component
@@ -84,7 +83,7 @@ def test_traced_initial_state_is_the_plain_one(name):
     trace = trace_init(component)
     params, inputs, _ = arguments(component, random.Random(1))
     state = component.init(packer(component.inputs)(inputs), packer(component.params)(params))
-    assert evaluate(trace.state, values_of(params, inputs, (), 0.0)) == flatten(state)
+    assert [*evaluated(trace.state, [values_of(params, inputs, (), 0.0)])] == [flatten(state)]
 
 
 @every_component

@@ -168,18 +168,6 @@ def ordered(results: Iterable[Any]) -> list[Symbol]:
     return order
 
 
-def evaluate(results: Sequence[Any], values: dict[str, Any]) -> list[Any]:
-    """The numbers that traced results take for given values of the variables."""
-    known: dict[int, Any] = {}
-    for node in ordered(results):
-        if node.operation == "variable":
-            known[id(node)] = values[node.args[0]]
-        else:
-            args = [known[id(a)] if isinstance(a, Symbol) else a for a in node.args]
-            known[id(node)] = OPERATIONS[node.operation](*args)
-    return [known[id(r)] if isinstance(r, Symbol) else r for r in results]
-
-
 def used_variables(results: Sequence[Any]) -> list[frozenset[str]]:
     """Names of the variables that each result depends on; a factor that is exactly 0 cuts."""
     names: list[str] = []
