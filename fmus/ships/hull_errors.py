@@ -62,8 +62,8 @@ def changed(function: str, change: Change) -> Effect:
 
 def wind_force(
     ship: Motion,
-    W_n: Annotated[float, "m/s", "velocity of the wind to the north"] = 0.0,
-    W_e: Annotated[float, "m/s", "velocity of the wind to the east"] = 0.0,
+    W_n: Annotated[float, "m/s", "velocity of the wind over the water, to the north"] = 0.0,
+    W_e: Annotated[float, "m/s", "velocity of the wind over the water, to the east"] = 0.0,
     frontal_area: Annotated[float, "m2", "area above the water from ahead", POSITIVE] = 1.0,
     lateral_area: Annotated[float, "m2", "area above the water from the side", POSITIVE] = 1.0,
     lateral_centre: Annotated[float, "m", "forward place of the lateral area's centre"] = 0.0,
@@ -73,7 +73,8 @@ def wind_force(
 ) -> Triple:
     """Wind on the areas above the water, beside the resistance of the ship in still air.
 
-    By the relative wind (Fossen 2021, ch. 10): 1/2 rho C A V_rw u_rw, and so across.
+    By the relative wind (Fossen 2021, ch. 10): 1/2 rho C A V_rw u_rw, and so across. The ship's velocity is
+    that through the water, so that the wind is that over the water: in a current not that over ground.
     """
 
     def drag(u: Number, v: Number) -> tuple[Number, Number]:
@@ -102,7 +103,7 @@ def wind(ship: Description) -> Effect:
         "XYN",
         formula="X = ρ/2 C_X A_F V_rw u_rw, Y = ρ/2 C_Y A_L V_rw v_rw, N = x_L Y, less still air",
         symbol="W_n, W_e",
-        sign="direction that the air moves towards",
+        sign="direction that the air moves towards, as seen from the water",
         source="Fossen 2021, ch. 10",
         linear=False,
         parameters=tuple([replace(v, start=given.get(v.name, v.start)) for v in WIND]),
@@ -115,7 +116,7 @@ def wind(ship: Description) -> Effect:
 
 def _blown(f: Found) -> str:
     speed = number(hypot(f["W_n"], f["W_e"]))
-    return f"A wind of {speed} m/s blows towards {compass(f['W_n'], f['W_e'])}."
+    return f"A wind of {speed} m/s over the water blows towards {compass(f['W_n'], f['W_e'])}."
 
 
 def hull_errors(ship: Description) -> list[Effect]:
