@@ -12,6 +12,7 @@ from .assessment.regions import Region
 from .assessment.remainder import AxisRemainder, Remainder, axis_remainders
 from .assessment.remainder_text import remainder_sentence
 from .identification.findings import Finding, Findings
+from .identification.prior import NominalPrior
 from .identification.refinement import at_limit
 from .model import Model, WeakWindows, omega
 from .model.uncertainty import omega_std
@@ -59,24 +60,32 @@ def verdict(learned: Findings, refitted: bool, remainder: Remainder) -> Verdict:
     return "unexplained" if remainder.significant or learned.effects or refitted else "none"
 
 
-def concluded(found: Findings, runs: Sequence[WeakWindows], unseen: Unseen, start: Model) -> Conclusion:
+def concluded(
+    found: Findings,
+    runs: Sequence[WeakWindows],
+    unseen: Unseen,
+    start: Model,
+    prior: NominalPrior,
+) -> Conclusion:
     """The model that the findings amount to.
 
     Coefficients alone explain the data if something was missing, nothing is with them, none is further
-    from what is believed of it than MOST_MOVED, and unseen data are not worse than without. They then
-    take the place of effects of which none is believed, if unseen data are not worse either.
+    than MOST_MOVED from what is believed of it where its value is from, and unseen data are not worse
+    than without. They then take the place of effects of which none is believed, if unseen data are not
+    worse either.
 
     Args:
         found: what is left of the findings after the withdrawal.
         runs: all runs.
         unseen: the data that decide.
         start: the model at first.
+        prior: of the nominal coefficients, as where their values are from has it.
     """
     if any(believed(f) for f in found.effects) or (found.effects and found.refit is None):
         return Conclusion(found, False, [])
     alone = without(found, [f.id for f in found.effects], start) if found.effects else found
     other = alone.refitted
-    if other is not None and alone.plausible:
+    if other is not None and alone.plausible_by(prior):
         missing, left = (something_left(runs, start, m) for m in (start, other))
         before = [found, start] if found.effects else [start]
         if missing and not left and unseen.judges(alone):

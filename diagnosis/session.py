@@ -246,10 +246,11 @@ def diagnose(
     unseen = Unseen(train, held_out, start, found.sigma)
     kept, withdrawn = withdraw(found, unseen, start, lambda a, b: drives_on(a, b, region))
     kept = replace(kept, effects=[limited(f, start) for f in kept.effects])
-    learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start)
+    belief = NominalPrior.of(start, prior)
+    learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start, belief)
     advance("fit to predictions")
     something = bool(learned.effects) or refitted
-    fit = to_predictions(learned, train, NominalPrior.of(start, prior), something)
+    fit = to_predictions(learned, train, belief, something)
     if held_out and harm(*unseen.losses(fit.findings.model, start)):
         # The fit by the model error was held against these runs already.
         fit = fit.about(learned)
@@ -258,7 +259,7 @@ def diagnose(
     refitted = refitted or (something and not left)
     if use is None and not any(believed(f) for f in fit.findings.effects):
         advance("calibration")
-        alone = calibrated(fit.findings, train, held_out, start, NominalPrior.of(start, prior))
+        alone = calibrated(fit.findings, train, held_out, start, belief)
         if alone is not None:
             dropped, refitted, something, fit = [*dropped, *fit.findings.effects], True, True, alone
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])

@@ -248,7 +248,7 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
         judges=lambda f: case["judges"],
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
-    c = concluded(found, [], unseen, START)
+    c = concluded(found, [], unseen, START, NominalPrior.of(START))
     assert c.refitted == refitted
     if refitted:
         assert c.learned.model is OTHER

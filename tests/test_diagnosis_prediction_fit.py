@@ -289,6 +289,15 @@ def test_posterior_has_total_values_by_the_names_of_the_fmus(tmp_path):
     assert posterior.correlation[drag, own] < -0.1  # the sum is what the data know
 
 
+def test_value_that_an_effect_and_a_coefficient_are_of_stands_once_as_their_sum():
+    fit, prior = fitted()
+    names = ["X_u", "m", "X_u"]
+    covariance = np.array([[4.0, 0.1, -3.0], [0.1, 1.0, 0.2], [-3.0, 0.2, 9.0]])
+    posterior = Posterior.of(replace(fit, names=names, covariance=covariance), prior)
+    assert posterior.names == ["vessel.X_u", "vessel.m"]
+    np.testing.assert_allclose(posterior.covariance, [[7.0, 0.3], [0.3, 1.0]])
+
+
 def test_pair_that_is_correlated_at_98_percent_is_known_only_together():
     covariance = np.array([[1.0, 0.98 * 3.0, 0.0], [0.98 * 3.0, 9.0, 0.1], [0.0, 0.1, 4.0]])
     posterior = Posterior(["vessel.a", "vessel.b", "vessel.c"], ["1"] * 3, np.zeros(3), covariance)

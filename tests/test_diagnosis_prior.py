@@ -1,5 +1,6 @@
 """How well the nominal coefficients are known: by where their values come from, or as the user says."""
 
+import numpy as np
 import pytest
 from support.command import command
 from support.project import ROOT
@@ -7,10 +8,13 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, learn
+from diagnosis.identification.findings import Findings
 from diagnosis.identification.prior import MEASURED, NominalPrior, shares
+from diagnosis.identification.refinement import Estimate
 from fmus.declare import variables
 from fmus.hull import Damping, Inertia
 from fmus.ship import ship
+from fmus.ships.ship_file import read_ship
 from fmus.thrusters.chain import Plant
 
 KNOWN = ship().coefficients
@@ -39,6 +43,32 @@ def test_the_search_believes_in_each_to_a_tenth():
     found = std(most=MEASURED)
     assert found["m"] == 0.01, "what is known better stays so"
     assert found["N_r"] == found["plant_F_vsp"] == MEASURED
+
+
+OTTER = Model(ship=ship(description=read_ship("otter")))
+
+
+def test_a_lag_of_a_ships_file_is_as_uncertain_as_it_says_and_never_negative():
+    prior = NominalPrior.of(OTTER)
+    assert [prior.mean["lag_port"], prior.std["lag_port"]] == [1.0, 0.5]
+    assert "lag" not in prior.mean, "no number of the file, but what may be missing"
+    at = Estimate.at(OTTER, prior)
+    for off, lag in ((-1.0, 0.5), (-4.0, 0.0)):
+        moved = at.plus({}, off * np.array([n == "lag_port" for n in prior.mean]))
+        assert moved.model(prior).value("lag_port") == pytest.approx(lag)
+
+
+@pytest.mark.parametrize(("share", "plausible"), [(0.2, True), (0.1, False)])
+def test_coefficients_are_held_to_where_they_come_from_not_to_the_search(share, plausible):
+    searched, own = (NominalPrior.of(Model(), {"X_u": s}) for s in (MEASURED, share))
+    offset = 4.0 * np.array([n == "X_u" for n in searched.mean])
+    found = Findings(
+        moved={"X_u": 4.0},
+        estimate=Estimate(Model(), offset),
+        searched=searched,
+    )
+    assert not found.plausible
+    assert found.plausible_by(own) is plausible
 
 
 def test_a_prior_of_some_beats_the_ships_and_a_single_one_its_group():

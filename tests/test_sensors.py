@@ -171,6 +171,32 @@ def test_a_clock_that_wanders_is_told_by_its_stretches_and_repaired():
     )
 
 
+def held(run):
+    """Its position north stands still for a tenth of the run, as the log's writer held it."""
+    x = run.pose[:, 0].copy()
+    x[600:760] = x[600]
+    return replace(run, pose=np.column_stack([x, run.pose[:, 1:]]))
+
+
+def behind(run):
+    """Its pose is filtered over a second and a half."""
+    pose, share = run.pose.copy(), 1.0 - np.exp(-H / 1.5)
+    for k in range(1, len(pose)):
+        pose[k] = pose[k - 1] + share * (pose[k] - pose[k - 1])
+    return replace(run, pose=pose)
+
+
+@pytest.mark.parametrize("lie", [held, behind])
+def test_what_way_and_turn_tell_differently_is_no_clock(lie):
+    found = examine(lie(made()), REFERENCE)
+    assert not [f for f in found.findings if f.channel == "time"]
+    assert np.array_equal(found.run.time, made().time)
+
+
+def test_a_position_that_was_held_needs_two_clocks():
+    assert [n for n in examine(held(made()), REFERENCE).notes if "another clock" in n]
+
+
 def test_true_time_rises_where_noise_makes_the_rate_of_the_clock_negative():
     edges, clock = np.arange(0.0, 6.0), np.array([0.9, 1.1, -0.4, 1.0, 1.0])
     true = integral_of(edges, clock)

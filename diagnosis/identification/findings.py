@@ -132,3 +132,10 @@ class Findings:
     def plausible(self) -> bool:
         """Whether no nominal coefficient is further from what is believed of it than MOST_MOVED."""
         return all(abs(z) <= MOST_MOVED for z in self.moved.values())
+
+    def plausible_by(self, prior: NominalPrior) -> bool:
+        """The same by another prior than that of the search, which believes in all to a tenth."""
+        if self.searched is None or self.estimate is None:
+            return self.plausible
+        offset = prior.rescaled(self.estimate.offset, self.searched)
+        return bool((np.abs(offset) <= MOST_MOVED).all())

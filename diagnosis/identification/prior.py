@@ -79,6 +79,11 @@ class NominalPrior:
         """Number of coefficients."""
         return len(self.mean)
 
+    def rescaled(self, offset: np.ndarray, of: "NominalPrior") -> np.ndarray:
+        """Offsets (size,) in standard deviations of another prior, in those of this one."""
+        pairs = zip(offset.tolist(), of.std.values(), self.std.values(), strict=True)
+        return np.array([k * a / b if b else 0.0 for k, a, b in pairs])
+
     def changes(self, offset: np.ndarray) -> dict[str, float]:
         """Additions to the coefficients, SI, for offsets (size,) in standard deviations."""
         return {

@@ -86,8 +86,9 @@ class Estimate:
         return cls(start, np.zeros(prior.size))
 
     def model(self, prior: NominalPrior) -> Model:
-        """The model with all of it."""
-        return self.start.plus(self.values).plus(prior.changes(self.offset))
+        """The model with all of it, nominal coefficients within their range."""
+        found = self.start.plus(self.values)
+        return found.plus({n: bounded(found, n, c) for n, c in prior.changes(self.offset).items()})
 
     @property
     def fitted(self) -> list[str]:

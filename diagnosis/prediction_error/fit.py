@@ -145,6 +145,8 @@ class PredictionFit:
         self._steps = {
             n: SMALL * s for n, s in (scale | {n: s for n, s in prior.std.items() if s}).items()
         }
+        # Of an effect that adds to a nominal coefficient, such as a lag, the name stands twice.
+        self._columns = [[*self._steps].index(n) for n in self.names]
         P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
         self.precision = P[np.ix_(self._kept, self._kept)]
 
@@ -210,7 +212,7 @@ class PredictionFit:
         def of_windows(s: Shooting) -> tuple[np.ndarray, ...]:
             around = s.around(model, self._steps)
             W = self.whitening(s, around)
-            A = whitened(W, around.slopes * self.unit)
+            A = whitened(W, around.slopes[..., self._columns] * self.unit)
             flat = A.reshape(-1, q)
             fine = running(W)
             sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]

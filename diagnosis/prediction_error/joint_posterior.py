@@ -33,12 +33,16 @@ class Posterior:
     @classmethod
     def of(cls, fitted: Fitted, prior: NominalPrior) -> "Posterior":
         """The posterior of a fit to predictions."""
-        model, names = fitted.estimate.model(prior), fitted.names
+        model, names = fitted.estimate.model(prior), [*dict.fromkeys(fitted.names)]
+        # A value that an effect and a nominal coefficient are of is their sum.
+        parts = np.array([[float(n == of) for of in fitted.names] for n in names]).reshape(
+            len(names), -1
+        )
         return cls(
             [f"{model.owner(n)}.{n}" for n in names],
             [model.declared(n).unit for n in names],
             np.array([model.value(n) for n in names]),
-            fitted.covariance,
+            parts @ fitted.covariance @ parts.T,
         )
 
     @classmethod

@@ -56,7 +56,7 @@ def to_predictions(
         std = np.concatenate([omega_std(w, found.model) for w in runs])
         push = estimate(runs, model_error(runs, found.model), std)
         return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, push, {}))
-    begin = replace(begin, offset=rescaled(begin.offset, searched, prior))
+    begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
     weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
     fitted = fit_predictions(runs, windows, weak, prior)
     posterior, at = Posterior.of(fitted, prior), fitted.estimate
@@ -85,12 +85,6 @@ def to_predictions(
         estimate=at,
     )
     return Outcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
-
-
-def rescaled(offset: np.ndarray, old: NominalPrior, new: NominalPrior) -> np.ndarray:
-    """Offsets (q,) in standard deviations of one prior, in those of another."""
-    pairs = zip(offset.tolist(), old.std.values(), new.std.values(), strict=True)
-    return np.array([k * a / b if b else 0.0 for k, a, b in pairs])
 
 
 def fit_model_error(

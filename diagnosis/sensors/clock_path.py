@@ -88,6 +88,7 @@ class PathProblem:
         without: frozenset[int] = frozenset(),
     ) -> None:
         self.evidence, self.constants, self.noise = e, constants, noise
+        self.gaps, self.without = gaps, without
         time = e.time
         rows = e.rows
         for start, end in gaps:

@@ -29,6 +29,13 @@ SWING = 2.0 * np.pi  # rad: headings all round, as a ship is swung to adjust its
 CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
 CLOCK_OR_COMPASS = "a compass that is off by heading would look the same"
 CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
+# Of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
+# differ by beyond noise. Chosen: with more, most of it is not what both tell.
+MOST_APART = 0.5
+TWO_CLOCKS = (
+    "position and speed would need another clock than heading and yaw rate: no clock is repaired, and "
+    "something else is wrong there, such as a filter, or values that were held"
+)
 STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
 LEAST_NOISE = 1e-6  # m, rad; keeps the equations well-posed where nothing is noisy
@@ -43,6 +50,7 @@ class Motion(NamedTuple):
         wanders: whether it does.
         kept: constant faults that are sure and matter.
         either: whether a compass that is off by heading would look like that clock.
+        torn: whether way and turn would each need a clock of its own.
     """
 
     problem: PathProblem
@@ -50,6 +58,7 @@ class Motion(NamedTuple):
     wanders: bool
     kept: list[Column]
     either: bool = False
+    torn: bool = False
 
     @property
     def std(self) -> np.ndarray:
@@ -76,7 +85,8 @@ def motion(run: Run, scale: Scale) -> Examined:
         return replace(rest, findings=(*_added(late, rest.findings),))
     fixes = [f for f in findings if f.repaired]
     repaired = corrected(e, _correction(found, jumps, fixes)) if fixes else run
-    return Examined(repaired, tuple(findings), _leeway(e), _agreeing(found, e))
+    notes = (*_leeway(e), *((TWO_CLOCKS,) if found.torn else ()))
+    return Examined(repaired, tuple(findings), notes, _agreeing(found, e))
 
 
 def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
@@ -122,7 +132,8 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
     columns, solution = list(every), problem.solve(fixed_clock=True)
     wanders = solution.criterion - loose.criterion > LIKELIER
     wanders = wanders and _uneven(Motion(wandering, loose, True, []))
-    if wanders:
+    torn = wanders and _two_clocks(Motion(wandering, loose, True, free))
+    if wanders := wanders and not torn:
         problem, columns, solution = wandering, free, loose
     swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
     if e.rate is not None and (
@@ -137,7 +148,7 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
     while len(kept := _sure(columns, solution)) < len(columns):
         problem, columns = PathProblem(e, kept, sizes, cut, without), kept
         solution = problem.solve(fixed_clock=not wanders)
-    return Motion(problem, solution, wanders, columns, either)
+    return Motion(problem, solution, wanders, columns, either, torn)
 
 
 def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
@@ -271,6 +282,28 @@ def _uneven(found: Motion) -> bool:
     b = _blocks(found)
     off = np.abs(b.mean - np.average(b.mean, weights=b.std**-2.0))
     return bool((off > np.maximum(SURE * b.std, LEAST_CLOCK)).any())
+
+
+def _two_clocks(found: Motion) -> bool:
+    """Whether way and turn contradict a clock: it acts alike on both, so that each alone tells it."""
+    p, e = found.problem, found.problem.evidence
+    if e.velocity is None or e.rate is None:
+        return False
+    alone = []
+    for needs, part in (
+        ("velocity", replace(e, rate=None)),
+        ("rate", replace(e, velocity=None, by=None)),
+    ):
+        own = [c for c in found.kept if c.needs == needs]
+        own = own if needs == "rate" else [c for c in own if c.kind != "scale"]
+        problem = PathProblem(part, own, p.noise, p.gaps, p.without)
+        alone.append(_blocks(Motion(problem, problem.solve(), True, own)))
+    way, turn = alone
+    weight = 1.0 / (way.std**2 + turn.std**2)
+    rates = np.array([way.mean - turn.mean, _blocks(found).mean])
+    rates -= np.average(rates, axis=1, weights=weight)[:, None]
+    apart, off = (weight * rates**2).sum(axis=1).tolist()
+    return apart - weight.size > MOST_APART * off
 
 
 def _stretches(found: Motion) -> list[tuple[float, float, float, float]]:

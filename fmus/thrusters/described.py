@@ -1,6 +1,5 @@
 """The thrusters of a described ship: from a request, or from commands, to the force that acts."""
 
-from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ..actuators.actuation import actuators, forces, measurable, ordered, output, parameters, variable
@@ -51,8 +50,10 @@ def described(effects: EffectSet, ship: Description) -> Component:
     """The FMU of a described ship's thrusters, with the effects that it may have."""
     shape = layout(ship)
     groups = thruster_effects(effects, shape)
-    lags = {f"lag_{a.order}": a.part.number("lag") for a in ordered(ship)}
-    slow = redeclared(groups.dynamics.params, lambda v: replace(v, start=lags.get(v.name, v.start)))
+    lags = {f"lag_{a.order}": x for a in ordered(ship) for x in a.part.values if x.name == "lag"}
+    slow = redeclared(
+        groups.dynamics.params, lambda v: lags[v.name].of(v, "lag") if v.name in lags else v
+    )
     parts = actuators(ship)
     params = bundle(
         "Params",
