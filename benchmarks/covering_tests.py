@@ -39,6 +39,7 @@ context = ${PYTEST_CURRENT_TEST-}
 disable_warnings = no-data-collected, module-not-imported
 include =
     */fmus/*
+    */fmucheck/*
     */cosim/*
     */diagnosis/*
     */studies/*

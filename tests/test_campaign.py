@@ -157,15 +157,17 @@ def test_a_row_for_each_run_with_the_metrics_of_a_fresh_one(base):
     assert told["versions"]["cybership"]
 
 
-def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native):
+def test_compiled_fmus_that_are_reset_give_the_same_runs(base, native, monkeypatch):
     """By the same hashes, so that a campaign goes on with FMUs of the other kind."""
     path = campaign(base, {"seed": {"set": "seed", "values": [0, 1]}})
+    monkeypatch.setattr("cosim.campaign.conduct.prepare_library", lambda native: f"made for {native}")
     tables, logs = {}, {}
     for kind in (True, False):
         out, notes = base / f"native_{kind}", []
         made = cosim.run_campaign(path, out, workers=0, keep_logs=True, show=notes.append, native=kind)
         assert list(made["status"]) == ["done"] * 2
         assert any("--no-native" in note for note in notes) == kind
+        assert f"note: made for {kind}" in notes
         folders = [out / "logs" / h[:16] for h in made["hash"]]
         told = [json.loads((folder / "log.json").read_text()) for folder in folders]
         assert [t["fmus"]["vessel"]["native"] for t in told] == [kind] * 2

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from array import array
 
 import numpy as np
@@ -11,6 +12,7 @@ from support.cases import slow
 from support.foreign import ANY_STEP, STATE, build_lag, needs_compiler
 
 import cosim
+from cosim.compiled import library
 from cosim.compiled.row_text import Rows, compiled_lines
 from cosim.master.loops.rounding import round_to_places
 from cosim.results.log import format_rows
@@ -43,6 +45,22 @@ EVENTS = [
     {"time": 1.3, "model": "vessel", "variable": "u", "action": "reset"},
     {"time": 1.9, "model": "vessel", "variable": "delta_X_u", "action": "reset"},
 ]
+
+
+@pytest.mark.parametrize(
+    ("does", "why"),
+    [
+        ("sys.exit('a note\\nloop.c:3: error: no such thing')", "fails: loop.c:3: error: no such thing"),
+        ("sys.exit(1)", "fails: no message"),
+        ("open(sys.argv[sys.argv.index('-o') + 1], 'w').close()", "made nothing to load: "),
+    ],
+)
+def test_a_compiler_that_fails_is_told_with_what_it_says(does, why, tmp_path, monkeypatch):
+    compiler = [sys.executable, "-c", f"import sys; {does}"]
+    monkeypatch.setattr(library, "_compiler", lambda with_zig: compiler)
+    with pytest.raises(library.NoLibraryError) as told:
+        library._compile(tmp_path / "loop.so", False)
+    assert str(told.value).startswith(f"compiler '{sys.executable}' {why}")
 
 
 def run(content, folder, loop, monkeypatch):

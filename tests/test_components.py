@@ -221,6 +221,9 @@ def test_declaring_a_name_twice_is_refused():
         ("N.m.s2/rad2", {"kg": 1, "m": 2, "rad": -2}),
         ("N.s2/(m.rad)", {"kg": 1, "rad": -1}),
         ("rad/s2", {"s": -2, "rad": 1}),
+        ("kg.m2", {"kg": 1, "m": 2}),
+        ("W", base_exponents("N.m/s")),
+        ("kg.m/N", base_exponents("s2")),
     ],
 )
 def test_units_are_taken_apart(unit, exponents):

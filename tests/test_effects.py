@@ -499,6 +499,14 @@ def test_values_that_are_tried_are_allowed_and_those_of_one_parameter_grow():
             assert alone == sorted(set(alone)), name
 
 
+def test_no_more_than_all_of_a_force_is_lost_and_it_is_no_more_than_doubled():
+    ranges = [
+        p.range for name in STANDARD if name.startswith("loss_") for p in STANDARD[name].parameters
+    ]
+    assert len(ranges) > 3
+    assert all((1.0 - r.max, 1.0 - r.min) == (0.0, 2.0) for r in ranges)
+
+
 def test_documentation_table_is_that_of_the_registry():
     assert (ROOT / "docs" / "effects.md").read_text() == effects_table()
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import numpy as np
 import pandas
@@ -22,6 +23,9 @@ from cosim.campaign.__main__ import main as campaign_main
 from cosim.campaign.conduct import SUMMARY
 from cosim.campaign.run_table import JOURNAL, TABLE
 from cosim.export.__main__ import main as export_main
+from cosim.master.recorder import demand_memory
+from cosim.results.performance import needed, read
+from cosim.system import prepare
 from fmus.build.__main__ import main as build_main
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no supervisor here")
@@ -474,6 +478,19 @@ def test_more_steps_than_memory_are_told_before_anything_is_written(ellipse, tmp
     with pytest.raises(cosim.InputError, match=r"1000000000000000 steps are too many: .* GiB of memory"):
         cosim.simulate(cosim.load_scenario(content), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_memory_is_demanded_for_what_is_kept(ellipse, monkeypatch):
+    """Eight bytes for time and each column that metrics, or pictures, too, read, at every step."""
+    with closing(prepare(cosim.load_scenario(ellipse | {"stop": 5.0}))) as system:
+        for pictures, reads in ((False, read), (True, needed)):
+            columns = {*reads(list(system.signals), system.scenario.roles)} & {*system.signals}
+            memory = {"SC_PHYS_PAGES": (1 + len(columns)) * 501, "SC_PAGE_SIZE": 8}
+            monkeypatch.setattr(os, "sysconf", memory.__getitem__)
+            demand_memory(system, pictures)
+            memory["SC_PHYS_PAGES"] -= 1
+            with pytest.raises(cosim.InputError, match="steps are too many"):
+                demand_memory(system, pictures)
 
 
 @linux_only

@@ -14,7 +14,8 @@ from cosim.export import export_fmu, export_osp, export_ssp
 from cosim.export.__main__ import main as export
 from cosim.files import file_stems
 from cosim.fmu import Model
-from cosim.formats.groups import variable_groups
+from cosim.formats.elements import write_document
+from cosim.formats.groups import osp_model_description, variable_groups, variables_of_group
 from cosim.formats.namespaces import SSP_SPACES
 from cosim.scenario import load_scenario
 from cosim.system import prepare
@@ -315,6 +316,19 @@ def test_variable_groups_hold_what_belongs_together(fmus):
     assert vessel["torque_tau"][1] == ["tau_N"]
     assert vessel["linear_velocity"][1] == ["u", "v"]
     assert vessel["angular_displacement_m"][1] == ["psi_m"]
+
+
+def test_the_written_groups_are_of_the_standard_and_are_read_back(fmus, tmp_path):
+    model, file = Model(fmus["vessel"]), tmp_path / "vessel.xml"
+    root = osp_model_description(model)
+    write_document(root, file)
+    groups = variable_groups(model)
+    assert {name: variables_of_group(file, name) for name in groups} == {
+        name: members for name, (_, members) in groups.items()
+    }
+    kinds = {group.tag for group in root.find("VariableGroups")}
+    assert kinds == {"Force", "Torque", "LinearVelocity", "AngularVelocity", "LinearDisplacement",
+                     "AngularDisplacement", "LinearAcceleration", "AngularAcceleration"}  # fmt: skip
 
 
 def test_the_namespaces_are_those_of_the_standard():

@@ -119,6 +119,8 @@ def test_values_of_another_unit_are_refused(angles, tmp_path, name):
     ("edits", "message"),
     [
         ([("<ssd:Elements>", '<ssd:Elements><ssd:System name="inner"/>')], "nested systems are not supported"),
+        *[([(SYSTEM, BINDING.format(f' {kind}', "", "") + SYSTEM)], "kind of parameter binding is not supported")
+          for kind in ('type="text/csv"', 'sourceBase="component"')],
         ([(SYSTEM, "<ssd:SignalDictionaries/>" + SYSTEM)], "signal dictionaries are not supported"),
         ([("resources/gain.fmu", "resources/ramps.fmu")], "did you mean 'resources/ramp.fmu'"),
         ([("resources/gain.fmu", "http://example.org/gain.fmu")], "is not a file"),

@@ -16,6 +16,7 @@ from test_diagnosis_commands import frame
 
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
+from cosim.process import run_state
 from diagnosis import result_folder
 from diagnosis.result_folder import together
 
@@ -209,3 +210,17 @@ def test_interrupts_at_any_time_leave_nothing(tmp_path):
         for each in load:
             each.kill()
             each.wait()
+
+
+def test_texts_of_a_run_have_room_of_their_own():
+    """What one place holds at most changes no other, and not the first row."""
+    state = run_state.RunState()
+    names = ("CALL", "FOLDER", "LAYOUT", "CAMPAIGN", "UNFINISHED", "NAMES", "DESCRIPTION")
+    places = {name: getattr(run_state, name) for name in names}
+    for name, (_, room) in places.items():
+        state.write(places[name], name[-1] * room)
+    texts = {name: name[-1] * (room - run_state.LENGTH.size) for name, (_, room) in places.items()}
+    assert [name for name, text in texts.items() if state.read(places[name]) != text] == []
+    assert max(first + room for first, room in places.values()) <= run_state.ROWS[0]
+    assert sum(run_state.ROWS) == run_state.SIZE
+    assert state.numbers[run_state.INSTANCE] == run_state.NOTHING

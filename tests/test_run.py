@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import signal
 import stat
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -372,22 +374,27 @@ def test_unpacked_fmus_are_removed(scenario, tmp_path):
     assert list((tmp_path / "tmp").iterdir()) == []
 
 
-def test_missing_binary_is_one_message(tmp_path, plain_fmu):
-    import zipfile
-
-    fmu = plain_fmu("NoBinary", GAIN)
+@pytest.mark.parametrize(
+    ("kind", "gone", "said"),
+    [
+        ("NoBinary", "binaries/", "cannot be loaded"),
+        ("NoModule", "resources/slavemodule", "is a Python FMU without its resources/slavemodule.txt"),
+    ],
+)
+def test_a_missing_part_is_one_message(tmp_path, plain_fmu, kind, gone, said):
+    fmu = plain_fmu(kind, GAIN)
     with zipfile.ZipFile(fmu) as archive:
-        content = {n: archive.read(n) for n in archive.namelist() if not n.startswith("binaries")}
+        content = {n: archive.read(n) for n in archive.namelist() if not n.startswith(gone)}
     with zipfile.ZipFile(fmu, "w") as archive:
         for name, data in content.items():
             archive.writestr(name, data)
     path = tmp_path / "s.json"
     path.write_text(
-        json.dumps({"name": "s", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": "NoBinary.fmu"}}})
+        json.dumps({"name": "s", "step": 0.1, "stop": 1.0, "fmus": {"a": {"path": f"{kind}.fmu"}}})
     )
     done = command(path, "--out", tmp_path / "out")
     assert done.returncode == 2
-    assert "cannot be loaded" in done.stderr
+    assert said in done.stderr
     assert not (tmp_path / "out").exists()
 
 
@@ -405,6 +412,8 @@ def test_help_has_examples(module):
     )
     assert done.returncode == 0
     assert "example" in done.stdout
+    options = re.findall(r"--([a-z-]+) ([A-Z_]+)", done.stdout)
+    assert not [option for option, value in options if option.upper() == value], "says what it takes"
     assert done.stderr == ""
 
 

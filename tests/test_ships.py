@@ -506,6 +506,20 @@ def test_effects_of_a_described_ship_are_its_actuators():
 # Ships of publications
 
 
+@pytest.mark.parametrize("name", SHIPS)
+def test_what_a_description_is_not_sure_of_may_be_fitted_but_no_limit_of_a_command(name):
+    """Of its actuators; what is zero has no share that it could be wrong by."""
+    d = SHIPS[name]
+    limits = ("n_max", "n_min", "n_rate", "alpha_max", "delta_max", "P_idle", "P_full")
+    known = {
+        v.name.removeprefix("plant_"): v.known for v in variables(ship(description=d).thrusters.params)
+    }
+    values = {f"{a.name}_{v.name}": v for a in d.actuators for v in a.values}
+    unsure = {name for name, v in values.items() if v.share and v.value and not name.endswith(limits)}
+    assert {name for name in known if known[name] is not None} == unsure & known.keys()
+    assert all(known[name].share == values[name].share for name in unsure & known.keys())
+
+
 def sailed(d, tau, seconds, h=0.05):
     """The last state of a ship and of its thrusters, for a request or commands."""
     s = ship(description=d)

@@ -303,7 +303,9 @@ def test_experiments_differ_by_what_they_are_about():
             if factor:
                 assert parameters["controller"]["K_d_r"] == factor * trials.HARD["d_r"]
     for (store, spikes), by_controller in chapter6_runs.spiked(trial, plant).items():
-        for content in by_controller.values():
+        assert set(by_controller) == set(chapter6_runs.CL)
+        for name, content in by_controller.items():
+            assert content["fmus"]["controller"]["path"] == f"{name}.fmu"
             parameters, spiky = given(content)
             assert spiky == spikes
             assert (parameters["controller"].get("stale", 0.0) == 1.0) == store.startswith(PRINTED)

@@ -155,19 +155,20 @@ def test_pictures_of_the_regressions(found, tmp_path, drawn):
 
 
 def test_scatter_has_each_force_over_each_velocity(monkeypatch):
+    """Of as many samples as a picture takes, evenly."""
     s = linear()
+    monkeypatch.setattr(analysis_tables, "POINTS", 100)
+    shown = slice(None, None, s.time.size // 100)
     figure = analysis_tables.scatter(s)
     for k, axis in enumerate(("omega_X", "omega_Y", "omega_N")):
         for j, state in enumerate(NU):
             panel = figure.axes[3 * k + j]
             (points,) = panel.get_lines()
-            assert (points.get_xdata() == s.nu[:, j]).all()
-            assert (points.get_ydata() == s.omega[:, k]).all()
+            assert (points.get_xdata() == s.nu[shown, j]).all()
+            assert (points.get_ydata() == s.omega[shown, k]).all()
+            assert len(points.get_xdata()) == 100
             assert panel.get_xlabel() == (state if k == 2 else "")
             assert panel.get_ylabel() == (axis if j == 0 else "")
-    monkeypatch.setattr(analysis_tables, "POINTS", 100)
-    (points,) = analysis_tables.scatter(s).axes[0].get_lines()
-    assert len(points.get_xdata()) == 100
 
 
 def test_components_are_told_and_drawn(tmp_path, drawn):
@@ -403,3 +404,30 @@ def test_a_run_that_broke_off_ends_the_study():
     assert chapter7.folder(FinishedRun({}, folder="there")) == "there"
     with pytest.raises(Exception, match="why"):
         chapter7.folder(FinishedRun({}, status="failed", message="why"))
+
+
+def test_the_study_runs_every_scenario_and_reads_what_lies_in_its_folder(tmp_path, monkeypatch):
+    read, ran, told = [], {}, []
+    s = linear(0.01)
+
+    def run_all(todo, seeds, analyse, logs, jobs, advance):
+        for name in todo:
+            where = logs / name / str(seeds[0])
+            ran[where] = analyse(FinishedRun({}, folder=where))
+            advance()
+
+    monkeypatch.setattr(chapter7, "run_all", run_all)
+    monkeypatch.setattr(chapter7, "true_samples", lambda run: read.append(run) or s)
+    monkeypatch.setattr(chapter7.cosim, "read_log", read.append)
+    monkeypatch.setattr(
+        analysis, "gather_samples", lambda runs, by: read.extend(runs) or analysis.by_run(s)
+    )
+    monkeypatch.setattr(analysis_tables, "write_shapes", lambda *given: told.append("shapes"))
+    monkeypatch.setattr(chapter7, "simulated", lambda *given: told.append([n for n, _ in given[2]]))
+    monkeypatch.setattr(chapter7, "write_loops", lambda *given: told.append(given[2:]))
+    monkeypatch.setattr(chapter7, "measured", lambda report, data: told.append(data))
+    chapter7.study(tmp_path, 9.0, 2, None)
+    assert ran == {where: str(where) for where in read}
+    assert told == ["shapes", ["true states", "smoothed", "mdf", "eight"], (9.0, 2)]
+    chapter7.study(tmp_path, None, 2, tmp_path)
+    assert told[-1] == tmp_path

@@ -70,6 +70,11 @@ def test_a_file_with_other_columns_is_refused(tmp_path):
         tanker.study(tmp_path, tmp_path / "out", None, "selection", False)
     with pytest.raises(InputError, match="no trial"):
         research_vessel.study(tmp_path, tmp_path / "out", None, "selection", False)
+    pd.DataFrame({name: [0.0] for name in research_vessel.COLUMNS if name != "psi"}).to_csv(
+        tmp_path / "trial_1.csv", index=False
+    )
+    with pytest.raises(InputError, match="has no column 'psi'"):
+        research_vessel.study(tmp_path, tmp_path / "out", None, "selection", False)
 
 
 def test_every_run_is_left_out_once_and_never_learned_from(monkeypatch):
@@ -192,6 +197,15 @@ def test_a_log_closes_where_speed_and_heading_make_the_way():
     run.pose[101] = np.nan
     run.measured["u"][210] = np.nan
     assert closure(run) == pytest.approx(0.1 * research_vessel.HORIZON), "gaps are bridged"
+
+
+def test_manoeuvres_of_a_trial_follow_each_other_and_are_told_apart():
+    every = [m for trial in research_vessel.MANOEUVRES.values() for m in trial]
+    assert len({m.name.lower() for m in every}) == len(every)
+    for trial in research_vessel.MANOEUVRES.values():
+        times = [t for m in trial for t in (m.start, m.end)]
+        assert times == sorted(times)
+        assert all(m.end - m.start > research_vessel.HORIZON for m in trial)
 
 
 def test_manoeuvres_begin_with_their_approach_and_leave_out_gaps_of_the_clock():

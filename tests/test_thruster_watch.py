@@ -101,6 +101,24 @@ def test_usual_is_what_least_squares_with_its_prior_finds():
     assert np.array(usual.weights) == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
+def test_what_stands_out_counts_as_three_standard_deviations():
+    """Of each mean square, however far it is off; what is less counts as it is."""
+    rng = np.random.default_rng(2)
+    usual = watch.Usual(square=tuple(rng.uniform(0.5, 2.0, 3)), ratios=tuple(rng.uniform(0.5, 2.0, 2)))
+
+    def means(deviations):
+        square, ratios = np.array(usual.square), np.array(usual.ratios)
+        error = deviations * np.sqrt(4.0 * square)
+        row = watch.Row(error=tuple(error), unsure=4.0, ratios=tuple(deviations**2 * ratios), fair=1.0)
+        after = watch.learned(usual, row, watch.Params())
+        return np.array([*after.square, *after.ratios]) / [*square, *ratios] - 1.0
+
+    assert means(300.0) == pytest.approx(means(3.0), rel=1e-9)
+    assert (means(0.0) < 0.0).all()
+    assert means(2.0) == pytest.approx(3.0 / 8.0 * means(3.0))
+    assert means(1.0) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_nothing_is_told_without_the_applied_force():
     c = watch.COMPONENT
     p, inputs = c.params(), Inputs(applied=Applied())

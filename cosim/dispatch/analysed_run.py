@@ -78,9 +78,9 @@ class Analysed:
                 _in_memory(pool, scenario, run)
             else:
                 _in_folder(pool, scenario, run, self.folder)
-            return Row("done", "", 0.0, {}, {}, self.analyse(run))
+            return Row("done", "", value=self.analyse(run))
         except Exception as error:  # told where the runs were asked for
-            return Row("failed", str(error), 0.0, {}, {}, error)
+            return Row("failed", str(error), value=error)
 
 
 def _in_memory(pool: InstancePool, scenario: Scenario, run: FinishedRun) -> None:

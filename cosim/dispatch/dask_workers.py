@@ -157,7 +157,7 @@ class DaskWorkers:
                     suspects.extend(batch)
                     found = []
                 elif found is None:
-                    found = [Row("lost", "it ended every process that ran it", 0.0, {}, {})]
+                    found = [Row("lost", "it ended every process that ran it")]
                 self._walls.extend(row.wall_s for row in found)
                 yield from zip(batch, found, strict=False)
                 fill()

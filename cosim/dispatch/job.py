@@ -30,9 +30,9 @@ class Row(NamedTuple):
 
     status: str
     message: str
-    wall_s: float
-    metrics: dict[str, float]
-    log: dict[str, bytes]
+    wall_s: float = 0.0
+    metrics: Mapping[str, float] = {}
+    log: Mapping[str, bytes] = {}
     value: Any = None
 
 

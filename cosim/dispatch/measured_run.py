@@ -40,8 +40,8 @@ class Measured:
         try:
             metrics = run_in_memory(pool, scenario)
         except performance.MetricsError as error:
-            return Row("done", f"no metrics: {error}", 0.0, {}, {})
-        return Row("done", "", 0.0, metrics, {})
+            return Row("done", f"no metrics: {error}")
+        return Row("done", "", metrics=metrics)
 
 
 def run_in_memory(

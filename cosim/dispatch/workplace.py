@@ -40,9 +40,9 @@ class Workplace:
             try:
                 row = task(self.pool, scenario)
             except (InputError, SimulationError) as error:
-                row = Row("failed", str(error), 0.0, {}, {})
+                row = Row("failed", str(error))
             except Exception as error:  # of this computer, as a full disk, or of this program
-                row = Row("lost", repr(error), 0.0, {}, {})
+                row = Row("lost", repr(error))
             finally:
                 os.chdir(here)
             return row._replace(wall_s=time.perf_counter() - started)

@@ -77,14 +77,13 @@ def present(register: Register, now: Sample, span: Number, learns: Condition) ->
     return when(span > 0.0, delayed, lambda: Present(register, now, 1.0, learns))
 
 
-def explained(
-    model: Parametrisation, sample: Sample, s: State, belief: Any
-) -> tuple[Any, Triple, Triple]:
-    """Regressors, y, and eps = y - F phi_hat - R^T omega_hat, (4.33), with today's estimates."""
-    F = model.regressors(sample.nu, sample.nu_dot, sample.tau, belief)
-    y = model.error(sample.nu, sample.nu_dot, sample.tau, belief)
+def explained(model: Parametrisation, sample: Sample, s: State, p: Any) -> tuple[Row, Triple]:
+    """A sample as it is stored, y or as printed eps, and eps = y - F phi_hat - R^T omega_hat, (4.33)."""
+    F = model.regressors(sample.nu, sample.nu_dot, sample.tau, p.belief)
+    y = model.error(sample.nu, sample.nu_dot, sample.tau, p.belief)
     a, b = model.force(F, s.phi_hat), to_body(sample.psi, s.omega)
-    return F, y, (y[0] - a[0] - b[0], y[1] - a[1] - b[1], y[2] - a[2] - b[2])
+    eps = (y[0] - a[0] - b[0], y[1] - a[1] - b[1], y[2] - a[2] - b[2])
+    return Row(1.0, sample.time, sample.psi, choose(p.store.stale > 0.5, eps, y), F), eps
 
 
 def concurrent(
@@ -143,20 +142,16 @@ def concurrent(
             lambda: present(s.register, now, p.samples.smoothing, learns),
             lambda: Present(s.register, now, 0.0, False),
         )
-        F_sample, y, eps = explained(model, sample, s, p.belief)
+        row, eps = explained(model, sample, s, p)
 
         omega_on = dot(p.disturbance, (1.0, 1.0, 1.0)) > 0.0
-        target = choose(p.store.stale > 0.5, eps, y)
-        row = Row(1.0, sample.time, sample.psi, target, F_sample)
 
         def smoothed_row() -> tuple[FixedPoint, Row, Any]:
             pose = (e.x_hat, e.y_hat, e.psi_hat)
             seen = learns & not_(e.frozen > 0.5)
             new = Now(time, pose, nu, acted)
             point, past, ready = advanced(model, p.belief, s.point, new, p.samples.fixed_point, h, seen)
-            F_past, y_past, eps_past = explained(model, past, s, p.belief)
-            aim = choose(p.store.stale > 0.5, eps_past, y_past)
-            return point, Row(1.0, past.time, past.psi, aim, F_past), ready
+            return point, explained(model, past, s, p)[0], ready
 
         point, offered, ready = when(
             (h > 0.0) & (p.samples.fixed_point > 0.0), smoothed_row, lambda: (s.point, row, fresh)
@@ -174,7 +169,7 @@ def concurrent(
             lambda: no_integral,
         )
         if by_eps:
-            drive = Drive(F_sample, sample.psi, times(counts, eps))
+            drive = Drive(row.F, sample.psi, times(counts, eps))
         else:
             drive = Drive(F, e.psi_hat, (z.z2_u, z.z2_v, z.z2_r))
         phi, omega, rates = learned(

@@ -156,11 +156,11 @@ def learned(usual: Usual, old: Row, p: Params) -> Usual:
     judged = usual.judged + old.fair * p.sample_time
     share = old.fair * fmax(1.0 - keep, p.sample_time / (judged + START))
     # An error or a ratio that stands out counts as three standard deviations.
-    a, b, c = [
-        s + share * (fmin(e * e / old.unsure, 9.0 * s) - s)
-        for s, e in zip(usual.square, old.error, strict=True)
+    squares = (*[e * e / old.unsure for e in old.error], *old.ratios)
+    a, b, c, x, y = [
+        m + share * (fmin(n, 9.0 * m) - m)
+        for m, n in zip((*usual.square, *usual.ratios), squares, strict=True)
     ]
-    x, y = [m + share * (fmin(n, 9.0 * m) - m) for m, n in zip(usual.ratios, old.ratios, strict=True)]
     return Usual(P, weights, (a, b, c), (x, y), usual.learned + p.sample_time, judged)
 
 
