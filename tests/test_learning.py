@@ -6,12 +6,15 @@ from support.cases import in_part
 from support.loops import closed_loop, ellipse_target, multisine_target, unlimited
 from support.project import COMPONENTS
 
-from fmus.controller.adaptive import Disturbance, adaptive
+from fmus.controller.adaptive import Disturbance, adaptive, to_body
+from fmus.controller.concurrent import explained
 from fmus.controller.learning import Drive, learned, remembered
 from fmus.controller.models import PARAMETRISATIONS, ROTATIONAL, SURGE
+from fmus.controller.smoothing import Sample
 from fmus.controller.store import SIZE, Row, StoreOptions, empty_store, summed
 from fmus.declare import variables
 from fmus.hull import RotationalDamping
+from fmus.signals import Force
 from fmus.vessel import vessel
 
 TRUE_PHI = np.array(RotationalDamping())
@@ -325,3 +328,20 @@ def test_defaults_of_the_combinations():
     names = {v.name for v in COMPONENTS["controller_cl_win_eps"].variables}
     assert {v.name for v in COMPONENTS["controller_abs"].variables} <= names
     assert {v.name for v in variables(StoreOptions)} <= names
+
+
+def test_what_is_stored_is_the_whole_force_or_what_was_left_to_explain_then():
+    """y with which errors are formed anew; as printed eps, which is y less what was known already."""
+    component = COMPONENTS["controller_cl_win_eps"]
+    sample = Sample(0.0, 0.7, (0.3, -0.1, 0.2), (0.05, -0.02, 0.1), Force(1.0, -0.5, 0.2))
+    s = component.init(component.inputs(), component.params())
+    s = s._replace(phi_hat=type(s.phi_hat)(*np.linspace(-2.0, 3.0, 8)), omega=(0.3, -0.2, 0.1))
+    targets = []
+    for stale in (0.0, 1.0):
+        p = component.params(store=component.params().store._replace(stale=stale))
+        row, eps = explained(ROTATIONAL, sample, s, p)
+        targets.append(np.array(row.target))
+    known = np.add(ROTATIONAL.force(row.F, s.phi_hat), to_body(sample.psi, s.omega))
+    assert np.abs(known).min() > 0.01
+    assert targets[0] - known == pytest.approx(np.array(eps))
+    assert targets[1].tolist() == list(eps)
