@@ -36,7 +36,7 @@ def attempt(rule: Rule, fmu: Fmu, timeout: float, stopped: threading.Event) -> O
     # Reports lie apart from the folder that an FMU may take for its own.
     with (
         TemporaryDirectory(prefix="fmu_", ignore_cleanup_errors=True) as place,
-        TemporaryDirectory(prefix="report_", ignore_cleanup_errors=True) as reports,
+        TemporaryDirectory(ignore_cleanup_errors=True) as reports,
     ):
         folder, desk = Path(place, "fmu"), Path(place, "desk")  # it may leave files where it runs
         report, note = Path(reports, "report"), Path(reports, "note")
@@ -58,7 +58,7 @@ def attempt(rule: Rule, fmu: Fmu, timeout: float, stopped: threading.Event) -> O
 
 def _run(arguments: list[str | Path], desk: Path, timeout: float, stopped: threading.Event) -> str:
     """Run the child; returns how it ended, nothing if as it should."""
-    paths = [str(PACKAGES), os.environ.get("PYTHONPATH", "")]
+    paths = [str(PACKAGES), os.environ.get("PYTHONPATH")]
     process = subprocess.Popen(
         [sys.executable, "-m", "fmucheck.child", *arguments],
         cwd=desk,

@@ -7,6 +7,8 @@ import stat
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -15,7 +17,7 @@ from support.command import command
 from support.plain import GAIN
 from support.project import COMPONENTS, ROOT
 
-from fmucheck import source
+from fmucheck import checking, source, trial
 from fmucheck.api import Library
 from fmucheck.bench import Bench, near, other
 from fmucheck.checking import main
@@ -189,7 +191,7 @@ MISBEHAVING = [
     ("exports", [('return "2.0"', 'return "1.0"')], [], "fmi2GetVersion returns"),
     ("life", [("return NULL", "return NULL; return NULL"), ('"{lag}"', '"{gal}"')], [], "fmi2Instantiate returned"),
     ("life", [("fmi2Terminate(void *c) {", "fmi2Terminate(void *c) { raise(SIGSEGV);")], [], "fmi2Terminate: the process ended by SIGSEGV"),
-    ("life", [(STEP, "return 3; s->y += h")], [], "fmi2DoStep returned error"),
+    ("life", [(STEP, 'm->callbacks->logger(0, "", 3, "errors", "too much"); return 3; s->y += h')], [], "fmi2DoStep returned error: too much"),
     ("life", [PENDING], [], "fmi2DoStep returned pending"),
     ("life", [(STEP, 'm->callbacks->logger(0, "", 1, "gossip", "hm"); s->y += h')], [], "category 'gossip'"),
     ("free", [("alive--;", "if (!m->s.running) abort(); alive--;")], [], "fmi2FreeInstance: the process ended by SIGABRT"),
@@ -274,6 +276,7 @@ def test_a_value_nearby_is_a_tenth_of_the_start_or_of_the_nominal_away(xml, shar
     assert near(v, share) == pytest.approx(value)
     if xml == '<Real start="2"/>':
         assert other(v, near(v, 1.0)) == pytest.approx(1.9), "half as far to the other side"
+        assert other(v, near(v, -0.5)) == pytest.approx(2.2)
 
 
 @pytest.mark.parametrize(
@@ -415,6 +418,8 @@ def test_command_tells_findings_with_their_clause(tmp_path):
     assert "experiment (FMI 2.0.4, 2.2.5)" in done.stdout
     assert "lag: it stops at 0 s" in done.stdout
     assert "1 finding in 1 FMU" in done.stdout
+    rows = [line.split() for line in done.stdout.splitlines()]
+    assert rows[:3] == [["check", "lag"], ["experiment", "1"], ["life", "-"]]
     # A file that is no FMU does not take the results of the others away, wherever options stand.
     done = run_check(path, *only, "--json", __file__)
     assert (done.returncode, done.stderr.count("error: ")) == (2, 1)
@@ -425,9 +430,37 @@ def test_command_tells_findings_with_their_clause(tmp_path):
 
 
 def test_command_is_content_with_a_sound_fmu(tmp_path):
-    done = run_check(lag.pack(tmp_path, compiled=False), "--no-run", "--only", "xsd")
+    path = lag.pack(tmp_path, compiled=False)
+    done = run_check(path, "--no-run", "--only", "xsd", "--timeout", "0.5", "--jobs", "2")
     assert (done.returncode, done.stderr) == (0, "")
     assert "no findings in 1 FMU" in done.stdout
+
+
+def test_a_reader_that_leaves_is_no_mistake(tmp_path, monkeypatch):
+    def leave(*_):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(checking, "show", leave)
+    path = lag.pack(tmp_path, compiled=False)
+    assert (run_check(path, "--no-run", "--only", "xsd").returncode) == 0
+
+
+def test_the_bar_stays_out_of_what_is_written(tmp_path, monkeypatch):
+    """On a terminal, to which the results need not go."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    done = run_check(lag.pack(tmp_path, compiled=False), "--no-run", "--only", "xsd", "--json")
+    assert json.loads(done.stdout)["findings"] == 0
+    assert "checking" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [*(("--timeout", value) for value in ("0", "-1", "inf", "nan", "soon")), ("--jobs", "0"), ("--jobs", "1.5")],
+)  # fmt: skip
+def test_command_wants_positive_numbers(option, value):
+    done = run_check(option, value)
+    assert done.returncode == 2
+    assert f"not '{value}'" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -474,6 +507,45 @@ def test_archive_that_becomes_too_large_is_refused(limit, message, tmp_path, mon
         monkeypatch.setattr(source, name, value)
     with pytest.raises(BadFileError, match=message):
         Fmu(path)
+
+
+@pytest.mark.parametrize(
+    ("packed", "most"),
+    [(100, 64 * 2**20), (2**20, 200 * 2**20), (2**30, 4 * 2**30)],
+    ids=["small", "by its size", "whatever its size"],
+)
+def test_archives_may_grow_up_to_a_limit(packed, most):
+    path = SimpleNamespace(stat=lambda: SimpleNamespace(st_size=packed))
+    half = SimpleNamespace(file_size=most // 2)
+    source._limit(path, [half, half])
+    with pytest.raises(BadFileError, match="archive bomb"):
+        source._limit(path, [half, half, SimpleNamespace(file_size=1)])
+
+
+@pytest.mark.parametrize(
+    ("encoding", "declared", "said"),
+    [("utf-8", "", "UTF-8"), ("utf-16", "", "UTF-16"), ("latin-1", "ISO-8859-1", "ISO-8859-1")],
+)
+def test_encoding_is_that_declared_or_told_by_the_first_bytes(encoding, declared, said):
+    head = f'<?xml version="1.0" encoding="{declared}"?>' if declared else ""
+    assert source.read_xml(f"{head}<a/>".encode(encoding), "x.fmu")[1] == said
+
+
+def test_a_rule_that_cannot_be_checked_says_why(tmp_path):
+    def check(fmu):
+        raise NotApplicableError("there is nothing to see")
+
+    rule = replace(RULES["xsd"], name="new", check=check)
+    outcome = examine(Fmu(lag.pack(tmp_path, compiled=False)), [rule])["new"]
+    assert (outcome.found, outcome.skipped, outcome.missing) == ([], "there is nothing to see", False)
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [(0, ""), (3, "with exit code 3"), (-9, "by SIGKILL"), (-99, "by signal 99")],
+)
+def test_end_of_a_trial_is_told_by_its_code(code, said):
+    assert trial._manner(code) == (said and f"the process ended {said}")
 
 
 def test_absent_tool_is_told(tmp_path, monkeypatch):

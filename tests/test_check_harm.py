@@ -40,6 +40,15 @@ def test_fmu_that_removes_files_spoils_no_other_trial(habit, number, tmp_path):
     assert outcomes["reset"].found == []
 
 
+@compiled
+def test_files_that_an_fmu_leaves_where_it_runs_go_with_the_trial(tmp_path, monkeypatch):
+    path = pack(tmp_path, 'fclose(fopen("left", "w")); ')
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert examine(Fmu(path), [RULES["life"]])["life"].found == []
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 def wait_for(path):
     """The number that another process writes to a file."""
     deadline = time.monotonic() + 20.0

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ import cosim
 from cosim import metrics, plots, run
 from cosim.master import real_time
 from cosim.scenario import Roles
+from fmucheck.checking import main as check_main
+from fmus.build.__main__ import main as build_main
 
 PICTURES = {"trajectory.png", "errors.png", "metrics.png", "forces.png", "model_error.png"}
 
@@ -405,13 +408,14 @@ def test_folder_without_permission_is_refused(scenario, tmp_path):
     assert done.returncode == 2
 
 
-@pytest.mark.parametrize("module", ["cosim.run", "cosim.metrics", "cosim.plots", "fmus.build"])
-def test_help_has_examples(module):
-    done = subprocess.run(
-        [sys.executable, "-m", module, "--help"], capture_output=True, text=True, cwd=ROOT, check=False
-    )
+@pytest.mark.parametrize("main", [run.main, metrics.main, plots.main, build_main, check_main])
+def test_help_has_examples_and_says_what_each_option_does(main):
+    done = support.command.command(main, "--help")
     assert done.returncode == 0
     assert "example" in done.stdout
+    for line, after in pairwise(f"{done.stdout}\n".splitlines()):
+        if re.match(r"  -{1,2}\w", line):
+            assert re.search(r"\S {2,}\S", line) or after.startswith(" " * 20), line
     options = re.findall(r"--([a-z-]+) ([A-Z_]+)", done.stdout)
     assert not [option for option, value in options if option.upper() == value], "says what it takes"
     assert done.stderr == ""
