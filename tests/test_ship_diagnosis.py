@@ -88,6 +88,27 @@ def test_commands_far_beyond_their_limit_are_refused_and_say_since_when(ship, ru
     assert diagnosis.load(requested, ship="otter")
 
 
+@pytest.mark.parametrize(
+    ("read_as", "told", "fix"),
+    [
+        (lambda n: n / 16.541, "are shares of their limits", {"factor": 16.54}),
+        (lambda n: -n, "commands have the wrong sign", {"flip": True}),
+    ],
+)
+def test_commands_in_another_unit_or_sign_are_told_with_what_mends_them(
+    run, tmp_path, read_as, told, fix
+):
+    table = run[run["time"] < 40.0].copy()
+    names = ["port.n", "starboard.n"]
+    table[names] = read_as(table[names])
+    table.to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(InputError) as error:
+        diagnosis.load(tmp_path / "run.csv", ship="otter")
+    assert told in str(error.value)
+    line = {"columns": {n: {"name": n} | fix for n in names}}
+    assert f"put {json.dumps(line)} into" in str(error.value)
+
+
 def test_force_columns_are_commands_too(ship, run):
     """A run that tells forces is one of the commands that the ship's allocation gives for them."""
     found = read_frame(run, "run", ship)

@@ -86,8 +86,9 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     if still:
         seen = f"{still} is the same number in all rows, while the rest of the pose changes"
         return seen, {still: Change(still)}, "the name of its column"
+    beyond = beyond_thrusters(w.run, model)
     silent = contradicted_commands(w, model)
-    if silent:
+    if silent and beyond is None:
         return silent, {}, None
     found = likeliest_mistake(w, model)
     if found:
@@ -96,7 +97,7 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
             f"commands show in its motion, as it was read {found.before:.0%}"
         )
         return seen, found.reading.changes, None
-    beyond, given = beyond_thrusters(w.run, model), gains(w, model)
+    given = gains(w, model)
     if beyond is None and given.sound:
         return None
     seen = beyond or _of_gains(given)
@@ -204,7 +205,7 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     now = shares(as_read)
     if now.max() < MISSING:
         return None
-    found, readings = [], [*directions(w.run)]
+    found, readings = [], [*directions(w.run, model)]
     least = chdtri(1, CHANCE / len(readings)) / (w.middle.size / OVERLAP)
     for reading in readings:
         z = as_read if reading.still else _varying(w, model, reading)

@@ -25,6 +25,7 @@ class Reading:
         commands: (3, 3), the same of the commanded force.
         turn: what is added to the heading [rad].
         pace: of the clock, seconds meant for a second read.
+        force: (n, 3), commanded force at rest where actuators' own commands are others; None: as read.
     """
 
     mistake: str
@@ -33,6 +34,7 @@ class Reading:
     commands: np.ndarray = field(default_factory=lambda: np.eye(3))
     turn: float = 0.0
     pace: float = 1.0
+    force: np.ndarray | None = None
 
     @property
     def still(self) -> bool:
@@ -65,7 +67,7 @@ def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
     return Reading(f"{pair[0]} and {pair[1]} are swapped", changes, motion, commands)
 
 
-def directions(run: Run) -> Iterator[Reading]:
+def directions(run: Run, model: Model) -> Iterator[Reading]:
     """Readings in which axes point elsewhere, columns are swapped, or the heading is in degrees."""
     yield of_pose("its heading is mirrored (clockwise is positive here)", (1.0, 1.0, -1.0))
     yield of_pose("y points west (east is positive here)", (1.0, -1.0, 1.0))
@@ -82,14 +84,17 @@ def directions(run: Run) -> Iterator[Reading]:
             yield of_commands(f"{name} has the wrong sign", (1.0 - 2.0 * np.eye(3)[k]).tolist())
         yield from (swapped(TAU, *pair) for pair in ((0, 1), (0, 2), (1, 2)))
     else:
-        yield Reading(wrong, {s: Change(s, -1.0) for s in run.signals}, commands=-np.eye(3))
+        unit = model.ship.commands or {}  # a force turns round with its thrust, at the same angle
+        thrusts = [s for s in run.signals if unit.get(s) != "rad"]
+        changes = {s: Change(s, -1.0) for s in thrusts or run.signals}
+        yield Reading(wrong, changes, commands=-np.eye(3))
 
 
 def units(run: Run, model: Model) -> Iterator[Reading]:
     """Readings in which the pose or the commands are in other units.
 
     Args:
-        run: whose commands are tau.
+        run: with its commands.
         model: whose thrusters' full force is a percentage's whole.
     """
     for unit, size in UNITS["length"].items():
@@ -99,6 +104,8 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
     half = Change("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
     if run.commands is not None:
+        if model.ship.commands is not None:
+            yield from _shares(run, run.commands, model)
         return
     forces, moments = UNITS["force"], UNITS["moment"]
     yield of_commands(
@@ -111,6 +118,20 @@ def units(run: Run, model: Model) -> Iterator[Reading]:
         yield of_commands(f"tau_X and tau_Y are in {unit}", (f, f, 1.0))
         yield of_commands(f"tau_X is in {unit}", (f, 1.0, 1.0))
         yield of_commands(f"tau_Y is in {unit}", (1.0, f, 1.0))
+
+
+def _shares(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
+    """Readings in which commands that no share is a unit of are shares of their limits, or percent."""
+    limits = np.abs(model.ship.layout_of(commands).limits(model.drive.params)).max(axis=1)
+    for whole, name in ((1.0, "shares"), (100.0, "percent")):
+        meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
+        factor = np.where(meant, limits / whole, 1.0)
+        changes = {
+            s: Change(s, factor=f) for s, f in zip(run.signals, factor.tolist(), strict=True) if f != 1.0
+        }
+        if changes:
+            force = model.ship.commanded_force(commands * factor)
+            yield Reading(f"{' and '.join(changes)} are {name} of their limits", changes, force=force)
 
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
@@ -130,7 +151,8 @@ def other_factors(run: Run, k: float) -> Iterator[Reading]:
 def reread(w: WeakWindows, reading: Reading) -> WeakWindows:
     """The windows of a run by another reading, its commands as forces."""
     s, run = w.smoothed, w.run
-    given = replace(run, tau_cmd=run.tau_cmd @ reading.commands.T, commands=None, power=None)
+    force = run.tau_cmd if reading.force is None else reading.force
+    given = replace(run, tau_cmd=force @ reading.commands.T, commands=None, power=None)
     meant = replace(
         s,
         track=replace(s.track, run=given),

@@ -51,7 +51,7 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
     columns = {}
     for signal, (source, sign, factor, offset) in changes.items():
         column = layout.column(source)
-        units = UNITS[QUANTITY[signal]]
+        units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
         flip = column.flip != (sign < 0.0)
