@@ -91,6 +91,16 @@ def test_a_unit_of_the_rate_is_named():
     assert "deg/s in place of rad/s" in found["r", "scale"].sentence
 
 
+@pytest.mark.parametrize("name", ["x", "y", "psi"])
+def test_a_mirrored_channel_of_the_pose_is_named_not_the_three_that_contradict_it(name):
+    run = swung()
+    signs = np.where(np.array(["x", "y", "psi"]) == name, -1.0, 1.0)
+    found = examine(replace(run, pose=run.pose * signs), REFERENCE)
+    assert [(f.channel, f.kind, f.value) for f in found.findings] == [(name, "scale", -1.0)]
+    np.testing.assert_array_equal(found.run.pose, run.pose)
+    assert [*told(beside(run, r=-run.measured["r"]))] == [("r", "scale")], "one that is alone is it"
+
+
 def test_sway_with_the_other_sign_is_no_place_of_the_antenna():
     run = made()
     ahead = np.column_stack([*rotate_to_earth(run.pose[:, 2], 0.3, 0.0), 0.0 * run.time])

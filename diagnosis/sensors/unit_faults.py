@@ -9,6 +9,7 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.scale import Scale
 
 from ..data import Run
+from ..data.columns import POSE
 from ..data.unit_factors import UNITS
 from .blocked_fit import SURE, blocked_fit
 from .evidence import Evidence, evidence, integral
@@ -33,16 +34,49 @@ def unit_factors(quantity: str) -> dict[str, float]:
 
 def units(run: Run, scale: Scale) -> Examined:
     """Velocity and yaw rate that are many times what the pose says, or its opposite."""
-    e = evidence(run)
+    found = mirrored(run)
+    e = evidence(found.run)
     if e is None:
-        return Examined(run)
-    found = Examined(run)
+        return found
     if e.rate is not None:
         found = _judged(found, e, ("r",), "rate", *_windows(e, e.psi[:, None], e.turned[:, None]))
     if e.velocity is not None and e.by is not None:
         names = ("speed",) if e.by[0] == "speed" else e.by
         found = _judged(found, e, names, "speed", *_windows(e, _position(e), e.gone))
     return found
+
+
+def mirrored(run: Run) -> Examined:
+    """A channel of the pose with the other sign, with which alone rate and velocity both agree with it.
+
+    Heading and velocity in the ship's axes tell where it goes, the yaw rate how the heading turns: of the
+    three signs only one puts both right.
+    """
+    e = evidence(run)
+    if e is None or e.rate is None or e.by != ("u", "v") or _both_agree(e):
+        return Examined(run)
+    for k, name in enumerate(POSE):
+        pose = run.pose * np.where(np.arange(3) == k, -1.0, 1.0)
+        other = replace(run, pose=pose)
+        meant = evidence(other)
+        if meant is not None and _both_agree(meant):
+            ends = float(e.time[0]), float(e.time[-1])
+            text = f"{name} contradicts u, v and r: {OPPOSITE}"
+            finding = SensorFinding(name, "scale", -1.0, "1", (-1.0, -1.0), *ends, text)
+            return Examined(other, (finding,))
+    return Examined(run)
+
+
+def _both_agree(e: Evidence) -> bool:
+    """Whether the pose tells of the same motion as yaw rate and velocity, signs included."""
+    said = ((e.psi[:, None], e.turned[:, None]), (_position(e), e.gone))
+    return all(_alike(*_windows(e, *pair)) > AGREED for pair in said)
+
+
+def _alike(pose: np.ndarray, said: np.ndarray) -> float:
+    """Correlation of what pose and channels say of windows (k, d), about zero; 0 where nothing moves."""
+    sizes = (pose**2).sum() * (said**2).sum()
+    return float((pose * said).sum() / np.sqrt(sizes)) if sizes > 0.0 else 0.0
 
 
 def sway(run: Run, scale: Scale) -> Examined:
@@ -100,8 +134,7 @@ def _judged(
         return found
     pose, said, size = pose[much], said[much], size[much]
     ratio = (pose * said).sum(axis=1) / size**2
-    moved = np.sqrt((pose**2).sum(axis=1))
-    alike = float((pose * said).sum() / np.sqrt((moved**2).sum() * (size**2).sum()))
+    alike = _alike(pose, said)
     told = " and ".join(names)
     if abs(alike) < AGREED:
         measured = {n: v for n, v in found.run.measured.items() if n not in names}
