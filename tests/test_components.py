@@ -135,7 +135,7 @@ def test_dependencies_hold_against_perturbation(name):
     # A plant's state answers through the integral, which a vanishing step takes away.
     h = 0.01 if component.sampled else 1e-13
     seen = [set() for _ in declared]
-    for _ in range(30):
+    for _ in range(20):
         params, inputs, state = arguments(component, rng)
         outputs = directly(component, params, inputs, state, h)[-len(declared) :]
         followed = [k for k, v in enumerate(variables(component.inputs)) if v.name not in component.held]

@@ -181,23 +181,25 @@ def test_step_size_may_change(name, opened):
 
 
 @every_fmu
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_bad_input_does_not_poison_the_state(name, bad, opened):
+def test_bad_input_does_not_poison_the_state(name, opened):
     """Afterwards the outputs are of the size that they have without any bad input."""
-    fmu, healthy = opened(name).initialise(), opened(name, "healthy").initialise()
-    play(fmu, random.Random(0), 20)
+    healthy = opened(name, "healthy").initialise()
     usual = play(healthy, random.Random(0), 20)
-    for input_ in fmu.inputs:
-        for k in range(3):
-            fmu.set(**{input_: bad})
-            fmu.step(0.2 + 0.01 * k)
-            assert all(map(math.isfinite, fmu.get())), input_
-        play(fmu, random.Random(1), 2)
-        usual += play(healthy, random.Random(1), 2)
-    rows = play(fmu, random.Random(2), 20)
+    for _ in healthy.inputs:
+        usual += play(healthy, random.Random(1), 1)
     usual += play(healthy, random.Random(2), 20)
     limit = max(100.0, 10.0 * np.abs(usual).max(initial=0.0))
-    assert all(math.isfinite(x) and abs(x) < limit for row in rows for x in row)
+    for bad in (math.nan, math.inf, -math.inf):
+        fmu = opened(name, f"given {bad}").initialise()
+        play(fmu, random.Random(0), 20)
+        for input_ in fmu.inputs:
+            for k in range(2):
+                fmu.set(**{input_: bad})
+                fmu.step(0.2 + 0.01 * k)
+                assert all(map(math.isfinite, fmu.get())), (input_, bad)
+            play(fmu, random.Random(1), 1)
+        rows = play(fmu, random.Random(2), 20)
+        assert all(math.isfinite(x) and abs(x) < limit for row in rows for x in row), bad
 
 
 def test_initial_outputs_follow_inputs_and_parameters(opened):

@@ -222,7 +222,7 @@ def test_what_an_fmu_has_started_ends_with_it(plain_fmu, tmp_path, last):
         {last}
     """
     cosim.simulate(
-        cosim.load_scenario(one(plain_fmu(f"Forks{len(last)}", GAIN, step), timeout=5.0)),
+        cosim.load_scenario(one(plain_fmu(f"Forks{len(last)}", GAIN, step), timeout=3.0)),
         tmp_path / "out",
     )
     assert gone([int(mark.read_text())])

@@ -126,18 +126,6 @@ def test_compiler_that_fails_is_told(monkeypatch, tmp_path):
     assert not list(tmp_path.rglob("*.fmu"))
 
 
-def test_machines_of_a_universal_library_are_found_where_its_header_says():
-    parts = [bytes.fromhex("cffaedfe") + bytes([k, 0, 0, 1, k, 0, 0, 0]) + b"code" * k for k in (7, 12)]
-    whole = compilers.universal(parts)
-    assert int.from_bytes(whole[4:8], "big") == 2
-    for k, part in enumerate(parts):
-        _, _, offset, size, _ = (
-            int.from_bytes(whole[8 + 20 * k + 4 * j :][:4], "big") for j in range(5)
-        )
-        assert whole[offset : offset + size] == part
-        assert offset % 16384 == 0
-
-
 @pytest.fixture
 def came_along(native, tmp_path, monkeypatch):
     """A package with a compiled FMU of this source, a computer without a compiler, and an empty cache."""

@@ -246,7 +246,7 @@ def test_killed_run_leaves_a_log_readable_up_to_the_last_second(scenario, tmp_pa
     process = start(scenario(stop=10000.0), out, "--realtime", "4")
     begun = time.monotonic()
     first = cosim.read_log(out)["time"][-1]
-    time.sleep(2.0)
+    time.sleep(1.5)
     process.kill()
     process.communicate()
     elapsed = time.monotonic() - begun
