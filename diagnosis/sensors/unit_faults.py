@@ -47,10 +47,10 @@ def units(run: Run, scale: Scale) -> Examined:
 
 
 def mirrored(run: Run) -> Examined:
-    """A channel of the pose with the other sign, with which alone rate and velocity both agree with it.
+    """A channel of the pose that has the other sign.
 
-    Heading and velocity in the ship's axes tell where it goes, the yaw rate how the heading turns: of the
-    three signs only one puts both right.
+    Heading and velocity in the ship's axes tell where it goes, the yaw rate how the heading turns: of
+    the three signs only one puts both right.
     """
     e = evidence(run)
     if e is None or e.rate is None or e.by != ("u", "v") or _both_agree(e):
