@@ -18,6 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 HERE = Path(__file__)
+COLUMNS = ["time", "x", "y", "psi", "tau_X", "tau_Y", "tau_N"]
 # First words of the steps that `learn` tells -> part.
 PARTS = {
     "reading": "reading, smoothing",
@@ -71,7 +72,6 @@ def simulated(folder: Path) -> list[str]:
     import numpy as np
     import pandas as pd
 
-    from .hidden_effects.cost import COLUMNS
     from .hidden_effects.fleet import Order, sail_all
     from .hidden_effects.manoeuvres import manoeuvres
     from .hidden_effects.simulated_runs import Hidden, RunawayError

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.cosimulated import build, sail
 from support.shared import once
 
 from benchmarks.hidden_effects import fleet, simulated_runs
@@ -42,7 +43,7 @@ from benchmarks.hidden_effects.reliability_diagram import (
 from benchmarks.hidden_effects.results import Results, Row
 from benchmarks.hidden_effects.scoring import row, same_coefficients
 from benchmarks.hidden_effects.separation import NOTHING, Rivals, flat
-from benchmarks.hidden_effects.simulated_runs import STEP, Hidden, Voyage, build, sail
+from benchmarks.hidden_effects.simulated_runs import STEP, Hidden, Voyage
 from benchmarks.hidden_effects.summary import write
 from benchmarks.hidden_effects.targets import bias
 from benchmarks.hidden_effects.truth import Motion, force, motion, over, windows
@@ -312,7 +313,7 @@ def test_summary_counts(tmp_path):
         "X_u", "n1", "exact", 0, found=["X_u"], reported=["X_u"], separable=True, right=True, in_set=True
     )
     bad = Row("N_r", "n1", "exact", 0, found=["lag"], reported=["lag"], separable=True)
-    text = write(tmp_path, [good, bad, Row("none", "n1", "wrong", 0)], None).read_text()
+    text = write(tmp_path, [good, bad, Row("none", "n1", "wrong", 0)]).read_text()
     assert (
         "| right effect first where separable, exact | >= 97 % | 50.0 % (1/2): n1 50.0 % (1/2) |" in text
     )
@@ -455,7 +456,7 @@ def test_nothing_that_is_named_is_a_cause_of_foreign_physics(effect, tmp_path):
     wrong = row(problem_of(effect), answer_of("found", ("X_u", 0.95, {}), significant=True))
     doubt = row(problem_of(effect), answer_of("found", ("X_u", 0.5, {}), significant=True))
     assert (wrong.right, wrong.true, wrong.surest) == (False, ["0"], 0.95)
-    text = write(tmp_path, [wrong, doubt], None).read_text()
+    text = write(tmp_path, [wrong, doubt]).read_text()
     assert (
         "| foreign physics: told as unexplained, nothing wrong at >= 0.9 | >= 95 % | 50.0 % (1/2)"
         in text

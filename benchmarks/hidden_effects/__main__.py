@@ -8,7 +8,6 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from cosim import InputError, SimulationError
 from cosim.command import BAD_INPUT, FAILED, command_parser, run_command
@@ -18,13 +17,12 @@ from studies.study_command import progress
 from .answers import judge, kept_answer, path_of
 from .cells import KINDS, Cell, Key, cells
 from .confidence_fit import write_fit
-from .cost import Cost, measure
 from .draw import SINGLE
 from .problems import kept, make
 from .reliability_diagram import draw_diagram
 from .results import Results, Row
 from .scoring import row
-from .simulated_runs import NOISE, build
+from .simulated_runs import NOISE
 from .summary import write
 
 OUT = Path("docs") / "benchmarks" / "hidden_effects"
@@ -77,13 +75,6 @@ def answered(
             pool.shutdown(cancel_futures=True)
 
 
-def cost() -> Cost:
-    """Time and memory of the diagnosis."""
-    with TemporaryDirectory() as folder:
-        build(Path(folder))
-        return measure(Path(folder))
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = _parser().parse_args(arguments)
@@ -97,12 +88,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if left:
                 run(left, results, options.problems, options.jobs, not options.no_peers)
         finally:
-            path = write(options.out, results.rows, None)
+            path = write(options.out, results.rows)
             draw_diagram(results.rows, options.out / DIAGRAM)
         if options.calibrate:
             print(write_fit(results.rows, options.out / FIT))
-        if options.cost:
-            path = write(options.out, results.rows, cost())
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -149,7 +138,6 @@ def _parser() -> argparse.ArgumentParser:
         "examples:\n"
         "  python -m benchmarks.hidden_effects --quick --out /tmp/hidden\n"
         "  python -m benchmarks.hidden_effects --effects X_u 'Y_|v|v' --noise n1 n10 --exact --seeds 3\n"
-        "  python -m benchmarks.hidden_effects --cost\n"
         "  python -m benchmarks.hidden_effects --first 50 --seeds 4 --calibrate --out /tmp/calibration\n"
         "Cells that are in DIR/results.csv are not run again: after Ctrl-C, the same command goes on.\n"
         "exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted",
@@ -190,7 +178,6 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help=f"fit the calibration of confidences to cells set aside, seeds from 50 on: DIR/{FIT}",
     )
-    parser.add_argument("--cost", action="store_true", help="measure time and memory, too")
     parser.add_argument("--quick", action="store_true", help="few effects, n4, exact coefficients")
     return parser
 

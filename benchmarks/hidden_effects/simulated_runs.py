@@ -6,16 +6,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import cosim
 from diagnosis import Run
-from fmus.build import BuildError, native_targets
-from fmus.build import build as build_fmus
 
-from .manoeuvres import GUIDANCE, Manoeuvre
+from .manoeuvres import Manoeuvre
 
 STEP, STOP = 0.02, 240.0  # s
 FINE = 0.005  # s, step of ships that are integrated otherwise
@@ -30,7 +26,6 @@ SHIP = [f"vessel.{n}" for n in ("x", "y", "psi", "u", "v", "r", "u_dot", "v_dot"
 FORCE = [f"thrusters.tau_act_{a}" for a in "XYN"]
 OMEGA = [f"vessel.omega_{a}" for a in "XYN"]
 TARGET = ["guidance.x_t", "guidance.y_t"]
-HERE = Path(__file__).parent
 OTHER = ("other_vessel", "other_thrusters")
 
 CONNECTIONS = [
@@ -83,40 +78,16 @@ class Voyage:
     omega: np.ndarray
 
 
-def sail(manoeuvre: Manoeuvre, hidden: Hidden, noise: float, seed: int, fmus: Path) -> Voyage:
-    """Run the ship along a manoeuvre.
+def scenario(manoeuvre: Manoeuvre, hidden: Hidden, noise: float, seed: int, fmus: Path) -> dict:
+    """Content of the scenario of a run.
 
     Args:
         manoeuvre: path and speed.
         hidden: what the plant has.
         noise: times that of n1.
         seed: of noise, freezes and spikes.
-        fmus: folder of the FMUs that :func:`build` made.
-
-    Raises:
-        RunawayError: the ship did not stay on its path.
+        fmus: folder of the FMUs.
     """
-    content = scenario(manoeuvre, hidden, noise, seed, fmus)
-    with TemporaryDirectory() as folder:
-        result = cosim.simulate(cosim.load_scenario(content), folder)
-        if result.status == "interrupted":
-            raise KeyboardInterrupt
-        if result.status != "done":
-            raise RunawayError(result.message)
-        log = cosim.read_log(folder)
-    eta, nu, nu_dot, tau, omega, pose, commands, target = (
-        np.column_stack([log[name] for name in names])
-        for names in (SHIP[:3], SHIP[3:6], SHIP[6:], FORCE, OMEGA, MEASURED, COMMANDS, TARGET)
-    )
-    tracking = log["time"] > SETTLED
-    if np.hypot(*(eta[tracking, :2] - target[tracking]).T).max() > FAR:
-        raise RunawayError(f"more than {FAR:g} m from the target")
-    measured = Run(manoeuvre.kind, log["time"], pose, commands)
-    return Voyage(measured, eta, nu, nu_dot, tau, omega)
-
-
-def scenario(manoeuvre: Manoeuvre, hidden: Hidden, noise: float, seed: int, fmus: Path) -> dict:
-    """Content of the scenario of a run, arguments as of :func:`sail`."""
     std = [noise * POSITION, noise * POSITION, noise * HEADING]
     filtering = {"position_std": std[0], "heading_std": std[2]}
     start = manoeuvre.start | dict(hidden.vessel)
@@ -149,13 +120,3 @@ def scenario(manoeuvre: Manoeuvre, hidden: Hidden, noise: float, seed: int, fmus
         "log": {"signals": logged, "every": round(STEP / FINE) if hidden.other else 1},
         "metrics": {},
     }
-
-
-def build(folder: Path) -> None:
-    """Put all FMUs that runs need into a folder."""
-    names = ["vessel", "thrusters", "observer_kalman", "controller_abs", *GUIDANCE]
-    files = [HERE / f"{name}.py" for name in OTHER]
-    try:
-        build_fmus([*names, *files], folder, native=native_targets())
-    except BuildError:  # no compiler
-        build_fmus([*names, *files], folder)

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from .cost import Cost
 from .reliability_diagram import Bin, tables
 from .targets import Rows, fall, lines, single
 
@@ -89,7 +88,7 @@ def reliability(panels: dict[str, list[Bin]]) -> list[list[str]]:
     ]
 
 
-def write(folder: Path, rows: Rows, cost: Cost | None) -> Path:
+def write(folder: Path, rows: Rows) -> Path:
     """Write the summary.
 
     Returns:
@@ -103,7 +102,7 @@ def write(folder: Path, rows: Rows, cost: Cost | None) -> Path:
     ran = f"{len(rows)} cells, seeds {seeds[0]}-{seeds[-1]}; " if rows else "No cells yet; "
     parts = [
         HEAD + f"\n{ran}CPython {platform.python_version()} on {machine}; {packages}.",
-        table(("", "target", "reached"), lines(rows, cost)),
+        table(("", "target", "reached"), lines(rows)),
         "## Effect by effect\n",
         table(
             ("hidden", "first where separable", "in the set", "held-out error falls", "first instead"),

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from statistics import mean, median
 
-from .cost import Cost
 from .draw import FOREIGN
 from .reliability_diagram import interval, mean_and_error
 from .results import Row
@@ -39,7 +38,7 @@ def fall(rows: Iterable[Row]) -> str:
     return f"{mine:.1f}x of {truth:.1f}x of {limit:.1f}x ({len(known)})"
 
 
-def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
+def lines(rows: Rows) -> list[tuple[str, str, str]]:
     """Measure, target, and what was reached."""
     good = [r for r in rows if not r.note]
     one, two, none, foreign, outages, noisy = ([r for r in good if r.kind == k] for k in KINDS_SHOWN)
@@ -105,9 +104,6 @@ def lines(rows: Rows, cost: Cost | None) -> list[tuple[str, str, str]]:
         found.append(("the same cells: PLS", "", share(peers, by("pls"))))
         found.append(("the same cells: the diagnosis", "", share(peers, lambda r: r.right)))
     found.append(("processor time of a cell to the answer (4 runs), median", "", _seconds(rows)))
-    if cost is not None:
-        found.append(("time of 4 runs x 240 s x 50 Hz", "<= 10 s", f"{cost.seconds:.1f} s"))
-        found.append(("memory, one hour at 100 Hz", "< 1 GB", f"{cost.megabytes:.0f} MB"))
     return found
 
 
