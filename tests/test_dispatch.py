@@ -5,7 +5,7 @@ import pytest
 
 import cosim
 from cosim.dispatch import analyse_runs, measured_run
-from cosim.dispatch.job import Job, Row, own_version
+from cosim.dispatch.job import Job, Row
 from cosim.results import MetricsError
 
 
@@ -40,16 +40,6 @@ def test_a_run_is_known_by_what_its_numbers_follow_from():
     assert len({known(), known("two.fmu"), known(stop=2.0), known(alike=["one.fmu"])}) == 4
     assert known(alike=["one.fmu", "two.fmu"]) == known("two.fmu", alike=["one.fmu", "two.fmu"])
     assert known(alike=["two.fmu"]) == known()
-
-
-def test_a_worker_of_another_version_runs_nothing(monkeypatch, tmp_path):
-    task = pytest.importorskip("cosim.dispatch.dask_task")
-    monkeypatch.setattr(task, "parent_process", lambda: None)
-    monkeypatch.setattr(task, "_folder", lambda worker: tmp_path)
-    monkeypatch.setattr(task, "get_worker", lambda: None)
-    assert task.run_on_worker(task.Request([], (), frozenset(), own_version())) == []
-    with pytest.raises(cosim.InputError, match=r"a worker has cybership .*, and here it is 0\.0$"):
-        task.run_on_worker(task.Request([], (), frozenset(), "0.0"))
 
 
 def everything(run):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shutil
 import zipfile
 
@@ -11,6 +12,7 @@ from support.exchanged import log_of, write
 import cosim
 from cosim import InputError
 from cosim.export import export_osp, export_ssp
+from cosim.fmu import Model
 from cosim.formats.namespaces import SSM
 from cosim.scenario import load_scenario
 from cosim.system import prepare
@@ -257,6 +259,43 @@ def test_osp_connections_convert_only_what_they_say(angles, tmp_path):
     assert plain == log_of(angles, tmp_path / "kept")[1] != before
     described = json.loads((result.folder / "log.json").read_text())
     assert any("in 'deg' and 'rad'; values pass unchanged" in note for note in described["notes"])
+
+
+GROUPS = (
+    '<OspModelDescription xmlns="https://open-simulation-platform.com/OspModelDescription/1.0.0" version="1.0">'
+    '<VariableGroups><Generic name="all"><Generic name="one">{}</Generic></Generic></VariableGroups>'
+    "</OspModelDescription>"
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "message"),
+    [
+        ('<Variable ref="y"/>', '<Variable ref="u"/>', None),
+        ('<Variable ref="y"/>', "", "ramp.all and gain.all differ in size: 1 and 0"),
+        ('<Variable ref="y"/>', '<Variable ref="w"/>', "'gain' has no variable 'w'"),
+        ('<Variable ref="y"/>', None, "gain.all needs '.*_OspModelDescription.xml'"),
+    ],
+)
+def test_connected_groups_are_their_variables_connected_in_turn(chain, tmp_path, first, second, message):
+    write(chain, tmp_path / "osp", export_osp)
+    plain = load_scenario(tmp_path / "osp").connections
+    structure = tmp_path / "osp" / "OspSystemStructure.xml"
+    text = structure.read_text()
+    for end in ("ramp", "gain"):
+        text = re.sub(
+            f'<Variable simulator="{end}" name="."', f'<VariableGroup simulator="{end}" name="all"', text
+        )
+    structure.write_text(text.replace("VariableConnection", "VariableGroupConnection"))
+    for end, members in (("ramp", first), ("gain", second)):
+        name = Model(tmp_path / "osp" / f"{end}.fmu").name
+        if members is not None:
+            (tmp_path / "osp" / f"{name}_OspModelDescription.xml").write_text(GROUPS.format(members))
+    if message is None:
+        assert load_scenario(tmp_path / "osp").connections == plain
+    else:
+        with pytest.raises(InputError, match=message):
+            load_scenario(tmp_path / "osp")
 
 
 def test_several_osp_scenarios_leave_the_choice(chain, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -486,6 +487,19 @@ def test_claim_of_the_velocity_that_is_held(mdf, df, here):
 def test_claim_of_the_wrap_of_the_heading(df, mdf, here):
     runs = replayed("ellipse", after_wrap_r=lambda o: df if o == "df" else mdf)
     assert claims.wrap(runs)[1] == here
+
+
+def test_the_least_error_of_each_signal_is_bold(tmp_path):
+    def of(best, o):
+        return 1.0 if o == best else 2.0
+
+    errors = {f"rms_{s}": partial(of, OBSERVERS[k % len(OBSERVERS)]) for k, s in enumerate(SIGNALS)}
+    report = Report(tmp_path, "t")
+    estimators.error_tables(report, {"rich": estimators.over_seeds(replayed("rich", **errors)["rich"])})
+    rows = [r.split("|")[1:-1] for r in report.write().read_text("utf-8").splitlines() if "|" in r][2:]
+    for k in range(len(SIGNALS)):
+        bold = [name.strip() for name, *cells in rows if cells[k].strip().startswith("**")]
+        assert bold == [OBSERVERS[k % len(OBSERVERS)]]
 
 
 def test_claim_of_the_observers_that_get_stuck():
