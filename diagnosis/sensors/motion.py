@@ -33,8 +33,8 @@ CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look
 # differ by beyond noise. Chosen: with more, most of it is not what both tell.
 MOST_APART = 0.5
 TWO_CLOCKS = (
-    "position and speed would need another clock than heading and yaw rate: no clock is repaired, and "
-    "something else is wrong there, such as a filter, or values that were held"
+    "position and speed would need another clock than heading and yaw rate: something else is wrong "
+    "there, such as a filter, or values that were held, and nothing but a delay is repaired"
 )
 STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
@@ -132,19 +132,22 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
     columns, solution = list(every), problem.solve(fixed_clock=True)
     wanders = solution.criterion - loose.criterion > LIKELIER
     wanders = wanders and _uneven(Motion(wandering, loose, True, []))
-    torn = wanders and _two_clocks(Motion(wandering, loose, True, free))
-    if wanders := wanders and not torn:
+    if wanders:
         problem, columns, solution = wandering, free, loose
     swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
-    if e.rate is not None and (
-        swung or wanders
-    ):  # a compass off by heading looks like a wandering clock
+    # A compass that is off by heading looks like a wandering clock.
+    if e.rate is not None and (swung or wanders):
         deviating = [*every, *deviations(e)]
         even = PathProblem(e, deviating, sizes, cut, without)
         told = even.solve(fixed_clock=True)
         either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
         if either and swung:
             problem, columns, solution, wanders, either = even, deviating, told, False, False
+    torn = wanders and not either and _two_clocks(Motion(problem, solution, True, columns))
+    if torn:  # nor is what is wrong a constant: of these a delay alone may have torn them
+        wanders, columns = False, [c for c in every if c.kind == "delay"]
+        problem = PathProblem(e, columns, sizes, cut, without)
+        solution = problem.solve(fixed_clock=True)
     while len(kept := _sure(columns, solution)) < len(columns):
         problem, columns = PathProblem(e, kept, sizes, cut, without), kept
         solution = problem.solve(fixed_clock=not wanders)
