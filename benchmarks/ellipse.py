@@ -5,48 +5,21 @@ of the true position error after the first 20 s, over several seeds.
 """
 
 import argparse
-import json
 import platform
 import statistics
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import cosim
+from studies.monte_carlo import run_all, shipped, vary
 
-SCENARIO = Path(__file__).parent.parent / "scenarios" / "ellipse.json"
 CONTROLLERS = ("controller_bs.fmu", "controller_abs.fmu", "controller_cl_win_eps.fmu")
 
 
-def position_error(controller: str, seed: int) -> float:
-    """RMS of the true position error [m] over the window that the scenario's metrics cover.
-
-    Args:
-        controller: FMU that takes the place of the scenario's controller.
-        seed: of noise and freezes.
-
-    Returns:
-        The error [m].
-    """
-    content = json.loads(SCENARIO.read_text())
-    content["seed"] = seed
-    content["fmus"]["controller"] = {"path": controller}
-    with TemporaryDirectory() as folder:
-        result = cosim.simulate(cosim.load_scenario(content), folder)
-    return result.metrics["e_pos_rms"]
-
-
 def over_seeds(seeds: Sequence[int]) -> dict[str, list[float]]:
-    """Controller -> error for each seed, on two processes."""
-    # Forking a process that has loaded FMUs would copy their threads' locks.
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        return {
-            controller: list(pool.map(position_error, [controller] * len(seeds), seeds))
-            for controller in CONTROLLERS
-        }
+    """Controller -> RMS of the true position error [m] for each seed, after the first 20 s."""
+    variants = {name: vary(shipped("ellipse"), {"controller": name}) for name in CONTROLLERS}
+    found = run_all(variants, seeds, processes=2)
+    return {name: [metrics["e_pos_rms"] for metrics in each] for name, each in found.items()}
 
 
 def main() -> int:

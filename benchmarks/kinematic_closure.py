@@ -12,7 +12,8 @@ from pathlib import Path
 
 from diagnosis.model import Model, ship_with
 from diagnosis.sensors import closure, examine
-from studies.research_vessel import read
+from studies.research_vessel import COLUMNS
+from studies.ship_folds import read
 
 TRACK, TURN = 60.0, 20.0  # s
 SHA256 = {
@@ -30,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"trial    position over {TRACK:g} s, median [m]   heading over {TURN:g} s in turns, RMS [°]")
     for name, known in SHA256.items():
         path = data / name
-        run = read(path, model)
+        run = read(path, COLUMNS, model)
         found = examine(run, model.ship.scale)
         before, after = (closure(r, TRACK, TURN) for r in (run, found.run))
         same = hashlib.sha256(path.read_bytes()).hexdigest() == known

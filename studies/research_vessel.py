@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 import diagnosis
-from cosim import InputError
 from diagnosis import Model
 from diagnosis.assessment import free_runs
-from diagnosis.data import Run, read_frame
+from diagnosis.data import Run
 from diagnosis.identification import Method
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 from diagnosis.sensors import Examined, examine
 
-from .ship_folds import Fold, folds_command, learn_folds, titled, write_folds
+from .ship_folds import Fold, folds_command, learn_folds, read, titled, write_folds
 from .study_report import Report
 
 HORIZON = 60.0  # s, of predictions: the ship goes ten lengths
@@ -76,22 +74,6 @@ MANOEUVRES: dict[str, tuple[Manoeuvre, ...]] = {
         Manoeuvre("straight, 7780 s", 7780.0, 8237.0),
     ),
 }
-
-
-def read(path: Path, model: Model) -> Run:
-    """A trial as a run of the ship.
-
-    Raises:
-        InputError: it is absent, or has other columns.
-    """
-    if not path.is_file():
-        raise InputError(f"no trial '{path}'")
-    table = pd.read_csv(path)
-    missing = [name for name in COLUMNS if name not in table]
-    if missing:
-        raise InputError(f"'{path}' has no column '{missing[0]}'")
-    signals = {signal: factor * table[name] for name, (signal, factor) in COLUMNS.items()}
-    return read_frame(pd.DataFrame(signals), path.stem, model.ship)
 
 
 def cut(run: Run, examined: Examined, manoeuvres: Sequence[Manoeuvre]) -> Iterator[Run]:
@@ -186,7 +168,7 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
     ship = ship_with((), "gunnerus")
     trials = []
     for name in MANOEUVRES:
-        run = read(data / f"{name}.csv", Model(ship=ship))
+        run = read(data / f"{name}.csv", COLUMNS, Model(ship=ship))
         trials.append((run, examine(run, ship.scale)))
     places = [f.value for _, e in trials for f in e.findings if (f.channel, f.kind) == ("x", "place")]
     ahead = AHEAD + (float(np.mean(places)) if places else 0.0)

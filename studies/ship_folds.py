@@ -4,17 +4,19 @@ The runs are dealt into folds; each fold is left out in turn. With as many folds
 out alone.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 import diagnosis
 from cosim import InputError
 from diagnosis import Diagnosis, DiagnosisContent, Model, WeakWindows, diagnosis_content
+from diagnosis.data import Run, read_frame
 from diagnosis.identification import DEFAULT, Findings, Method, Prior
 from diagnosis.model import omega
 from diagnosis.progress import Advance
@@ -46,6 +48,27 @@ class NoSearch:
     ) -> Findings:
         error = np.concatenate([omega(w, model) for w in runs])
         return Findings(model=model, sigma=np.sqrt(np.mean(error**2, axis=0)))
+
+
+def read(path: Path, columns: Mapping[str, tuple[str, float]], model: Model) -> Run:
+    """A run of a ship from a table with columns of its own.
+
+    Args:
+        path: CSV.
+        columns: of the file -> signal, factor to SI.
+        model: of the ship.
+
+    Raises:
+        InputError: it is absent, or has other columns.
+    """
+    if not path.is_file():
+        raise InputError(f"no trial '{path}'")
+    table = pd.read_csv(path)
+    missing = [name for name in columns if name not in table]
+    if missing:
+        raise InputError(f"'{path}' has no column '{missing[0]}'")
+    signals = {signal: factor * table[name] for name, (signal, factor) in columns.items()}
+    return read_frame(pd.DataFrame(signals), path.stem, model.ship)
 
 
 def folds_command(

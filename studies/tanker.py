@@ -8,17 +8,15 @@ It is not part of this project.
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.data import Run, read_frame
 from diagnosis.identification import Method
 from diagnosis.model import ship_with
 from diagnosis.progress import silent
 
-from .ship_folds import folds_command, learn_folds, titled, write_folds
+from .ship_folds import folds_command, learn_folds, read, titled, write_folds
 from .study_report import Report
 
 # Column of the files -> signal, factor to SI. The angle of the rudder has the opposite sign there.
@@ -33,20 +31,6 @@ COLUMNS = {
 }
 
 
-def read(path: Path, model: Model) -> Run:
-    """A zig-zag as a run of the tanker.
-
-    Raises:
-        InputError: it has other columns.
-    """
-    table = pd.read_csv(path)
-    missing = [name for name in COLUMNS if name not in table]
-    if missing:
-        raise InputError(f"'{path}' has no column '{missing[0]}'")
-    signals = {signal: factor * table[name] for name, (signal, factor) in COLUMNS.items()}
-    return read_frame(pd.DataFrame(signals), path.stem, model.ship)
-
-
 def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: bool) -> Path:
     """Learn from the zig-zags, some left out in turn, and write what came out."""
     files = sorted(data.glob("z_*.csv"))
@@ -54,7 +38,7 @@ def study(data: Path, out: Path, folds: int | None, by: str | Method, quick: boo
         raise InputError(f"no zig-zags z_*.csv in '{data}'")
     model = Model(ship=ship_with((), "kvlcc2"))
     chosen = files[::4] if quick else files
-    runs = diagnosis.gather([read(f, model) for f in chosen], model=model, anyway=True)
+    runs = diagnosis.gather([read(f, COLUMNS, model) for f in chosen], model=model, anyway=True)
     report = Report(out, titled("KVLCC2, a tanker of 7 m: free-running zig-zags", by))
     report.text(
         f"{len(runs)} zig-zags; the nominal model is that of the MMG standard method "

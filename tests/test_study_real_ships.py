@@ -34,7 +34,10 @@ needs_vessel = pytest.mark.skipif(
 def test_the_nominal_tanker_is_as_wrong_as_published_models_are():
     """Its speed loss in a zig-zag, and its turns, are right to a third of a length in three lengths."""
     model = Model(ship=ship_with((), "kvlcc2"))
-    runs = [tanker.read(TANKER / f"{name}.csv", model) for name in ("z_10_10_p", "z_20_10_s", "z_35_05")]
+    runs = [
+        ship_folds.read(TANKER / f"{name}.csv", tanker.COLUMNS, model)
+        for name in ("z_10_10_p", "z_20_10_s", "z_35_05")
+    ]
     data = diagnosis.gather(runs, model=model, anyway=True)
     for e in diagnosis.evaluate(data, model).evaluations:
         assert 0.2 < e.before.position < 0.4
@@ -50,7 +53,7 @@ def test_the_nominal_tanker_is_as_wrong_as_published_models_are():
 @needs_vessel
 def test_the_sea_trial_is_repaired_and_cut_into_its_manoeuvres():
     model = Model(ship=ship_with((), "gunnerus"))
-    run = research_vessel.read(VESSEL / "trial_2.csv", model)
+    run = ship_folds.read(VESSEL / "trial_2.csv", research_vessel.COLUMNS, model)
     examined = examine(run, model.ship.scale)
     assert closure(examined.run) < 2.0 < closure(run)
     parts = list(cut(run, examined, MANOEUVRES["trial_2"]))
@@ -146,7 +149,7 @@ def test_a_rudder_of_the_tanker_has_the_other_sign(tmp_path):
         "thrust": 40.0,
     }
     pd.DataFrame(columns).to_csv(tmp_path / "z_10_10.csv", index=False)
-    run = tanker.read(tmp_path / "z_10_10.csv", Model(ship=ship_with((), "kvlcc2")))
+    run = ship_folds.read(tmp_path / "z_10_10.csv", tanker.COLUMNS, Model(ship=ship_with((), "kvlcc2")))
     assert (run.name, run.signals) == ("z_10_10", ("propeller.n", "rudder.delta"))
     assert run.commands[0] == pytest.approx([11.0, -np.radians(10.0)])
     assert run.pose[10] == pytest.approx([1.0, 2.0, np.pi / 2.0])
@@ -167,7 +170,9 @@ def test_a_sea_trial_comes_in_degrees_and_revolutions_a_minute(tmp_path):
         "RPM": 90.0,
     }
     pd.DataFrame(columns).to_csv(tmp_path / "trial_1.csv", index=False)
-    run = research_vessel.read(tmp_path / "trial_1.csv", Model(ship=ship_with((), "gunnerus")))
+    run = ship_folds.read(
+        tmp_path / "trial_1.csv", research_vessel.COLUMNS, Model(ship=ship_with((), "gunnerus"))
+    )
     assert run.pose[5] == pytest.approx([20.0, 5.0, np.radians(30.0)])
     assert dict(zip(run.signals, run.commands[0], strict=True)) == pytest.approx(
         {"azimuth.alpha": np.radians(5.0), "azimuth.n": 1.5}
@@ -344,7 +349,7 @@ def test_the_sea_trial_is_measured_where_its_sensors_say(tmp_path, monkeypatch):
     asked = {}
     place = SimpleNamespace(channel="x", kind="place", value=0.5)
     other = SimpleNamespace(channel="y", kind="place", value=9.0)
-    monkeypatch.setattr(research_vessel, "read", lambda path, _: SimpleNamespace(name=path.stem))
+    monkeypatch.setattr(research_vessel, "read", lambda path, *_: SimpleNamespace(name=path.stem))
     monkeypatch.setattr(research_vessel, "examine", lambda *_: SimpleNamespace(findings=[place, other]))
     monkeypatch.setattr(research_vessel, "cut", lambda run, e, manoeuvres: manoeuvres)
     monkeypatch.setattr(
@@ -377,7 +382,7 @@ def test_zig_zags_are_learned_from_in_their_order(tmp_path, monkeypatch):
     asked = []
     for name in ("z_3", "z_1", "z_2", "z_5", "z_4", "other"):
         (tmp_path / f"{name}.csv").touch()
-    monkeypatch.setattr(tanker, "read", lambda path, _: path.stem)
+    monkeypatch.setattr(tanker, "read", lambda path, *_: path.stem)
 
     def gather(runs, model, anyway):
         asked.append(runs)

@@ -4,7 +4,7 @@ import platform
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypedDict, TypeVar
+from typing import Any, TypeVar
 
 from fmus.effects.text import Found
 
@@ -36,15 +36,7 @@ def comparison_content(
         model: its file; None: the nominal one.
         files: names of the files that are written together.
     """
-    return result_keys.ComparisonContent(
-        data=_data(comparison.evaluations),
-        fmu=fmu_result(comparison),
-        windows=_lengths(comparison.evaluations),
-        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
-        errors=[_errors(e) for e in comparison.evaluations],
-        where=result_keys.WhereResult.model_validate(comparison.before),
-        **_provenance(comparison, model, files),
-    )
+    return result_keys.ComparisonContent(**_of_both(comparison, model, files))
 
 
 def diagnosis_content(
@@ -93,17 +85,11 @@ def diagnosis_content(
         suspect_coefficients=suspects,
         coefficients=list(coefficients(diagnosis)),
         ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
-        data=_data(comparison.evaluations),
-        windows=_lengths(comparison.evaluations),
-        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
-        errors=[_errors(e) for e in comparison.evaluations],
-        where=result_keys.WhereResult.model_validate(comparison.before),
         where_after=result_keys.WhereResult.model_validate(comparison.after),
-        fmu=fmu_result(comparison),
         stability=result_keys.StabilityResult.model_validate(diagnosis.stability),
         prior=dict(prior) if isinstance(prior, Mapping) else prior,
         seed=diagnosis.seed,
-        **_provenance(comparison, model, files),
+        **_of_both(comparison, model, files),
     )
 
 
@@ -149,18 +135,17 @@ def _unrecorded(u: Unrecorded) -> result_keys.UnrecordedResult:
     )
 
 
-class _Provenance(TypedDict):
-    """What both files say of their origin."""
-
-    runs: list[str]
-    model: str | None
-    files: list[str]
-    versions: dict[str, str]
-
-
-def _provenance(comparison: Comparison, model: Path | None, files: Sequence[str]) -> _Provenance:
+def _of_both(comparison: Comparison, model: Path | None, files: Sequence[str]) -> dict[str, Any]:
+    """What both files say of the runs, and of their origin."""
+    evaluations = comparison.evaluations
     return {
-        "runs": [e.name for e in comparison.evaluations],
+        "data": _data(evaluations),
+        "windows": _lengths(evaluations),
+        "sensors": [s for e in evaluations for s in sensor_results(e)],
+        "errors": [_errors(e) for e in evaluations],
+        "where": result_keys.WhereResult.model_validate(comparison.before),
+        "fmu": fmu_result(comparison),
+        "runs": [e.name for e in evaluations],
         "model": None if model is None else model.name,
         "files": list(files),
         "versions": versions(),
