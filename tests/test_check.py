@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -17,14 +18,14 @@ from support.command import command
 from support.plain import GAIN
 from support.project import COMPONENTS, ROOT
 
-from fmucheck import checking, source, trial
+from fmucheck import checking, report, source, trial
 from fmucheck.api import Library
 from fmucheck.bench import Bench, near, other
 from fmucheck.checking import main
 from fmucheck.description import Description
 from fmucheck.examine import examine
 from fmucheck.fmu import Fmu
-from fmucheck.registry import RULES, NotApplicableError, in_order
+from fmucheck.registry import RULES, NotApplicableError, Outcome, in_order
 from fmucheck.report import listing
 from fmucheck.source import BadFileError
 from fmus.build.packing import sources
@@ -427,6 +428,18 @@ def test_command_tells_findings_with_their_clause(tmp_path):
     assert told["findings"] == 1
     assert told["fmus"][0]["checks"]["experiment"]["found"] == ["it stops at 0 s, but starts at 0 s"]
     assert told["fmus"][0]["checks"]["life"]["skipped"]
+
+
+@pytest.mark.parametrize("columns", [60, 80, 133])
+def test_as_many_fmus_stand_side_by_side_as_the_terminal_has_room_for(columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    fmus = [SimpleNamespace(path=Path(f"{k}.fmu")) for k in range(200)]
+    rules = [RULES[name] for name in ("xsd", "output-dependencies")]
+    report.show(fmus, rules, [{rule.name: Outcome() for rule in rules}] * len(fmus))
+    tables = [part.splitlines() for part in capsys.readouterr().out.split("check ")[1:]]
+    widths = [max(map(len, table[1:3])) for table in tables]
+    assert max(widths) <= columns
+    assert all(columns - width < len("  199") for width in widths[:-1])
 
 
 def test_command_is_content_with_a_sound_fmu(tmp_path):

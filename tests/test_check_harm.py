@@ -41,8 +41,11 @@ def test_fmu_that_removes_files_spoils_no_other_trial(habit, number, tmp_path):
 
 
 @compiled
-def test_files_that_an_fmu_leaves_where_it_runs_go_with_the_trial(tmp_path, monkeypatch):
-    path = pack(tmp_path, 'fclose(fopen("left", "w")); ')
+def test_nothing_that_an_fmu_leaves_or_does_at_the_end_stays(tmp_path, monkeypatch):
+    """Its files where it runs go with the trial, whose process ends before a library may do more."""
+    late = f'static __attribute__((destructor)) void late(void) {{ fclose(fopen("{tmp_path}/late", "w")); }}'
+    edits = [("#include <signal.h>", f"{HEAD}\n{late}"), (STEP, f'fclose(fopen("left", "w")); {STEP}')]
+    path = lag.pack(tmp_path, c=edits)
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
     assert examine(Fmu(path), [RULES["life"]])["life"].found == []

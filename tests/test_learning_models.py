@@ -132,6 +132,7 @@ def test_order_is_that_of_the_equations():
     assert [c.name for c in ROTATIONAL.coefficients] == list(RotationalDamping._fields)
     assert len(SURGE.coefficients) == 14
     assert [c.name for c in ALL_UNKNOWN.coefficients[:3]] == ["c1", "c2", "c3"]
+    assert len({c.gain for c in ALL_UNKNOWN.coefficients[:3]}) == 1, "products of two velocities, all"
     assert len(ALL_UNKNOWN.coefficients) == 20
 
 
