@@ -181,6 +181,18 @@ def test_a_clock_that_wanders_is_told_by_its_stretches_and_repaired():
     )
 
 
+def test_without_a_way_a_clock_that_wanders_may_be_a_heading_that_is_none():
+    """As a course over ground in place of the heading."""
+    run = made()
+    course = run.pose[:, 2] + np.arctan2(run.measured["v"], run.measured["u"])
+    pose = np.column_stack([run.pose[:, :2], course])
+    found = examine(replace(run, pose=pose, measured={"r": run.measured["r"]}), REFERENCE)
+    rates = [f for f in found.findings if f.kind == "clock_rate"]
+    assert rates
+    assert not any(f.repaired for f in rates)
+    assert np.array_equal(found.run.time, run.time)
+
+
 def held(run):
     """Its position north stands still for a tenth of the run, as the log's writer held it."""
     x = run.pose[:, 0].copy()

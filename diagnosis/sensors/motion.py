@@ -143,6 +143,7 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
         either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
         if either and swung:
             problem, columns, solution, wanders, either = even, deviating, told, False, False
+    either = either or (wanders and e.velocity is None)  # nor does a way tell of it
     torn = wanders and not either and _two_clocks(Motion(problem, solution, True, columns))
     if torn:  # nor is what is wrong a constant: of these a delay alone may have torn them
         wanders, columns = False, [c for c in every if c.kind == "delay"]
