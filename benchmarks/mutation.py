@@ -238,7 +238,7 @@ def unsound(tests: Sequence[str], copies: Path) -> list[str]:
 
 
 def print_table(rows: Sequence[dict[str, Any]]) -> None:
-    """Killed over made by module and package with the exact 95 % interval, and the survivors."""
+    """Killed over made by module and package, with its exact 95 % interval, and the survivors."""
     listed = tomllib.loads(EQUIVALENT.read_text("utf-8"))["mutant"]
     known = {(each["module"], each["after"]) for each in listed if each["reason"]}
     fates: defaultdict[str, Counter[str]] = defaultdict(Counter)
@@ -254,9 +254,11 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
     for name in sorted(fates):
         count = fates[name]
         rest = ", ".join(f"{n} {fate}" for fate, n in sorted(count.items()) if fate != KILLED)
-        made = sum(count.values()) - count[GONE]
-        low, high = binomtest(count[KILLED], made).proportion_ci() if made else (0.0, 1.0)
-        print(f"{count[KILLED]} / {made} ({100 * low:.0f} to {100 * high:.0f} %)  {name}  {rest}")
+        made, within = sum(count.values()) - count[GONE], ""
+        if made and "/" not in name:
+            low, high = binomtest(count[KILLED], made).proportion_ci()
+            within = f" ({100 * low:.0f} to {100 * high:.0f} %)"
+        print(f"{count[KILLED]} / {made}{within}  {name}  {rest}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -110,6 +110,26 @@ def test_a_moment_that_the_thrusters_do_not_give_is_not_wound_up():
     assert psi[-1] == pytest.approx(0.5, abs=1e-3)
 
 
+def test_force_and_moment_that_the_model_lacks_are_told_once_the_ship_is_steady():
+    p, h = with_values(HEADING, **{**NO_TURN, "integral": 0.1}), 0.1
+    (m_u, _, _), _, (_, _, m_r) = mass_matrix(p.inertia)
+    c, target = p.damping, Target(x_t_dot=0.2)
+    u, r, psi, tau = 0.2, 0.0, 0.0, Force()
+    s = HEADING.init(Inputs(Estimate(u_hat=u), target), p)
+    for _ in range(2500):
+        e = Estimate(psi_hat=psi, u_hat=u, r_hat=r)
+        s, out = HEADING.step(s, Inputs(e, target, Applied(*tau)), p, h)
+        tau = out.demand.tau
+        drag = (c.X_u + c.X_absu_u * abs(u) + c.X_uuu * u * u) * u
+        u, r = u + h * (tau.tau_X + drag + 0.2) / m_u, r + h * (tau.tau_N + c.N_r * r - 0.05) / m_r
+        psi += h * r
+    told = out.demand
+    assert (told.omega_hat_X, told.omega_hat_Y, told.omega_hat_N) == pytest.approx(
+        (0.2, 0.0, -0.05), rel=1e-3
+    )
+    assert (u, psi) == pytest.approx((0.2, 0.0), abs=1e-4)
+
+
 def test_a_ship_that_tells_no_force_is_taken_to_give_what_is_asked_whatever_its_size():
     for size in (OTTER, scaled(OTTER, 100.0)):
         c = sized(HEADING, size)

@@ -139,6 +139,29 @@ def test_division_by_zero_fails_where_python_fails(tmp_path):
         assert agree(expected, run.step([], given, [0.0], 0.0))
 
 
+@kernel
+def heavy(x, y):
+    return floor(x) + 1.0 / y, x > y
+
+
+def mixed(a, b):
+    """With a kernel, a branch, and every operation."""
+    whole, more = heavy(a, b)
+    either = where((a <= b) | not_(whole == 3.0), -abs(a), math.inf)
+    chosen = when(more & (a != 3.0), lambda: (whole, exp(a)), lambda: (fmin(a, b), sqrt(a)))
+    return *chosen, either, fmax(a, -0.0), cos(b), atan2(b, a), clip(a, -1.0, b), math.nan
+
+
+@compiled
+def test_a_kernel_and_a_branch_in_c_give_the_same_bits(tmp_path):
+    component = of_inputs(lambda a, b, c: mixed(a, b)[:3])
+    run = ccode.Compiled(component, tmp_path)
+    for a in (-2.5, -0.0, 0.5, 3.0, 3.5):
+        for b in (0.5, -3.0, 3.25, 0.0):
+            expected = by_python(lambda a=a, b=b: [*component.step((0.0,), Given(a, b, 0.0), None, 0.0)])
+            assert agree(expected, run.step([], [a, b, 0.0], [0.0], 0.0))
+
+
 @compiled
 def test_truth_values_may_be_prepared(tmp_path):
     """They pass through an array of doubles, beside what is no number at all."""
@@ -169,17 +192,6 @@ def test_branch_and_kernel_are_recorded_as_such():
 @pytest.mark.parametrize("x", [-2.0, -0.0, 0.5, 3.0, math.inf, math.nan])
 def test_flat_python_gives_the_same_bits(x):
     """Branches, kernels, all operations, and numbers that are no numbers."""
-
-    @kernel
-    def heavy(x, y):
-        return floor(x) + 1.0 / y, x > y
-
-    def mixed(a, b):
-        whole, more = heavy(a, b)
-        either = where((a <= b) | not_(whole == 3.0), -abs(a), math.inf)
-        chosen = when(more & (a != 3.0), lambda: (whole, exp(a)), lambda: (fmin(a, b), sqrt(a)))
-        return *chosen, either, fmax(a, -0.0), cos(b), atan2(b, a), clip(a, -1.0, b), math.nan
-
     tape = Tape(Kernels())
     recording = tape.recording([*mixed(tape.variable("a"), tape.variable("b"))])
     flat = function(recording, tape.kernels, "a", "b")

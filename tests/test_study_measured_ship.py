@@ -358,6 +358,7 @@ def test_the_learned_curve_is_held_against_the_pulls(tmp_path, monkeypatch):
     for name in ("nominal", "learned, one run left out"):
         assert lines[name].get_ydata() == pytest.approx(1.165 * bollard.GRID)
     assert lines["bollard pulls, not learned from"].get_ydata() == pytest.approx(pulled)
+    assert lines["learned, one run left out"].get_alpha() < 1.0, "behind the learned line"
     assert (len(axes.get_lines()), len(axes.get_legend().get_texts())) == (5, 4), "folds share a label"
     text, _ = told(tmp_path, ship_tables.write_curve, folds, straight, pulls)
     assert "the target was 0.1 N: not reached." in text

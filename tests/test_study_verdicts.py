@@ -131,15 +131,19 @@ def test_settings_of_the_weights_are_what_they_say():
     )
 
 
-def test_study_of_the_weights_takes_the_paths_that_are_asked_for(tmp_path, monkeypatch):
+def test_study_of_the_weights_takes_the_paths_that_are_asked_for(tmp_path, monkeypatch, capsys):
     def run_all(contents, seeds, analyse, folder, processes, advance):
         assert ([*seeds], folder, processes) == ([0], None, 2)
+        for _ in contents:
+            advance()
         return {key: [BROKEN._replace(position=0.1)] for key in contents}
 
     monkeypatch.setattr(store_weight, "run_all", run_all)
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
     text = store_weight.study(tmp_path, ("eight",), 40.0, 2).read_text()
     assert "## Eight" in text
     assert "## Ellipse" not in text
+    assert "store weight" in capsys.readouterr().err
     assert set(json.loads((tmp_path / "results.json").read_text())) >= {"eight"}
     asked = []
     monkeypatch.setattr(store_weight, "run_study", asked.append)
