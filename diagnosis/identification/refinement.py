@@ -86,9 +86,13 @@ class Estimate:
         return cls(start, np.zeros(prior.size))
 
     def model(self, prior: NominalPrior) -> Model:
-        """The model with all of it, nominal coefficients within their range."""
-        found = self.start.plus(self.values)
-        return found.plus({n: bounded(found, n, c) for n, c in prior.changes(self.offset).items()})
+        """The model with all of it.
+
+        A time constant stays within its range; a force may change sign on the way to where it belongs.
+        """
+        found, changes = self.start.plus(self.values), prior.changes(self.offset)
+        times = {n: c for n, c in changes.items() if found.declared(n).unit == "s"}
+        return found.plus(changes | {n: bounded(found, n, c) for n, c in times.items()})
 
     @property
     def fitted(self) -> list[str]:
