@@ -73,8 +73,8 @@ def wind_force(
 ) -> Triple:
     """Wind on the areas above the water, beside the resistance of the ship in still air.
 
-    By the relative wind (Fossen 2021, ch. 10): 1/2 rho C A V_rw u_rw, and so across. The ship's velocity is
-    that through the water, so that the wind is that over the water: in a current not that over ground.
+    By the relative wind (Fossen 2021, ch. 10): 1/2 rho C A V_rw u_rw, and so across. The ship's
+    velocity is that through the water, so that the wind is that over the water, not over ground.
     """
 
     def drag(u: Number, v: Number) -> tuple[Number, Number]:
