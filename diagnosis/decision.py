@@ -28,6 +28,9 @@ FOUND, BELIEVED = 0.8, 0.5
 # it is a cause or stands in for a part of the other is even odds, as long as the other is not known.
 EVEN_ODDS = 0.5
 MAY_BE_NONE = "by the interval of its value it may be nothing"
+MAY_BE_LAGS = (
+    "actuators that are faster than described, or commands that are measured states, look the same"
+)
 BESIDE = "something that it does not explain acts on the same axis"
 
 
@@ -100,11 +103,13 @@ def concluded(
 def limited(f: Finding, start: Model) -> Finding:
     """A finding; with a value at the limit of its range it is none.
 
-    One that may as well be nothing at all, by the interval of its only value, is even odds at the most.
+    One that may as well be nothing at all, by the interval of its only value, is even odds at the most,
+    and so is a pose that is younger than its stamp by no more than the described lags of the actuators.
     """
     at = at_limit(start, f.id, f.values)
     if not at:
-        return replace(f, confidence=EVEN_ODDS, doubt=MAY_BE_NONE) if _may_be_none(f) else f
+        doubt = MAY_BE_NONE if _may_be_none(f) else MAY_BE_LAGS if _may_be_lags(f, start) else None
+        return f if doubt is None else replace(f, confidence=min(f.confidence, EVEN_ODDS), doubt=doubt)
     return replace(f, confidence=0.0, together=0.0, doubt=AT_LIMIT.format(" and ".join(at)))
 
 
@@ -114,6 +119,12 @@ def _may_be_none(f: Finding) -> bool:
         return False
     low, high = f.ci95.get(next(iter(f.values)), (np.nan, np.nan))
     return low <= 0.0 <= high
+
+
+def _may_be_lags(f: Finding, start: Model) -> bool:
+    """Whether a clock that is ahead would make up for lags of the actuators that are too long."""
+    lags = [start.value(n) for n in start.ship.coefficients if start.declared(n).unit == "s"]
+    return -max(lags, default=0.0) <= f.values.get("clock_offset", 0.0) < 0.0
 
 
 def doubted(learned: Findings, remainder: Remainder, start: Model) -> Findings:

@@ -22,6 +22,7 @@ from diagnosis.identification.gram import block_folds
 from diagnosis.identification.map_regression import Scored, first_share
 from diagnosis.identification.prior import NominalPrior
 from diagnosis.model.correlation import correlated_windows
+from diagnosis.model.parameter_set import ship_with
 from diagnosis.model.ship_model import of_one_run
 from diagnosis.model.uncertainty import omega_std
 from diagnosis.model.weak_form import commanded
@@ -434,6 +435,18 @@ def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     seen = limited(f, Model())
     assert seen.confidence == (0.94 if sure else 0.5)
     assert ("may be nothing" in seen.doubt) != sure
+
+
+@pytest.mark.parametrize(
+    ("name", "offset", "sure"),
+    [("otter", -0.2, False), ("otter", 0.2, True), ("otter", -2.0, True), ("cse1", -0.2, True)],
+)
+def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(name, offset, sure):
+    start = Model(ship=ship_with((), name))
+    f = Finding("clock_offset", {"clock_offset": offset}, {}, 0.99, [], 0.9, 0.9, together=0.99)
+    seen = limited(f, start)
+    assert seen.confidence == (0.99 if sure else 0.5)
+    assert ("look the same" in seen.doubt) != sure
 
 
 def test_axis_that_is_never_commanded_has_the_force_of_the_ships_inertia():
