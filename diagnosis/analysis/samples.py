@@ -24,7 +24,6 @@ from ..progress import Advance, silent
 from ..smoothing import smooth
 from .principal_components import fit_components, outliers
 
-ESTIMATES = ("smoothed", "mdf")
 NU = ("u", "v", "r")
 TAU = ("tau_X", "tau_Y", "tau_N")
 OMEGA = ("omega_X", "omega_Y", "omega_N")

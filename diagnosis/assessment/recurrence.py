@@ -22,7 +22,6 @@ SHIFTS = 199  # series shifted at random; a share above all of them is beyond ch
 REPEATS = 0.25  # share from which on an error is said to repeat; chosen
 CLEARER = 0.1  # share by which commands must give more than a force that comes and goes; chosen
 STRETCH = 15  # windows, of one amplitude: half of a block
-SPACES = ("place", "motion", "command", "time")
 
 
 class Recurrence(NamedTuple):
