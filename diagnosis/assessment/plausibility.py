@@ -200,7 +200,7 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     as_read = _varying(w, model, AS_READ)
 
     def shares(z: np.ndarray, T: np.ndarray = commands) -> np.ndarray:
-        return np.maximum((_unexplained(T, z) / (T**2).sum(axis=0))[heard], LEAST_SHARE)
+        return np.maximum(_unexplained(T, z)[heard] / (T**2).sum(axis=0)[heard], LEAST_SHARE)
 
     now = shares(as_read)
     if now.max() < MISSING:
