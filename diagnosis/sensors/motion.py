@@ -298,8 +298,8 @@ def _two_clocks(found: Motion) -> bool:
         ("velocity", replace(e, rate=None)),
         ("rate", replace(e, velocity=None, by=None)),
     ):
-        own = [c for c in found.kept if c.needs == needs]
-        own = own if needs == "rate" else [c for c in own if c.kind != "scale"]
+        # A scale of the speed is the mean rate of the way's own clock, which does not count here.
+        own = [c for c in found.kept if c.needs == needs and (needs == "rate" or c.kind != "scale")]
         problem = PathProblem(part, own, p.noise, p.gaps, p.without)
         alone.append(_blocks(Motion(problem, problem.solve(), True, own)))
     way, turn = alone
