@@ -23,14 +23,14 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis import Model, clean, diagnose, evaluate, load, smooth, weak_windows
-from diagnosis.assessment import LEVELS
-from diagnosis.identification.candidates import model_error
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.refinement import Estimate
-from diagnosis.prediction_error.fit import Fitted, fit_predictions, shootings
-from diagnosis.prediction_error.joint_posterior import Posterior
-from diagnosis.prediction_error.predicted_bands import prediction_bands
-from diagnosis.prediction_error.refit import fit_model_error
+from diagnosis.predictors import LEVELS
+from diagnosis.search.candidates import model_error
+from diagnosis.search.prediction_fit.fit import Fitted, fit_predictions, shootings
+from diagnosis.search.prediction_fit.joint_posterior import Posterior
+from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
+from diagnosis.search.prediction_fit.refit import fit_model_error
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import Estimate
 from fmus.effects import STANDARD
 
 from .hidden_effects.__main__ import PROBLEMS

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from math import degrees
 from pathlib import Path
 
-from diagnosis.model import Model, ship_with
-from diagnosis.sensors import closure, examine
+from diagnosis.predictors import Model, ship_with
+from diagnosis.runs import closure, examine
 from studies.research_vessel import COLUMNS
 from studies.ship_folds import read
 

@@ -17,7 +17,7 @@ import numpy as np
 
 import diagnosis
 from diagnosis import Run
-from diagnosis.sensors import SensorFinding, examine
+from diagnosis.runs import SensorFinding, examine
 from fmus.ship import ship
 
 from .hidden_effects.fleet import Order, sail_all

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 import diagnosis
-from diagnosis.model import Model, ship_with
+from diagnosis.predictors import Model, ship_with
 from fmus.actuators.response import at_rest, command_response, force_response
 from fmus.declare import Component, packer, variables
 from fmus.effects import STANDARD

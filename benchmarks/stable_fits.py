@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.analysis import as_model, effective_thrust, nearest_stable
 from diagnosis.assessment import least_dissipation
-from diagnosis.model import Model
+from diagnosis.predictors import Model
 
 COLUMNS = ["u", "v", "r", "tau_X", "tau_Y", "tau_N"]
 COLUMNS += ["|u|u", "|u|v", "|u|r", "|v|v", "|v|r", "|r|v", "|r|r"]

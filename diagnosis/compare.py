@@ -15,7 +15,7 @@ from typing import Any
 from cosim import InputError
 from cosim.command import printable, run_command
 
-from .command_line import (
+from .commands.command_line import (
     MAP,
     Done,
     command_of,
@@ -26,8 +26,8 @@ from .command_line import (
     parser,
     run,
 )
-from .progress import Advance
-from .result_folder import together
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 FILES = ("comparison.json", "report.html")
 
@@ -39,12 +39,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
+    from .acceptance import FILES as RECORD
+    from .acceptance import lines, read_criteria, validate
+    from .commands.initial_model import initial_model, proposing, write_map
     from .gathering import gather  # only now: it takes a while to import
-    from .initial_model import initial_model, proposing, write_map
-    from .model import ship_with
+    from .predictors import ship_with
     from .report import comparison_content, show_comparison, write_report
-    from .validation import FILES as RECORD
-    from .validation import lines, read_criteria, validate
 
     if options.criteria is None and (options.sign or options.learned):
         raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")

@@ -16,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     made.add_argument("--schema", action="store_true", help="the JSON Schema")
     options = made.parse_args(arguments)
-    from .validation import json_schema, template  # only now: it takes a second to import
+    from .acceptance import json_schema, template  # only now: it takes a second to import
 
     content = json_schema() if options.schema else template()
     Output(highlight=False, markup=False, soft_wrap=True).print(json.dumps(content, indent=2))

@@ -13,14 +13,12 @@ from fmus.scale import Scale
 
 from .assessment.plausibility import refuse_implausible
 from .assessment.trial_errors import measured_passage
-from .data import Run, Track, clean, read, thinned
-from .data.unit_check import GO_ON
-from .model import Model, WeakWindows, weak_windows
-from .model.weak_form import WIDTH
-from .parallel import for_each
-from .progress import Advance, silent
-from .sensors import Examined, examine
-from .smoothing import Smoothed, smooth
+from .execution.parallel import for_each
+from .execution.progress import Advance, silent
+from .predictors import Model, WeakWindows, weak_windows
+from .predictors.weak_form import WIDTH
+from .runs import Examined, Run, Smoothed, Track, clean, examine, read, smooth, thinned
+from .runs.columns.unit_check import GO_ON
 
 # Samples in a window of the weak form. Derived: with so many its kernel's slope integrates a velocity
 # that grows evenly to 2 %, with five to 3 %, with three to 23 %.

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
-from .data import Run, read_frame, ship_of_logs
-from .foreign import Fmu
+from .commands.initial_model import initial_model
+from .execution.progress import Advance, silent
 from .gathering import gather
-from .identification import DEFAULT, Method, Prior, shares
-from .initial_model import initial_model
-from .model import Model, WeakWindows, ship_with, write_model
-from .progress import Advance, silent
+from .predictors import Fmu, Model, WeakWindows, ship_with, write_model
 from .report.content import diagnosis_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
 from .report.result_keys import DiagnosisContent
 from .report.terminal import summary
+from .runs import Run, read_frame, ship_of_logs
+from .search import DEFAULT, Method, Prior, shares
 
 if TYPE_CHECKING:
     from typing import TypeAlias

@@ -12,7 +12,7 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import FAILED, run_command
 
-from .command_line import (
+from .commands.command_line import (
     MAP,
     Done,
     command_of,
@@ -24,9 +24,9 @@ from .command_line import (
     prior,
     run,
 )
-from .identification.methods import DEFAULT, METHODS, method
-from .progress import Advance
-from .result_folder import together
+from .execution.progress import Advance
+from .execution.result_folder import together
+from .search.methods import DEFAULT, METHODS, method
 
 DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "diagnosis.json",
@@ -47,11 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
+    from .commands.initial_model import initial_model, proposing, write_map
     from .gathering import gather  # only now: it takes a while to import
-    from .identification import shares
-    from .initial_model import initial_model, proposing, write_map
-    from .model import ship_with, write_model
+    from .predictors import ship_with, write_model
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
+    from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
     with together(options.out, (*FILES, FOUND, MAP)) as new:
@@ -64,8 +64,8 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         paths = [*options.train, *options.test]
         runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
         from . import session
-        from .foreign import write_wrapper
-        from .prediction_error.output_fit import fitted
+        from .predictors import write_wrapper
+        from .search.prediction_fit.output_fit import fitted
 
         train = len(options.train)
         model = fitted(runs[:train], model, options.prior, options.fit)

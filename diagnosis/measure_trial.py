@@ -17,9 +17,9 @@ from cosim.command import command_parser, printable, run_command
 from cosim.results import read_options
 from cosim.trials import KINDS, Outcome, draw_trial, executes, outcome, sheet, simulated_trial
 
-from .command_line import Done, out_options, run
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, out_options, run
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 FILES = ("trial.json", "trial.png")
 
@@ -51,10 +51,9 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, l
         InputError: it cannot be read, or nobody says which trial it is.
     """
     from .assessment.trial_errors import length_of, measured_passage
-    from .data import read
     from .gathering import gather
-    from .model import Model, ship_with
-    from .sensors import sensor_lines
+    from .predictors import Model, ship_with
+    from .runs import read, sensor_lines
 
     craft = ship_with((), options.ship)
     found = read(options.run, of=craft)

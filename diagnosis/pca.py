@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from cosim.command import run_command
 
-from .command_line import Done, analysis_parser, run, ship_option
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, analysis_parser, run, ship_option
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 FILES = ("pca.json", "report.html")
 
@@ -26,7 +26,7 @@ def pca(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .analysis import gather_samples  # only now: it takes a second to import
     from .analysis.outlier_report import analyse, content, document, sentences
-    from .model import ship_with
+    from .predictors import ship_with
     from .report.document import write_document, write_json
 
     of = ship_with((), options.ship)

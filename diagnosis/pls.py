@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from cosim.command import run_command
 
-from .command_line import Done, analysis_parser, run, ship_option
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, analysis_parser, run, ship_option
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 RESULT, MODEL, REPORT = FILES = ("pls.json", "model.ssv", "report.html")
 
@@ -33,7 +33,7 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
     from .analysis.partial_least_squares import regressed
     from .analysis.pls_report import content, document, sentences
     from .analysis.samples import joined, without_outliers
-    from .model import ship_with, write_model
+    from .predictors import ship_with, write_model
     from .report.document import write_document, write_json
 
     of = ship_with((), options.ship)

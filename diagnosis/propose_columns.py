@@ -13,9 +13,9 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
 
-from .command_line import Done, run
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, run
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,9 +27,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .data import clean, propose  # only now: they take a second to import
     from .gathering import gather
-    from .model import Model, ship_with
+    from .predictors import Model, ship_with
+    from .runs import clean, propose  # only now: they take a second to import
 
     craft = ship_with((), options.ship)
     path = options.file

@@ -15,15 +15,14 @@ from typing import TYPE_CHECKING
 from cosim import InputError
 from cosim.command import command_parser, run_command
 
-from .command_line import Done, run
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, run
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 if TYPE_CHECKING:
     from fmus.scale import Scale
 
-    from .data import Run
-    from .sensors import Examined
+    from .runs import Examined, Run
 
 WINDOW = 8.0  # s, times the scale of the ship: of a prediction
 KINDS = (".csv", ".parquet")
@@ -39,9 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def repair(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .data import layout_beside, read, table_of  # only now: they take a second to import
-    from .model import ship_with
-    from .sensors import examine
+    from .predictors import ship_with
+    from .runs import examine, layout_beside, read, table_of  # only now: they take a second to import
 
     out = options.out
     if out.suffix not in KINDS:
@@ -69,7 +67,7 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
 
 def _told(found: "Examined") -> list[str]:
     """What was found and done, a line each."""
-    from .sensors import sensor_lines
+    from .runs import sensor_lines
 
     beside = ", ".join(found.run.measured)
     first = f"measured beside the pose: {beside}" if beside else ALONE
@@ -81,7 +79,7 @@ def _told(found: "Examined") -> list[str]:
 
 def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
     """What windows of the length of a prediction miss by, before and after."""
-    from .sensors import closure
+    from .runs import closure
 
     window = WINDOW * scale.time
     pairs = [closure(run, window, window) for run in (before, after)]

@@ -13,29 +13,39 @@ from cosim import InputError
 from fmus.ship import ship
 from fmus.ships.naming import DEFAULT as USUAL
 
-from .assessment.bands import Bands
-from .assessment.evaluation import Evaluation, evaluate_run
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
 from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
-from .calibrated_model import calibrated
-from .decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
-from .foreign import Fmu, Use, as_model, by_fmu, evaluate_fmu, use_of
-from .identification import DEFAULT, Method, Prior, method
-from .identification.findings import Finding, Findings
-from .identification.prior import NominalPrior
-from .identification.prior import shares as prior_shares
-from .model import Model, WeakWindows, omega, told_apart
-from .model.uncertainty import omega_std
-from .model.weak_form import BLOCK
-from .parallel import for_each
-from .prediction_error.joint_posterior import Posterior
-from .prediction_error.predicted_bands import prediction_bands
-from .prediction_error.refit import to_predictions
-from .prediction_error.unrecorded import Unrecorded
-from .progress import Advance, silent
-from .unseen import harm
-from .withdrawal import NOTHING, Unseen, Withdrawn, unique_shares, withdraw
+from .execution.parallel import for_each
+from .execution.progress import Advance, silent
+from .predictors import (
+    Fmu,
+    Model,
+    Use,
+    WeakWindows,
+    as_model,
+    by_fmu,
+    evaluate_fmu,
+    omega,
+    told_apart,
+    use_of,
+)
+from .predictors.bands import Bands
+from .predictors.evaluation import Evaluation, evaluate_run
+from .predictors.uncertainty import omega_std
+from .predictors.weak_form import BLOCK
+from .search import DEFAULT, Method, Prior, method
+from .search.findings import Finding, Findings
+from .search.prediction_fit.disturbance_summary import Unrecorded
+from .search.prediction_fit.joint_posterior import Posterior
+from .search.prediction_fit.predicted_bands import prediction_bands
+from .search.prediction_fit.refit import to_predictions
+from .search.prior import NominalPrior
+from .search.prior import shares as prior_shares
+from .verdict.calibrated_model import calibrated
+from .verdict.decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
+from .verdict.pruning import NOTHING, Unseen, Withdrawn, unique_shares, withdraw
+from .verdict.validation_data import harm
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen

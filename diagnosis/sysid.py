@@ -12,9 +12,9 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import run_command
 
-from .command_line import Done, analysis_parser, run
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, analysis_parser, run
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 RESULT, MODEL, REPORT = FILES = ("sysid.json", "model.ssv", "report.html")
 
@@ -28,7 +28,7 @@ def sysid(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .analysis import gather_samples, table_7_1  # only now: it takes a second to import
     from .analysis.sysid_report import content, document, result, sentences
-    from .model import write_model
+    from .predictors import write_model
     from .report.document import write_document, write_json
 
     row = None if options.recipe is None else table_7_1.row(options.recipe)

@@ -14,7 +14,7 @@ TOLD = {True: "holds    ", False: "DIFFERS  ", None: "unknown  "}
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = _parser().parse_args(arguments)
-    from .validation import verify_record  # only now: it takes a second to import
+    from .acceptance import verify_record  # only now: it takes a second to import
 
     try:
         checks = verify_record(options.record, options.key)

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from cosim.command import run_command
 
-from .command_line import Done, open_loop_parser, run
-from .progress import Advance
-from .result_folder import together
+from .commands.command_line import Done, open_loop_parser, run
+from .execution.progress import Advance
+from .execution.result_folder import together
 
 FILES = ("watch.json", "report.html")
 

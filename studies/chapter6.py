@@ -12,7 +12,7 @@ from pathlib import Path
 
 import cosim
 from cosim.results import draw, read_options
-from diagnosis.model import read_model
+from diagnosis.predictors import read_model
 
 from .basin_trials import sysid4
 from .basin_trials.chapter6_runs import FEW, Plant, folder, run

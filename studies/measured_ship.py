@@ -14,8 +14,8 @@ from rich.console import Console
 import cosim
 import diagnosis
 from diagnosis import Diagnosis, Model, WeakWindows, diagnosis_content
-from diagnosis.identification import shares
-from diagnosis.progress import Advance, progress
+from diagnosis.execution.progress import Advance, progress
+from diagnosis.search import shares
 
 from .measured import bollard, ship_tables
 from .measured.leave_one_out import Fold, gather, leave_out

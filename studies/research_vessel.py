@@ -15,12 +15,10 @@ import numpy as np
 
 import diagnosis
 from diagnosis import Model
-from diagnosis.assessment import free_runs
-from diagnosis.data import Run
-from diagnosis.identification import Method
-from diagnosis.model import ship_with
-from diagnosis.progress import silent
-from diagnosis.sensors import Examined, examine
+from diagnosis.execution.progress import silent
+from diagnosis.predictors import free_runs, ship_with
+from diagnosis.runs import Examined, Run, examine
+from diagnosis.search import Method
 
 from .ship_folds import Fold, folds_command, learn_folds, read, titled, write_folds
 from .study_report import Report

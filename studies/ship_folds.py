@@ -16,10 +16,10 @@ import pandas as pd
 import diagnosis
 from cosim import InputError
 from diagnosis import Diagnosis, DiagnosisContent, Model, WeakWindows, diagnosis_content
-from diagnosis.data import Run, read_frame
-from diagnosis.identification import DEFAULT, Findings, Method, Prior
-from diagnosis.model import omega
-from diagnosis.progress import Advance
+from diagnosis.execution.progress import Advance
+from diagnosis.predictors import omega
+from diagnosis.runs import Run, read_frame
+from diagnosis.search import DEFAULT, Findings, Method, Prior
 
 from .study_command import run_study, study_parser
 from .study_report import Report

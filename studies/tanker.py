@@ -12,9 +12,9 @@ import numpy as np
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.identification import Method
-from diagnosis.model import ship_with
-from diagnosis.progress import silent
+from diagnosis.execution.progress import silent
+from diagnosis.predictors import ship_with
+from diagnosis.search import Method
 
 from .ship_folds import folds_command, learn_folds, read, titled, write_folds
 from .study_report import Report

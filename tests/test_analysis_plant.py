@@ -18,9 +18,9 @@ from diagnosis.analysis.sysid_report import warnings
 from diagnosis.analysis.table_7_1 import NAMES, TABLE_7_1, row
 from diagnosis.analysis.table_7_1 import plant as plant_of
 from diagnosis.assessment import least_dissipation
-from diagnosis.model import Model, omega, read_model, weak_windows
 from diagnosis.pca import main as pca
 from diagnosis.pls import main as pls
+from diagnosis.predictors import Model, omega, read_model, weak_windows
 from diagnosis.report.formatting import number
 from diagnosis.sysid import main as sysid
 from fmus.base_units import base_exponents

@@ -37,24 +37,19 @@ COSIM_LAYERS = (
 
 # The same of diagnosis: the steps of the work, in their order.
 DIAGNOSIS_LAYERS = (
-    ("parallel", "progress", "result_folder"),
-    ("data",),
-    ("sensors",),
-    ("smoothing",),
-    ("model",),
-    ("identification", "assessment"),
-    ("prediction_error",),
-    ("unseen",),
-    ("withdrawal",),
+    ("execution",),
+    ("runs",),
+    ("predictors",),
+    ("search", "assessment"),
+    ("verdict",),
     ("gathering",),
-    ("decision",),
-    ("calibrated_model", "foreign"),
     ("session",),
     ("report",),
     ("analysis",),
     ("open_loop",),
-    ("validation",),
-    ("interactive", "command_line", "initial_model"),
+    ("acceptance",),
+    ("commands",),
+    ("interactive",),
     (
         "compare",
         "criteria",
@@ -142,13 +137,11 @@ PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
     "diagnosis.analysis",
     "diagnosis.assessment",
-    "diagnosis.data",
-    "diagnosis.identification",
-    "diagnosis.model",
-    "diagnosis.progress",
+    "diagnosis.execution.progress",
+    "diagnosis.predictors",
     "diagnosis.report",
-    "diagnosis.sensors",
-    "diagnosis.smoothing",
+    "diagnosis.runs",
+    "diagnosis.search",
 )
 
 # File names that Python demands in several packages.
@@ -409,9 +402,9 @@ PARTS = re.compile(
 )
 # What knows CyberShip Enterprise 1: readers of its columns and files, and a page of the thesis' analysis.
 OF_ONE_SHIP = {
-    "diagnosis.data.columns",
-    "diagnosis.data.matlab_files",
-    "diagnosis.data.reading",
+    "diagnosis.runs.columns.columns",
+    "diagnosis.runs.files.matlab_files",
+    "diagnosis.runs.files.reading",
     "diagnosis.open_loop.thruster_report",
 }
 

@@ -7,8 +7,8 @@ from support.ships import SHIPS
 
 import diagnosis
 from diagnosis import Model
-from diagnosis.assessment.windows import Windows
-from diagnosis.model import omega
+from diagnosis.predictors import omega
+from diagnosis.predictors.windows import Windows
 from fmus.declare import packer, variables
 from fmus.frames import rotate_to_body
 from fmus.ship import ship

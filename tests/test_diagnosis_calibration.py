@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 from support.measured import sail, smoothed
 
-from diagnosis.assessment.windows import Windows
-from diagnosis.calibrated_model import CONSTANTS, LEFT_OUT, LENGTH, Calibration, begin, calibrated
-from diagnosis.identification.findings import Findings
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.refinement import Estimate
-from diagnosis.model import Model, weak_windows
-from diagnosis.prediction_error.fit import fit_to, shootings
+from diagnosis.predictors import Model, weak_windows
+from diagnosis.predictors.windows import Windows
+from diagnosis.search.findings import Findings
+from diagnosis.search.prediction_fit.fit import fit_to, shootings
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import Estimate
+from diagnosis.verdict.calibrated_model import (
+    CONSTANTS,
+    LEFT_OUT,
+    LENGTH,
+    Calibration,
+    begin,
+    calibrated,
+)
 
 DRAG = -2.0  # N s/m, hidden
 MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded

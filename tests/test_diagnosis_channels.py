@@ -8,7 +8,7 @@ import pytest
 
 import diagnosis
 from cosim import InputError
-from diagnosis.model import ship_with
+from diagnosis.predictors import ship_with
 
 N = 200
 T = np.arange(N) * 0.1
@@ -51,7 +51,7 @@ def test_a_unit_of_another_quantity_is_refused(tmp_path):
 
 
 def test_units_stand_in_the_names_of_a_frame():
-    run = diagnosis.data.read_frame(table(**{"r [deg/s]": T, "u (kn)": T}))
+    run = diagnosis.runs.read_frame(table(**{"r [deg/s]": T, "u (kn)": T}))
     np.testing.assert_allclose(run.measured["r"], np.radians(T), rtol=1e-12)
     np.testing.assert_allclose(run.measured["u"], T * 1852.0 / 3600.0, rtol=1e-12)
 
@@ -60,12 +60,12 @@ def test_what_an_actuator_gives_is_read_beside_its_command():
     otter = ship_with((), "otter")
     pose = pd.DataFrame({"time": T, "x": T, "y": np.sin(T), "psi": np.cos(T)})
     both = dict.fromkeys(otter.commands, T)
-    run = diagnosis.data.read_frame(pose.assign(**both, **{"port.thrust [kN]": T}), of=otter)
+    run = diagnosis.runs.read_frame(pose.assign(**both, **{"port.thrust [kN]": T}), of=otter)
     np.testing.assert_allclose(run.measured["port.thrust"], 1e3 * T, rtol=1e-12)
     assert run.signals == tuple(otter.commands)
 
 
 def test_what_is_missing_in_a_channel_is_missing_in_the_run():
     gone = np.where(T > 10.0, np.nan, T)
-    run = diagnosis.data.read_frame(table(u=gone))
+    run = diagnosis.runs.read_frame(table(u=gone))
     assert np.isnan(run.measured["u"][T > 10.0]).all()

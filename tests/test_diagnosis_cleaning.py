@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.measured import NOISE, changed, sail
 
 from diagnosis import InputError, clean
-from diagnosis.data.cleaning import in_order, noise, unwrap
+from diagnosis.runs.cleaning import in_order, noise, unwrap
 
 N = 1200
 

@@ -8,9 +8,9 @@ from support.cases import slow
 from support.measured import DATA, NOISE, base, needs_data, true_nu
 
 from diagnosis import Run, clean, read, smooth
-from diagnosis.smoothing import without_commands
-from diagnosis.smoothing.command_motion import FORGETTING, Commands
-from diagnosis.smoothing.spline import knots
+from diagnosis.runs import without_commands
+from diagnosis.runs.smoothing.command_motion import FORGETTING, Commands
+from diagnosis.runs.smoothing.spline import knots
 
 N = 3000
 INNER = slice(100, -100)

@@ -24,10 +24,11 @@ from support.shared import once
 
 import diagnosis
 from cosim import InputError
-from diagnosis import compare, learn, result_folder, session
+from diagnosis import compare, learn, session
 from diagnosis.assessment.stability import OPERATING, least_dissipation
+from diagnosis.execution import result_folder
+from diagnosis.execution.result_folder import together
 from diagnosis.report import result_keys
-from diagnosis.result_folder import together
 from fmus.effects import STANDARD
 from fmus.ship import ship
 
@@ -77,7 +78,7 @@ def strict(path):
 
 
 def model(folder):
-    return import_module("diagnosis.model").read_model(folder / "model.ssv")
+    return import_module("diagnosis.predictors").read_model(folder / "model.ssv")
 
 
 @pytest.fixture(scope="session")
@@ -307,7 +308,7 @@ def test_compare_with_the_learned_model_gives_the_errors_after(names, learned, r
 # A method that knows the answer.
 KNOWING = """
 from math import nan
-from diagnosis.identification.findings import Finding, Findings, Ranked
+from diagnosis.search.findings import Finding, Findings, Ranked
 
 class Knowing:
     name = "knowing"
@@ -502,7 +503,7 @@ def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
 def test_two_processes_give_what_one_gives(runs, monkeypatch):
     files = [runs / "a.csv", runs / "b.csv"]
     together = diagnosis.gather(files)
-    monkeypatch.setattr("diagnosis.parallel._alone", True)
+    monkeypatch.setattr("diagnosis.execution.parallel._alone", True)
     for one, two in zip(diagnosis.gather(files), together, strict=True):
         np.testing.assert_array_equal(one.smoothed.nu, two.smoothed.nu)
         assert one.run.name == two.run.name

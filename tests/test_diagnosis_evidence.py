@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from diagnosis import decision
 from diagnosis.assessment import remainder_text
-from diagnosis.assessment.bands import POINTS, Bands, quantile
 from diagnosis.assessment.recurrence import Recurrence
 from diagnosis.assessment.remainder import AxisRemainder
-from diagnosis.assessment.windows import WindowErrors, Windows, between_steps
-from diagnosis.decision import concluded
-from diagnosis.identification.conclusion import interval, laplace_std, suspected
-from diagnosis.identification.confidence import Evidence, confidence, evidence, variation
-from diagnosis.identification.findings import Finding, Findings
-from diagnosis.identification.gram import Nuisance
-from diagnosis.identification.multistart import Landscape, linear_ones, same
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.model import Model
-from diagnosis.model.uncertainty import NOISE_TOLERANCE
+from diagnosis.predictors import Model
+from diagnosis.predictors.bands import POINTS, Bands, quantile
+from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
+from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
+from diagnosis.search.conclusion import interval, laplace_std, suspected
+from diagnosis.search.confidence import Evidence, confidence, evidence, variation
+from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.gram import Nuisance
+from diagnosis.search.nonlinear.multistart import Landscape, linear_ones, same
+from diagnosis.search.prior import NominalPrior
+from diagnosis.verdict import decision
+from diagnosis.verdict.decision import concluded
 from fmus.declare import Range, Variable
 from fmus.scale import Scale
 

@@ -5,14 +5,7 @@ from itertools import combinations
 
 import pytest
 
-from diagnosis.report.finding_text import (
-    advice,
-    equation,
-    sentence,
-    separation_note,
-    tell_apart,
-    unit,
-)
+from diagnosis.report.finding_text import advice, equation, sentence, separation_note, tell_apart, unit
 from fmus.effects import STANDARD, Effect
 from fmus.effects.families import UNKNOWN
 from fmus.effects.text import Found

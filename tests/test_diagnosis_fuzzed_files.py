@@ -11,7 +11,7 @@ from support.measured import DATA, commands, needs_data
 
 import diagnosis
 from diagnosis import InputError
-from diagnosis.data.columns import FIVE, TAU
+from diagnosis.runs.columns.columns import FIVE, TAU
 
 N = 120
 TIME = np.arange(N) * 0.1

@@ -8,8 +8,8 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model
-from diagnosis.model import omega, weak_windows
-from diagnosis.model.weak_form import WIDTH, places
+from diagnosis.predictors import omega, weak_windows
+from diagnosis.predictors.weak_form import WIDTH, places
 
 HALF = 1500
 

@@ -15,9 +15,9 @@ from support.measured import DATA, needs_data
 import cosim
 import diagnosis
 from diagnosis import propose_columns
-from diagnosis.data import propose
-from diagnosis.data.columns import FIVE, POWER, TAU, THREE, Column, Layout
-from diagnosis.data.csv_tables import csv_table
+from diagnosis.runs import propose
+from diagnosis.runs.columns.columns import FIVE, POWER, TAU, THREE, Column, Layout
+from diagnosis.runs.files.csv_tables import csv_table
 from fmus.ship import ship
 from fmus.thrusters.allocation import Allocation, thrust
 

@@ -9,7 +9,7 @@ from support.cases import in_part
 from support.measured import commands, jumps, sail, slow_swings, smoothed
 
 from diagnosis import Model, Windows, clean, weak_windows
-from diagnosis.model import omega
+from diagnosis.predictors import omega
 
 SECONDS, H, LATE = 64.0, 0.01, 0.3
 # Commands, delay of the thrusters [s], noise.

@@ -16,8 +16,8 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, omega
-from diagnosis.identification import DEFAULT, METHODS
 from diagnosis.learn import main
+from diagnosis.search import DEFAULT, METHODS
 
 needs_peers = pytest.mark.skipif(
     find_spec("sklearn") is None or find_spec("pysindy") is None, reason="needs the extra 'hidden'"
@@ -112,7 +112,7 @@ def test_missing_library_is_named_with_the_extra(name, library, monkeypatch):
         pytest.skip("needs scikit-learn")
     for module in [m for m in sys.modules if m.partition(".")[0] == library]:
         monkeypatch.delitem(sys.modules, module)
-    monkeypatch.delitem(sys.modules, "diagnosis.identification.peers", raising=False)
+    monkeypatch.delitem(sys.modules, "diagnosis.search.peers", raising=False)
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(InputError) as raised:
         diagnosis.method(name)

@@ -8,10 +8,10 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
-from diagnosis.identification import profile
-from diagnosis.identification.candidates import additions, candidate, covered, model_error
-from diagnosis.identification.multistart import Landscape, best_values
-from diagnosis.model import read_model, weak_windows, write_model
+from diagnosis.predictors import read_model, weak_windows, write_model
+from diagnosis.search.candidates import additions, candidate, covered, model_error
+from diagnosis.search.nonlinear import profile
+from diagnosis.search.nonlinear.multistart import Landscape, best_values
 from fmus.declare import Range, Variable
 from fmus.effects import STANDARD, effect
 

@@ -8,7 +8,7 @@ from multiprocessing import get_context
 
 import pytest
 
-from diagnosis.parallel import FORKS, for_each
+from diagnosis.execution.parallel import FORKS, for_each
 
 forked = pytest.mark.skipif(not FORKS, reason="needs fork and two cores")
 

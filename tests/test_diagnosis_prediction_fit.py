@@ -10,22 +10,21 @@ import pytest
 from scipy.linalg import expm
 from support.measured import commands, sail, smoothed
 
-from diagnosis.assessment.windows import Windows
-from diagnosis.identification.candidates import model_error
-from diagnosis.identification.findings import Finding, Findings
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.refinement import Estimate
-from diagnosis.model import Model, weak_windows
-from diagnosis.model.weak_form import EVERY, HORIZON, WIDTH, kernel
-from diagnosis.prediction_error import push as pushes
-from diagnosis.prediction_error import shooting
-from diagnosis.prediction_error.fit import fit_predictions, shootings
-from diagnosis.prediction_error.joint_posterior import Posterior
-from diagnosis.prediction_error.predicted_bands import prediction_bands
-from diagnosis.prediction_error.push import NO_PUSH, Push, covariance, estimate
-from diagnosis.prediction_error.refit import fit_model_error, to_predictions
-from diagnosis.prediction_error.shooting import Linear, Shooting
-from diagnosis.prediction_error.unrecorded import box, unrecorded
+from diagnosis.predictors import Model, shooting, weak_windows
+from diagnosis.predictors.shooting import Linear, Shooting
+from diagnosis.predictors.weak_form import EVERY, HORIZON, WIDTH, kernel
+from diagnosis.predictors.windows import Windows
+from diagnosis.search.candidates import model_error
+from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.prediction_fit import disturbance as pushes
+from diagnosis.search.prediction_fit.disturbance import NO_PUSH, Push, covariance, estimate
+from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
+from diagnosis.search.prediction_fit.fit import fit_predictions, shootings
+from diagnosis.search.prediction_fit.joint_posterior import Posterior
+from diagnosis.search.prediction_fit.predicted_bands import prediction_bands
+from diagnosis.search.prediction_fit.refit import fit_model_error, to_predictions
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import Estimate
 from fmus.vessel import vessel
 
 STEPS = {

@@ -8,9 +8,9 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Model, learn
-from diagnosis.identification.findings import Findings
-from diagnosis.identification.prior import MEASURED, NominalPrior, shares
-from diagnosis.identification.refinement import Estimate
+from diagnosis.search.findings import Findings
+from diagnosis.search.prior import MEASURED, NominalPrior, shares
+from diagnosis.search.refinement import Estimate
 from fmus.declare import variables
 from fmus.hull import Damping, Inertia
 from fmus.ship import ship

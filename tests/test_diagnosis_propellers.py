@@ -6,7 +6,7 @@ from support.measured import NOISE, smoothed
 from test_diagnosis_selection import learn
 
 from diagnosis import Model, Run, weak_windows
-from diagnosis.data.columns import FIVE
+from diagnosis.runs.columns.columns import FIVE
 from fmus.actuators.response import total
 from fmus.effects import STANDARD, Running, Thrust
 from fmus.effects.cse1 import ASIDE

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from diagnosis.identification import candidates, profile
-from diagnosis.identification.acceptance import better, beyond_chance, harmful, matters
-from diagnosis.identification.candidates import Candidate, Shape, scaled, smoothness
-from diagnosis.identification.gram import RUN, Nuisance, block_folds, gram_table, noise
-from diagnosis.identification.map_regression import Scored, held_out_loss, regression, score
-from diagnosis.identification.shortlist import in_order, novelty
-from diagnosis.model.weak_form import OVERLAP
+from diagnosis.predictors.weak_form import OVERLAP
+from diagnosis.search import candidates
+from diagnosis.search.candidates import Candidate, Shape, scaled, smoothness
+from diagnosis.search.gram import RUN, Nuisance, block_folds, gram_table, noise
+from diagnosis.search.map_regression import Scored, held_out_loss, regression, score
+from diagnosis.search.nonlinear import profile
+from diagnosis.search.shortlist import in_order, novelty
+from diagnosis.search.significance import better, beyond_chance, harmful, matters
 from fmus.declare import Range
 
 K, BLOCK = 240, 12

@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis import Model
 from diagnosis.assessment.remainder import CHANCE, SHARE_OF_FIRST, SPAN, TESTS, axis_remainders, spans
-from diagnosis.model.uncertainty import SHARE_OF_COMMAND
-from diagnosis.model.weak_form import EVERY
+from diagnosis.predictors.uncertainty import SHARE_OF_COMMAND
+from diagnosis.predictors.weak_form import EVERY
 
 K, NOISE = 100 * SPAN, 0.02
 

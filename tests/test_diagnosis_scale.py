@@ -14,7 +14,7 @@ from diagnosis.assessment.covariates import MIN_TIME_BIN
 from diagnosis.assessment.stability import OperatingRegion, largest_distance
 from diagnosis.compare import main as compare
 from diagnosis.gathering import gather
-from diagnosis.model.uncertainty import omega_std
+from diagnosis.predictors.uncertainty import omega_std
 from fmus.actuators.law import Law
 from fmus.declare import variables
 from fmus.effects import STANDARD

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_matrix
 
-from diagnosis.identification.segmentation import (
+from diagnosis.predictors.weak_form import OVERLAP
+from diagnosis.search.nonlinear.segmentation import (
     LIKELY,
     Problem,
     Section,
@@ -19,7 +20,6 @@ from diagnosis.identification.segmentation import (
     programmed_in,
     segmented,
 )
-from diagnosis.model.weak_form import OVERLAP
 from fmus.scale import REFERENCE
 
 PAIRS = [("start_1", "end_1"), ("start_2", "end_2")]

@@ -5,12 +5,12 @@ import pytest
 from support.cases import in_part, slow
 from support.measured import sail, smoothed
 
-from diagnosis.identification import forward_selection, method
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.identification.refinement import Estimate, TrainingSet
-from diagnosis.identification.shortlist import NEW, novelty, rank
-from diagnosis.model import Model, omega, weak_windows
-from diagnosis.model.weak_form import kernel, kernel_integral, kernel_moment
+from diagnosis.predictors import Model, omega, weak_windows
+from diagnosis.predictors.weak_form import kernel, kernel_integral, kernel_moment
+from diagnosis.search import forward_selection, method
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import Estimate, TrainingSet
+from diagnosis.search.shortlist import NEW, novelty, rank
 from fmus.effects import STANDARD
 
 

@@ -9,9 +9,9 @@ from scipy.linalg import cholesky_banded
 from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoothed, true_nu
 
 from diagnosis import InputError, Run, clean, read, smooth
-from diagnosis.smoothing.likelihood import Criterion, deviance, likeliest
-from diagnosis.smoothing.penalised import Problem, Weighted
-from diagnosis.smoothing.spline import (
+from diagnosis.runs.smoothing.likelihood import Criterion, deviance, likeliest
+from diagnosis.runs.smoothing.penalised import Problem, Weighted
+from diagnosis.runs.smoothing.spline import (
     basis,
     gram,
     inverse_band,
@@ -76,7 +76,7 @@ def kalman_and_rauch(time, z, valid, q, sigma):
 
 def test_same_as_kalman_filter_and_rauch_smoother(monkeypatch):
     monkeypatch.setattr(
-        "diagnosis.smoothing.likelihood.ADAPTIONS", 0
+        "diagnosis.runs.smoothing.likelihood.ADAPTIONS", 0
     )  # the jerk is equally strong throughout
     time = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.03, 1000))
     run, _ = white_jerk(time, 2)

@@ -17,8 +17,8 @@ from diagnosis import InputError, Model, compare, learn, weak_windows
 from diagnosis.assessment.gains import gains
 from diagnosis.assessment.plausibility import refuse_implausible
 from diagnosis.assessment.readings import Reading, of_commands, of_pose, reread
-from diagnosis.identification import shortlist
-from diagnosis.model.thrust import full_thrust
+from diagnosis.predictors.thrust import full_thrust
+from diagnosis.search import shortlist
 from fmus.thrusters.allocation import Allocation, thrust
 
 RATE = 20  # Hz

@@ -29,8 +29,8 @@ from diagnosis.assessment.stability import (
     mass,
     sampled_motions,
 )
-from diagnosis.model import Model, ship_with
-from diagnosis.model.weak_form import acceleration
+from diagnosis.predictors import Model, ship_with
+from diagnosis.predictors.weak_form import acceleration
 from fmus.declare import variables
 from fmus.hull import Damping
 

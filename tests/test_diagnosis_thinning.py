@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.data import Run, clean, thinned, thinning
+from diagnosis.runs import Run, clean, thinned, thinning
 
 
 @pytest.fixture

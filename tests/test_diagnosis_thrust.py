@@ -8,8 +8,8 @@ import pytest
 from support.measured import sail
 
 from diagnosis import Model, Run
-from diagnosis.data.columns import FIVE
-from diagnosis.model.thrust import Integral, Response, thrust
+from diagnosis.predictors.thrust import Integral, Response, thrust
+from diagnosis.runs.columns.columns import FIVE
 from fmus.declare import variables
 from fmus.effects import STANDARD
 from fmus.signals import Force, Velocity

@@ -10,26 +10,26 @@ from support.planted import bank, dead_bow, gusts, voyages
 
 import diagnosis
 from diagnosis import Model, Run, omega, weak_windows
-from diagnosis.assessment.evaluation import evaluate_run
 from diagnosis.assessment.recurrence import recurrence
 from diagnosis.assessment.regions import find_regions
 from diagnosis.assessment.remainder import AxisRemainder, Remainder, axis_remainders
-from diagnosis.decision import doubted, limited, verdict
-from diagnosis.identification.acceptance import lower_throughout, worse
-from diagnosis.identification.confidence import confidence, credible, evidence
-from diagnosis.identification.findings import Finding, Findings
-from diagnosis.identification.gram import block_folds
-from diagnosis.identification.map_regression import Scored, first_share
-from diagnosis.identification.prior import NominalPrior
-from diagnosis.model.correlation import correlated_windows
-from diagnosis.model.parameter_set import ship_with
-from diagnosis.model.ship_model import of_one_run
-from diagnosis.model.uncertainty import omega_std
-from diagnosis.model.weak_form import commanded
+from diagnosis.predictors.correlation import correlated_windows
+from diagnosis.predictors.evaluation import evaluate_run
+from diagnosis.predictors.parameter_set import ship_with
+from diagnosis.predictors.ship_model import of_one_run
+from diagnosis.predictors.uncertainty import omega_std
+from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
-from diagnosis.unseen import Losses, Part, harm
-from diagnosis.withdrawal import Unseen, withdraw, without
+from diagnosis.search.confidence import confidence, credible, evidence
+from diagnosis.search.findings import Finding, Findings
+from diagnosis.search.gram import block_folds
+from diagnosis.search.map_regression import Scored, first_share
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.significance import lower_throughout, worse
+from diagnosis.verdict.decision import doubted, limited, verdict
+from diagnosis.verdict.pruning import Unseen, withdraw, without
+from diagnosis.verdict.validation_data import Losses, Part, harm
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}

@@ -5,8 +5,8 @@ import pytest
 from support.cases import in_part
 from support.measured import sail, smoothed
 
-from diagnosis.identification.waves import AROUND, PEAK, find_waves, followed, inside, peak
-from diagnosis.model import Model
+from diagnosis.predictors import Model
+from diagnosis.search.nonlinear.waves import AROUND, PEAK, find_waves, followed, inside, peak
 
 MASS = Model().reference_mass
 

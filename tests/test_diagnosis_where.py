@@ -12,9 +12,9 @@ from diagnosis import Model, omega_std
 from diagnosis.assessment.clusters import cluster_mean, welch_p_value
 from diagnosis.assessment.covariates import EAST, HEADING, NORTH, SPEED, THRUST, TIME, YAW_RATE
 from diagnosis.assessment.regions import Region, _Design, find_regions
-from diagnosis.model import omega, weak_windows
-from diagnosis.model.ship_model import GivenForce
-from diagnosis.model.weak_form import halfway
+from diagnosis.predictors import omega, weak_windows
+from diagnosis.predictors.ship_model import GivenForce
+from diagnosis.predictors.weak_form import halfway
 
 
 def windows(run):

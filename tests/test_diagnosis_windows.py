@@ -11,9 +11,9 @@ from support.cases import in_part
 from support.measured import DATA, NOISE, changed, needs_data, sail, smoothed
 
 from diagnosis import InputError, Model, Windows, clean, read, smooth
-from diagnosis.data.columns import FIVE
-from diagnosis.model.ship_model import parameters
-from diagnosis.model.weak_form import HORIZON
+from diagnosis.predictors.ship_model import parameters
+from diagnosis.predictors.weak_form import HORIZON
+from diagnosis.runs.columns.columns import FIVE
 from fmus.effects.cse1 import ASIDE
 from fmus.thrusters.allocation import Allocation, allocate
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS

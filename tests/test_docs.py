@@ -16,11 +16,11 @@ from support.command import command
 
 import cosim
 import diagnosis.assessment
-import diagnosis.calibrated_model
-import diagnosis.decision
-import diagnosis.identification
-import diagnosis.model
-import diagnosis.smoothing
+import diagnosis.predictors
+import diagnosis.runs
+import diagnosis.search
+import diagnosis.verdict.calibrated_model
+import diagnosis.verdict.decision
 import fmus
 from fmus.build.finding import load
 
@@ -75,9 +75,9 @@ def constants():
 
 def modules_with_constants():
     """The modules of the diagnosis in which the constants of the table may stand."""
-    yield diagnosis.decision
-    yield diagnosis.calibrated_model
-    parts = (diagnosis.smoothing, diagnosis.model, diagnosis.assessment, diagnosis.identification)
+    yield diagnosis.verdict.decision
+    yield diagnosis.verdict.calibrated_model
+    parts = (diagnosis.runs, diagnosis.predictors, diagnosis.assessment, diagnosis.search)
     for part in parts:
         for found in pkgutil.iter_modules(part.__path__, f"{part.__name__}."):
             if not found.name.endswith(".peers"):
@@ -163,7 +163,7 @@ RUN_HERE = {"stability.md", "getting_started.md"}
 )
 def test_python_of_the_pages_runs(page, reason, text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    diagnosis.model.write_model(tmp_path / "model.ssv", diagnosis.Model().plus({"delta_X_u": -2.0}))
+    diagnosis.predictors.write_model(tmp_path / "model.ssv", diagnosis.Model().plus({"delta_X_u": -2.0}))
     exec(compile(text, page.name, "exec"), {"__name__": "page"})
 
 
@@ -204,8 +204,8 @@ def place(tmp_path_factory):
     """A folder with the shipped scenarios, cut to 70 s, a learned model, and a run."""
     folder = tmp_path_factory.mktemp("shell")
     (folder / "results" / "diagnosis").mkdir(parents=True)
-    model = diagnosis.model.Model().plus({"delta_X_u": -2.0})
-    diagnosis.model.write_model(folder / "results" / "diagnosis" / "model.ssv", model)
+    model = diagnosis.predictors.Model().plus({"delta_X_u": -2.0})
+    diagnosis.predictors.write_model(folder / "results" / "diagnosis" / "model.ssv", model)
     (folder / "scenarios").mkdir()
     for path in (ROOT / "scenarios").glob("*.json"):
         content = json.loads(path.read_text("utf-8"))

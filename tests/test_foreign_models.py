@@ -17,9 +17,9 @@ import diagnosis
 from cosim import InputError, Unit
 from cosim.fmu import Variable
 from diagnosis import Fmu, Run, compare, learn
-from diagnosis.data import to_si
-from diagnosis.foreign import UnmatchedError, Use, as_model, use_of, write_wrapper
-from diagnosis.foreign.variable_map import completed, propose
+from diagnosis.predictors import UnmatchedError, Use, as_model, use_of, write_wrapper
+from diagnosis.predictors.fmu.variable_map import completed, propose
+from diagnosis.runs import to_si
 from fmus.build import build, native_targets
 from fmus.build.start_values_file import read_starts
 

@@ -17,8 +17,8 @@ from test_diagnosis_commands import frame
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
 from cosim.process import run_state
-from diagnosis import result_folder
-from diagnosis.result_folder import together
+from diagnosis.execution import result_folder
+from diagnosis.execution.result_folder import together
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
 
@@ -69,7 +69,7 @@ import signal, sys
 from contextlib import suppress
 from rich.console import Console
 from cosim.command import run_command
-from diagnosis.progress import progress
+from diagnosis.execution.progress import progress
 
 def main():
     with progress(Console(stderr=True)) as advance:

@@ -6,10 +6,10 @@ import pytest
 
 import diagnosis
 from cosim import InputError
-from diagnosis.assessment.measured_outputs import inseparable, named, rms
-from diagnosis.model import Model, ship_with
-from diagnosis.prediction_error.output_fit import fitted
+from diagnosis.predictors import Model, ship_with
+from diagnosis.predictors.measured_outputs import inseparable, named, rms
 from diagnosis.report.content import comparison_content
+from diagnosis.search.prediction_fit.output_fit import fitted
 from fmus.actuators.actuation import forces, output
 from fmus.actuators.response import total
 from fmus.signals import Force

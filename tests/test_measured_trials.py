@@ -113,7 +113,7 @@ def test_mistakes_are_one_line(sailed, tmp_path, trial, others, arguments, messa
 
 def errors(files, ship, learned=None) -> list[Any]:
     """errors[].trial of runs, before and after."""
-    craft = diagnosis.model.ship_with((), ship)
+    craft = diagnosis.predictors.ship_with((), ship)
     model = diagnosis.Model(ship=craft)
     after = model if learned is None else model.plus(learned)
     runs = diagnosis.gather(files, model=model)

@@ -10,11 +10,11 @@ from support.measured import sail, smoothed
 
 from cosim import InputError
 from diagnosis import Model, diagnose
-from diagnosis.identification import Method, method
-from diagnosis.identification.candidates import candidates, model_error
-from diagnosis.model import weak_windows
-from diagnosis.model.thrust import Response, thrust
+from diagnosis.predictors import weak_windows
+from diagnosis.predictors.thrust import Response, thrust
 from diagnosis.report.finding_text import sentence
+from diagnosis.search import Method, method
+from diagnosis.search.candidates import candidates, model_error
 from fmus.build import build
 from fmus.declare import DeclarationError
 from fmus.effects import STANDARD

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.project import ROOT
 
-from diagnosis.model import Model, ship_with
+from diagnosis.predictors import Model, ship_with
 from fmus.declare import DeclarationError
 from fmus.effects import STANDARD
 

@@ -21,7 +21,7 @@ from test_run import SSV, command, parameter, scenario  # noqa: F401 - a fixture
 
 import cosim
 from cosim import InputError, Parameter, ParameterSet, read_parameters, write_parameters
-from diagnosis.model import Model, read_model, write_model
+from diagnosis.predictors import Model, read_model, write_model
 from fmus.build import build
 from fmus.build.start_values_file import read_starts
 

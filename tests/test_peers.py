@@ -14,8 +14,8 @@ from benchmarks.peers import __main__ as peers
 from benchmarks.peers.chosen_settings import Answer, Method, answer
 from benchmarks.peers.same_windows import Continuous, Held, Nominal, moved, table
 from diagnosis import Model, Run
-from diagnosis.data.columns import THREE
-from diagnosis.model.thrust import commanded_shares
+from diagnosis.predictors.thrust import commanded_shares
+from diagnosis.runs.columns.columns import THREE
 
 LENGTH = 8.0
 DAMPED = np.array([[-0.2, 0.0, 0.0], [0.0, -0.3, 0.05], [0.0, 0.1, -0.5]])

@@ -18,9 +18,8 @@ import pytest
 from support.measured import sail, smoothed
 
 from diagnosis import Model, PredictionError, evaluate_run
-from diagnosis.assessment.windows import free_runs
-from diagnosis.model import weak_windows
-from diagnosis.prediction_error.joint_posterior import Posterior
+from diagnosis.predictors import weak_windows
+from diagnosis.predictors.windows import free_runs
 from diagnosis.report import (
     ComparisonContent,
     Curve,
@@ -33,6 +32,7 @@ from diagnosis.report import (
 )
 from diagnosis.report.content import coefficients
 from diagnosis.report.profiles import QUANTITIES, binned_errors, heading
+from diagnosis.search.prediction_fit.joint_posterior import Posterior
 from fmus.effects import STANDARD
 from fmus.ship import ship
 from fmus.ships.naming import described_ship

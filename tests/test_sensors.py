@@ -13,13 +13,14 @@ import diagnosis
 from cosim import InputError
 from diagnosis import Run
 from diagnosis import repair as command
-from diagnosis.data.telegrams import filled
-from diagnosis.sensors import closure, examine, motion
-from diagnosis.sensors.accelerations import accelerations
-from diagnosis.sensors.clock_path import integral_of
-from diagnosis.sensors.receivers import receivers
-from diagnosis.sensors.wraps import unwrapped
-from diagnosis.smoothing import measured_rates
+from diagnosis.runs import closure, examine
+from diagnosis.runs.files.telegrams import filled
+from diagnosis.runs.sensors import motion
+from diagnosis.runs.sensors.accelerations import accelerations
+from diagnosis.runs.sensors.clock_path import integral_of
+from diagnosis.runs.sensors.receivers import receivers
+from diagnosis.runs.sensors.wraps import unwrapped
+from diagnosis.runs.smoothing import measured_rates
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 

@@ -12,8 +12,8 @@ from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
 from cosim import InputError
 from diagnosis import analysis, propose_columns
-from diagnosis.data import read, read_frame
-from diagnosis.model import Model, ship_with
+from diagnosis.predictors import Model, ship_with
+from diagnosis.runs import read, read_frame
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from cosim import InputError
 from diagnosis.analysis import as_model, effective_thrust, nearest_stable
 from diagnosis.analysis.into_the_plant import EPSILON, force_columns
 from diagnosis.assessment import least_dissipation
-from diagnosis.model import Model
+from diagnosis.predictors import Model
 
 OTHERS = [c for c in COLUMNS if not c.startswith("tau")]
 

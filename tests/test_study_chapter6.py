@@ -8,7 +8,7 @@ import pytest
 import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import Model
-from diagnosis.model import write_model
+from diagnosis.predictors import write_model
 from fmus.hull import RotationalDamping
 from fmus.vessel import vessel
 from studies import chapter6

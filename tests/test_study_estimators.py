@@ -15,7 +15,7 @@ import cosim
 import diagnosis
 from cosim import InputError, SimulationError
 from cosim.dispatch import FinishedRun
-from diagnosis.data import Run
+from diagnosis.runs import Run
 from fmus.frames import rotate_to_body
 from studies import estimators, observer_gains
 from studies.observers import basin, claims

@@ -18,8 +18,8 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, omega, session, weak_windows
-from diagnosis.data.columns import FIVE
-from diagnosis.identification import Suspect
+from diagnosis.runs.columns.columns import FIVE
+from diagnosis.search import Suspect
 from fmus.signals import Force, Velocity
 from fmus.thrusters.allocation import allocate
 from fmus.thrusters.chain import Inputs

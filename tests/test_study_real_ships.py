@@ -12,11 +12,10 @@ from support.measured import DATA
 import diagnosis
 from cosim import InputError
 from diagnosis import Model
-from diagnosis.assessment import free_runs
-from diagnosis.data import Run
-from diagnosis.identification import DEFAULT
-from diagnosis.model import ship_with
-from diagnosis.sensors import examine
+from diagnosis.predictors import ship_with
+from diagnosis.predictors.windows import free_runs
+from diagnosis.runs import Run, examine
+from diagnosis.search import DEFAULT
 from studies import research_vessel, ship_folds, tanker
 from studies.research_vessel import MANOEUVRES, closure, cut, steady
 from studies.study_report import Report

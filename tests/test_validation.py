@@ -13,9 +13,8 @@ import diagnosis
 from cosim import InputError
 from cosim.campaign import Posterior
 from diagnosis import compare
-from diagnosis.prediction_error.push import Push
-from diagnosis.validation import FILES, json_schema, read_criteria, template
-from diagnosis.validation.budget import (
+from diagnosis.acceptance import FILES, json_schema, read_criteria, template
+from diagnosis.acceptance.budget import (
     Budget,
     Learned,
     Sources,
@@ -24,12 +23,13 @@ from diagnosis.validation.budget import (
     read_learned,
     sources_of,
 )
-from diagnosis.validation.criterion import Criterion
-from diagnosis.validation.judged_criterion import Predicted, decide, judge
-from diagnosis.validation.pdf import table
-from diagnosis.validation.predictions import Predictions, difference, judged
-from diagnosis.validation.statistics import independent, root_mean_square, share
-from diagnosis.validation.validity import window_means
+from diagnosis.acceptance.criterion import Criterion
+from diagnosis.acceptance.judged_criterion import Predicted, decide, judge
+from diagnosis.acceptance.pdf import table
+from diagnosis.acceptance.predictions import Predictions, difference, judged
+from diagnosis.acceptance.statistics import independent, root_mean_square, share
+from diagnosis.acceptance.validity import window_means
+from diagnosis.search.prediction_fit.disturbance import Push
 from diagnosis.verify import main as verify_main
 
 cryptography = pytest.importorskip("cryptography")
@@ -312,7 +312,7 @@ def test_a_record_of_both_verdicts_and_what_shows_a_change(comparison, tmp_path,
 
 
 def test_whose_signature_it_is(comparison, tmp_path, key):
-    from diagnosis.validation.signature import public_key
+    from diagnosis.acceptance.signature import public_key
 
     criteria = write_criteria(tmp_path / "criteria.json", {"horizon": 4.0})
     record = tmp_path / "out" / FILES[0]
@@ -333,7 +333,7 @@ def test_whose_signature_it_is(comparison, tmp_path, key):
 
 @pytest.mark.parametrize("kind", ["nothing", "no key", "public key"])
 def test_what_cannot_sign_leaves_nothing(comparison, tmp_path, key, kind):
-    from diagnosis.validation.signature import public_key
+    from diagnosis.acceptance.signature import public_key
 
     contents = {"no key": "no key", "public key": public_key(key)}
     path = tmp_path / "bad.pem"
@@ -346,7 +346,7 @@ def test_what_cannot_sign_leaves_nothing(comparison, tmp_path, key, kind):
 
 
 def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
-    from diagnosis.validation.signature import sign
+    from diagnosis.acceptance.signature import sign
 
     monkeypatch.setitem(__import__("sys").modules, "cryptography", None)
     with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[sign\]'"):

@@ -29,7 +29,9 @@ from cosim.system import prepare
 from cybership import completion
 from cybership.__main__ import main, usage
 from cybership.subcommands import SUBCOMMANDS
-from diagnosis import command_line, result_folder, withdrawal
+from diagnosis.commands import command_line
+from diagnosis.execution import result_folder
+from diagnosis.verdict import pruning as withdrawal
 from fmus import interruption
 from fmus.build import BuildError
 

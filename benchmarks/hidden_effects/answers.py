@@ -21,8 +21,8 @@ from diagnosis import (
     smooth,
     weak_windows,
 )
-from diagnosis.assessment import LEVELS, Bands
-from diagnosis.progress import silent
+from diagnosis.execution.progress import silent
+from diagnosis.predictors import LEVELS, Bands
 
 from .cells import Key
 from .problems import Problem, kept, slug

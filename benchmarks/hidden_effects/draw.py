@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.model import of_one_run, of_run
+from diagnosis.predictors import of_one_run, of_run
 from fmus.effects import APART, STANDARD
 
 from .effect_forms import form

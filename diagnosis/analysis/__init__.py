@@ -5,7 +5,7 @@ of the model error goes back into the ship by the effect ``linear_map``::
 
     runs = gather_samples(["run1.csv", "run2.csv"])
     found = regressed(joined(runs), recipe("PLS3"))
-    diagnosis.model.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
+    diagnosis.predictors.write_model(Path("model.ssv"), as_model(found.c, found.B, found.columns))
 """
 
 from cosim.lazy import lazy_names

@@ -31,7 +31,7 @@ from ..assessment.stability import (
     mass,
     sampled_motions,
 )
-from ..model import Model
+from ..predictors import Model
 from .into_the_plant import EPSILON, as_model, force_columns, goes_into_the_plant, regressor
 from .samples import TAU
 

@@ -15,7 +15,7 @@ from fmus.effects.linear_map import REGRESSORS, parameter
 from fmus.hull import RotationalDamping
 from fmus.ship import Ship, ship
 
-from ..model import Model
+from ..predictors import Model
 from ..report.formatting import number
 from .partial_least_squares import AXES, Regressed
 from .samples import TAU

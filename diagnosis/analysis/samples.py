@@ -18,10 +18,9 @@ from fmus.ship import Ship, ship
 from fmus.signals import Force, Measurement
 from fmus.vessel.vessel import State, disturbed
 
-from ..data import Run, Track, clean, read
-from ..model import Model
-from ..progress import Advance, silent
-from ..smoothing import smooth
+from ..execution.progress import Advance, silent
+from ..predictors import Model
+from ..runs import Run, Track, clean, read, smooth
 from .principal_components import fit_components, outliers
 
 NU = ("u", "v", "r")

@@ -14,7 +14,7 @@ from fmus.declare import variables
 from fmus.effects.linear_map import parameter
 from fmus.hull import RotationalDamping
 
-from ..model import Model
+from ..predictors import Model
 from .partial_least_squares import AXES
 
 NAMES = tuple(c.name.removesuffix(", added") for c in SURGE.coefficients)

@@ -1,9 +1,3 @@
-from ..model.uncertainty import omega_std as omega_std
-from .bands import LEVELS as LEVELS
-from .bands import Bands as Bands
-from .evaluation import Evaluation as Evaluation
-from .evaluation import PredictionError as PredictionError
-from .evaluation import evaluate_run as evaluate_run
 from .regions import ErrorRegions as ErrorRegions
 from .regions import Profile as Profile
 from .regions import Region as Region
@@ -14,6 +8,3 @@ from .stability import OperatingRegion as OperatingRegion
 from .stability import Stability as Stability
 from .stability import check_stability as check_stability
 from .stability import least_dissipation as least_dissipation
-from .windows import WindowErrors as WindowErrors
-from .windows import Windows as Windows
-from .windows import free_runs as free_runs

@@ -22,8 +22,8 @@ from fmus.observer.screen import Inputs as ObserverInputs
 from fmus.ops import Number, sqrt
 from fmus.signals import Estimate, Force, Measurement, Nothing, Target
 
-from ..model import Model
-from ..model.ship_model import parameters
+from ..predictors import Model
+from ..predictors.ship_model import parameters
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 STEP = 0.04  # s; chosen, distances agree with those at 0.01 s to about a millimetre

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Run
-from ..data.columns import TAU
-from ..model import Model, WeakWindows, weak_windows
-from ..model.thrust import full_thrust
+from ..predictors import Model, WeakWindows, weak_windows
+from ..predictors.thrust import full_thrust
+from ..runs import Run
+from ..runs.columns.columns import TAU
 from .readings import inertial, needed
 
 # Times the full thrust, beyond which a command is no force of these thrusters. Chosen: a model may count

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from ..model import WeakWindows
+from ..predictors import WeakWindows
 
 AXES = "XYN"
 QUANTILE_BINS = 8  # bins of equal numbers of windows; chosen

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Model, WeakWindows
-from ..model.correlation import correlated_windows
-from ..model.weak_form import OVERLAP, commanded_force
+from ..predictors import Model, WeakWindows
+from ..predictors.correlation import correlated_windows
+from ..predictors.weak_form import OVERLAP, commanded_force
 from .readings import inertial, needed
 
 # Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the

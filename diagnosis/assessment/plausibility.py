@@ -26,12 +26,12 @@ from scipy.special import chdtri
 
 from cosim import InputError
 
-from ..data import Run, line_beside
-from ..data.beside import Change
-from ..data.columns import POSE, TAU
-from ..data.unit_check import GO_ON
-from ..model import Model, WeakWindows
-from ..model.weak_form import commanded_force
+from ..predictors import Model, WeakWindows
+from ..predictors.weak_form import commanded_force
+from ..runs import Run, line_beside
+from ..runs.columns.columns import POSE, TAU
+from ..runs.columns.side_car import Change
+from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import Gains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units

@@ -7,11 +7,11 @@ import numpy as np
 
 from fmus.declare import variables
 
-from ..data import Run
-from ..data.beside import Change
-from ..data.columns import POSE, TAU, UNITS
-from ..model import Model, WeakWindows, omega
-from ..model.thrust import full_thrust
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.thrust import full_thrust
+from ..runs import Run
+from ..runs.columns.columns import POSE, TAU, UNITS
+from ..runs.columns.side_car import Change
 
 
 @dataclass(frozen=True, eq=False)

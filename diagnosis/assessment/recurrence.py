@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..model import WeakWindows
-from ..model.correlation import correlated_windows
+from ..predictors import WeakWindows
+from ..predictors.correlation import correlated_windows
 
 NEIGHBOURS = 5  # windows of a prediction; chosen
 SEARCHED = 160  # nearest windows among which these are: a pass of APART to both sides holds 120

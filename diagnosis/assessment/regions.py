@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import WeakWindows
+from ..predictors import WeakWindows
 from .clusters import ClusterMean, cluster_mean, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 

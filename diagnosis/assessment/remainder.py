@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from ..model import Model, WeakWindows
-from ..model.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
-from ..model.weak_form import OVERLAP, commanded
+from ..predictors import Model, WeakWindows
+from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
+from ..predictors.weak_form import OVERLAP, commanded
 from .covariates import AXES
 
 CHANCE = 0.01  # level of the test, all axes and both statistics together; contract

@@ -19,9 +19,9 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 from fmus.vessel.vessel_effects import NONE
 
-from ..model import Model
-from ..parallel import for_each
-from ..progress import Advance, silent
+from ..execution.parallel import for_each
+from ..execution.progress import Advance, silent
+from ..predictors import Model
 from .closed_loop import REFERENCES, bound_of, largest_distance
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))

@@ -10,9 +10,8 @@ from cosim import InputError
 from cosim.trials import Passage, executes, measure, passage
 from fmus.ship import Ship
 
-from ..data import Run
-from ..smoothing import Smoothed
-from .evaluation import Evaluation
+from ..predictors.evaluation import Evaluation
+from ..runs import Run, Smoothed
 
 APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
 NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")

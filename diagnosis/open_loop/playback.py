@@ -19,7 +19,7 @@ from cosim.process import scratch_folder
 from fmus.declare import Component, variables
 from fmus.thrusters.allocation import Allocation
 
-from ..progress import Advance, silent
+from ..execution.progress import Advance, silent
 from .run_source import COMMAND, TARGET, Source
 
 Entry = dict[str, Any]  # of an FMU in a scenario

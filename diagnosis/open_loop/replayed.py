@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..smoothing import smooth
+from ..runs import smooth
 from .playback import Played
 from .run_source import COMMAND
 

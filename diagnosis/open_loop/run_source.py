@@ -8,7 +8,7 @@ import numpy as np
 from fmus.controller.backstepping import Errors
 from fmus.signals import Force, Target
 
-from ..data import Track, clean, in_order, other_columns, read
+from ..runs import Track, clean, in_order, other_columns, read
 
 TARGET = Target._fields
 ERRORS = Errors._fields

@@ -8,12 +8,12 @@ from typing import Any, TypeVar
 
 from fmus.effects.text import Found
 
-from ..assessment.evaluation import Evaluation
-from ..assessment.measured_outputs import inseparable, named, rms
 from ..assessment.trial_errors import trial_errors
-from ..identification.findings import Finding
-from ..model.ship_model import of_one_run, parameter_and_run
-from ..prediction_error.unrecorded import Unrecorded
+from ..predictors.evaluation import Evaluation
+from ..predictors.measured_outputs import inseparable, named, rms
+from ..predictors.ship_model import of_one_run, parameter_and_run
+from ..search.findings import Finding
+from ..search.prediction_fit.disturbance_summary import Unrecorded
 from ..session import Comparison, Diagnosis
 from . import result_keys
 from .finding_text import advice, equation, sentence, separation_note, unit

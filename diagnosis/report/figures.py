@@ -7,8 +7,8 @@ import numpy as np
 
 from cosim.results import thin
 
-from ..assessment.evaluation import Evaluation
-from ..identification.shortlist import TIE
+from ..predictors.evaluation import Evaluation
+from ..search.shortlist import TIE
 from .content import Z95
 from .panels import breaks, figure_of, legend, panels_of, plain_numbers, stack
 from .profiles import BinnedError, Quantity

@@ -7,7 +7,7 @@ import numpy as np
 from fmus.effects import Effect, EffectSet
 from fmus.effects.text import Found
 
-from ..model.ship_model import parameter_and_run
+from ..predictors.ship_model import parameter_and_run
 
 CURVE = 8  # more coefficients than that are shown as a curve
 MOST_SHOWN = 4  # of the effects that data cannot tell apart, the most likely first; chosen

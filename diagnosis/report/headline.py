@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..decision import FOUND
+from ..verdict.decision import FOUND
 from .finding_text import listed
 from .result_keys import DiagnosisContent, EffectResult, PossibilityResult, SuspectResult
 

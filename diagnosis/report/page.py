@@ -11,9 +11,9 @@ import numpy as np
 import cosim
 
 from ..assessment.covariates import EAST, NORTH
-from ..assessment.evaluation import Evaluation
-from ..parallel import for_each
-from ..progress import Advance, silent
+from ..execution.parallel import for_each
+from ..execution.progress import Advance, silent
+from ..predictors.evaluation import Evaluation
 from . import figures, formatting, tracks
 from .headline import told, verdict_title
 from .profiles import QUANTITIES, binned_errors
@@ -108,7 +108,7 @@ def environment() -> "Environment":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

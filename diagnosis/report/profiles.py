@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..assessment.evaluation import Evaluation
-from ..model import WeakWindows
+from ..predictors import WeakWindows
+from ..predictors.evaluation import Evaluation
 
 BINS = 9  # chosen
 MIN_WINDOWS = 5  # in a bin, below which it is left empty; chosen

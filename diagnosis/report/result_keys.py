@@ -17,7 +17,7 @@ from pydantic import (
     model_serializer,
 )
 
-from ..sensors.constants import Kind
+from ..runs.sensors.constants import Kind
 
 
 def _finite(value: float | None) -> float | None:

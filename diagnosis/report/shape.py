@@ -12,9 +12,9 @@ from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
 from fmus.hull import damping_force
 
-from ..assessment.evaluation import Evaluation
-from ..model import Model
-from ..model.thrust import commanded_shares
+from ..predictors import Model
+from ..predictors.evaluation import Evaluation
+from ..predictors.thrust import commanded_shares
 
 COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
 POINTS = 401

@@ -8,7 +8,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from ..sensors import sensor_lines
+from ..runs import sensor_lines
 from .headline import is_sure, told, verdict_title
 from .result_keys import ComparisonContent, Data, DiagnosisContent, EffectResult, SensorResult
 from .trial_rows import trial_rows

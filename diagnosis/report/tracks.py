@@ -9,8 +9,8 @@ from cosim.results import hulls
 from fmus.ops import wrap
 from fmus.ship import Ship
 
-from ..assessment.bands import LEVELS
-from ..assessment.evaluation import Evaluation, PredictionError
+from ..predictors.bands import LEVELS
+from ..predictors.evaluation import Evaluation, PredictionError
 from .panels import ABOVE, BELOW, LEFT, RIGHT, breaks, legend, panels_of, plain_numbers, polygons
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH

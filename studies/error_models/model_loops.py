@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from cosim.dispatch import FinishedRun
 from diagnosis import analysis
 from diagnosis.analysis import Regressed
-from diagnosis.model import Model
+from diagnosis.predictors import Model
 
 from ..basin_trials.trials import CLE, CLZ, LOST, RBS, TRIALS, scenario
 from ..monte_carlo import Content, run_all, vary

@@ -19,9 +19,9 @@ from diagnosis import (
     diagnosis_content,
     omega,
 )
-from diagnosis.identification import Prior
-from diagnosis.model import Response
-from diagnosis.progress import Advance
+from diagnosis.execution.progress import Advance
+from diagnosis.predictors import Response
+from diagnosis.search import Prior
 from fmus.thrusters.chain import FIVE
 
 SAME = 1e-6

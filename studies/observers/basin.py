@@ -11,7 +11,7 @@ import numpy as np
 
 import diagnosis
 from cosim import InputError
-from diagnosis.data import lost, repeated
+from diagnosis.runs import lost, repeated
 from fmus.frames import rotate_to_body
 
 from .estimates_replayed import SETTLED, Log, rms

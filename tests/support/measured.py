@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis import Run, clean, smooth
-from diagnosis.model.ship_model import parameters
+from diagnosis.predictors.ship_model import parameters
 from fmus.signals import Force, Velocity
 from fmus.thrusters.chain import Inputs
 from fmus.thrusters.thrusters import COMPONENT as THRUSTERS

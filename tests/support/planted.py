@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from diagnosis import Run, WeakWindows, clean, smooth, weak_windows
-from diagnosis.model.ship_model import parameters
+from diagnosis.predictors.ship_model import parameters
 from fmus.hull import Triple
 from fmus.signals import Force, Velocity
 from fmus.thrusters.chain import Inputs

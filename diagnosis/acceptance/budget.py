@@ -1,0 +1,219 @@
+"""The uncertainty of a comparison, by its sources.
+
+As in ASME V&V 20, u_val^2 = u_num^2 + u_input^2 + u_D^2. Each is a standard
+uncertainty of the judged quantity at the judged horizon, the RMS over windows. What goes into a
+prediction is changed by one standard deviation at a time (of parameters: along the principal axes of
+their covariance), and the changes of the prediction are added in quadrature. All in SI.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import hypot, isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import eigh
+
+from cosim import InputError
+from cosim.campaign import Posterior, read_posterior
+from fmus.frames import rotate_to_body
+
+from ..predictors.shooting import Shooting
+from ..runs import Smoothed
+from ..search.prediction_fit.disturbance import Push, covariance
+from .criterion import JUDGED
+from .predictions import Predictions, difference, judged
+
+FINER = 2  # parts of a step, by which the error of integration is known
+POSE = {"position": (0, 1), "heading": (2,)}  # quantities that the covariance of a pose tells
+
+# Quantity -> variance in each window (w,); None: not known.
+Variances = Mapping[str, np.ndarray] | None
+
+
+class Learned(NamedTuple):
+    """What a diagnosis knows of the model that it made.
+
+    Attributes:
+        posterior: of its parameters; None where nothing was fitted.
+        push: the force that no command and no effect explains.
+        files: that it was read from.
+    """
+
+    posterior: Posterior | None
+    push: Push
+    files: tuple[Path, ...]
+
+
+def read_learned(folder: str | Path) -> Learned:
+    """What the result folder of ``diagnosis.learn`` knows.
+
+    Raises:
+        InputError: it is none.
+    """
+    path, other = Path(folder) / "diagnosis.json", Path(folder) / "posterior.json"
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))["unrecorded"]
+        size, time = (np.array(told[key], float).reshape(3) for key in ("size", "time"))
+        some = other.exists() and json.loads(other.read_text(encoding="utf-8"))["names"]
+    except OSError as error:
+        raise InputError(f"'{error.filename}' cannot be read: {error.strerror or error}") from None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise InputError(f"'{folder}' does not say what 'learn' has left") from None
+    if not (np.isfinite([size, time]).all() and (size >= 0.0).all() and (time > 0.0).all()):
+        raise InputError(f"'{path}': the unrecorded force has no size and time")
+    posterior = read_posterior(other) if some else None
+    return Learned(posterior, Push(size, time), (path, *([other] if some else [])))
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """Variances of the windows' predictions, by source; None in place of one that is not known.
+
+    Attributes:
+        measurement: of what a prediction is held against (u_D).
+        initial_state, parameters, process_noise: of what goes into it (u_input).
+        numerical: of the steps (u_num).
+        notes: source -> why it is not known, or what it leaves out.
+    """
+
+    measurement: Variances
+    initial_state: Variances
+    parameters: Variances
+    process_noise: Variances
+    numerical: Variances
+    notes: Mapping[str, str]
+
+
+class Budget(NamedTuple):
+    """Standard uncertainties of one quantity, SI; None: not known. Combined ones hold what is known."""
+
+    measurement: float | None
+    initial_state: float | None
+    parameters: float | None
+    process_noise: float | None
+    numerical: float | None
+
+    @property
+    def u_D(self) -> float:
+        return self.measurement or 0.0
+
+    @property
+    def u_input(self) -> float:
+        return combined(self.initial_state, self.parameters, self.process_noise)
+
+    @property
+    def u_num(self) -> float:
+        return self.numerical or 0.0
+
+    @property
+    def u_val(self) -> float:
+        return combined(self.u_num, self.u_input, self.u_D)
+
+    @property
+    def unknown(self) -> list[str]:
+        """The sources that are not known."""
+        return [name.replace("_", " ") for name, u in self._asdict().items() if u is None]
+
+
+def combined(*parts: float | None) -> float:
+    """Root of the sum of squares of independent standard uncertainties; unknown ones are left out."""
+    return hypot(*(u for u in parts if u is not None))
+
+
+def budget(quantity: str, sources: list[Sources], counted: list[np.ndarray]) -> Budget:
+    """The budget of a quantity over the windows of some runs that count, of each a mask (w,)."""
+
+    def over_runs(name: str) -> float | None:
+        found = []
+        for s, rows in zip(sources, counted, strict=True):
+            variances: Variances = getattr(s, name)
+            if variances is None or quantity not in variances:
+                return None
+            found.append(variances[quantity][rows])
+        u = float(np.sqrt(np.mean(np.concatenate(found)))) if found else np.nan
+        return u if isfinite(u) else None
+
+    return Budget(*(over_runs(name) for name in Budget._fields))
+
+
+def sources_of(p: Predictions, learned: Learned | None) -> Sources:
+    """The uncertainty of a run's predictions, by source."""
+    notes: dict[str, str] = {}
+
+    def known(name: str, found: Callable[[], Variances]) -> Variances:
+        try:
+            return found()
+        except InputError as error:
+            notes[name] = str(error)
+            return None
+
+    base = p.motion
+    return Sources(
+        _measurement(p),
+        known("initial_state", lambda: _initial(p, base)),
+        known("parameters", lambda: _parameters(p, base, learned)),
+        known("process_noise", lambda: _process_noise(p, learned)),
+        known("numerical", lambda: _squares(difference(p.finer(FINER), base))),
+        notes,
+    )
+
+
+def _squares(*changes: np.ndarray) -> dict[str, np.ndarray]:
+    """Variance of each quantity by independent changes (w, 6) of one standard deviation."""
+    zero = np.zeros(len(changes[0])) if changes else np.zeros(0)
+    return {q: sum((judged(q, c) ** 2 for c in changes), zero) for q in JUDGED}
+
+
+def _measurement(p: Predictions) -> Variances:
+    """Noise of the pose's samples; of the velocity the smoother's standard deviation."""
+    x, y, psi = np.broadcast_to(p.smoothed.noise**2, (p.rows.size, 3)).T
+    u, v, r = p.smoothed.nu_std[p.rows].T ** 2
+    return {"position": x + y, "heading": psi, "u": u, "v": v, "r": r}
+
+
+def _initial(p: Predictions, base: np.ndarray) -> Variances:
+    """By the smoother's standard deviation of each part of pose and rates, as if independent."""
+    if p.use is not None and p.use.whole:
+        raise InputError("the FMU's velocity cannot be set: its own start is part of what is judged")
+    s, states = p.smoothed, []
+    for name in ("eta", "eta_dot"):
+        value, std = getattr(s, name), np.nan_to_num(getattr(s, f"{name}_std"))
+        for k in range(3):
+            moved = value.copy()
+            moved[:, k] += std[:, k]
+            states.append(_in_body(replace(s, **{name: moved})))
+    return _squares(*(difference(m, base) for m in p.from_others(states)))
+
+
+def _in_body(s: Smoothed) -> Smoothed:
+    """A run with the velocity of the body as pose and rates have it."""
+    x_dot, y_dot, r = s.eta_dot.T
+    return replace(s, nu=np.column_stack([*rotate_to_body(s.eta[:, 2], x_dot, y_dot), r]))
+
+
+def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Variances:
+    if p.use is not None:
+        raise InputError("nobody told how uncertain the parameters inside the FMU are")
+    if learned is None or learned.posterior is None:
+        raise InputError("no posterior was given (--learned)")
+    names = [name.partition(".")[2] for name in learned.posterior.names]
+    variances, axes = eigh(np.array(learned.posterior.covariance))
+    steps = (axes * np.sqrt(np.maximum(variances, 0.0))).T
+    models = [p.model.plus(dict(zip(names, step.tolist(), strict=True))) for step in steps if step.any()]
+    return _squares(np.zeros_like(base), *(difference(m, base) for m in p.motions(models)))
+
+
+def _process_noise(p: Predictions, learned: Learned | None) -> Variances:
+    """By the unrecorded force; a model that moves as an FMU does stands for that."""
+    if p.use is not None and p.use.whole:
+        raise InputError("the FMU's velocity cannot be set")
+    if learned is None:
+        raise InputError("no diagnosis says which unrecorded force is left (--learned)")
+    shots = Shooting([p.smoothed], p.windows.length)
+    motion = shots.around(p.model, {}).motion
+    later = covariance(motion, np.zeros_like(shots.at_start), learned.push)[:, -1, :, -1]
+    ours = np.searchsorted(shots.start, p.start - 1e-6)
+    return {q: later[ours][:, axes, axes].sum(axis=1) for q, axes in POSE.items()}

@@ -1,0 +1,124 @@
+"""Motion some seconds ahead as a model or an FMU predicts it, in windows, and as it was measured."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from cosim import InputError
+from fmus.frames import rotate_to_body
+from fmus.ops import wrap
+
+from ..predictors import Model, Use, WeakWindows, predicted_windows, window_residuals
+from ..predictors.evaluation import Evaluation
+from ..predictors.windows import Windows
+from ..runs import Smoothed
+from .criterion import JUDGED
+
+INDEX = {"heading": 2, "u": 3, "v": 4, "r": 5}  # in a motion (x, y, psi, u, v, r)
+LATE = 0.1  # of the horizon, or 1.5 samples: by so much earlier the last sample may be; chosen
+
+
+class Predictions:
+    """Predictions of a run in windows of one length.
+
+    Args:
+        e: the run with what predicts it.
+        use: how an FMU predicts it; None: the learned model of ``e`` does, or the initial one.
+        horizon: of the predictions [s].
+
+    Attributes:
+        windows: of that length; of an FMU whose velocity cannot be set one, the whole run.
+        rows: (w,), row of the last sample of each, near the horizon.
+        measured: (w, 6), the sample of the pose there, and the smoothed velocity.
+
+    Raises:
+        InputError: no window has enough samples.
+    """
+
+    def __init__(self, e: Evaluation, use: Use | None, horizon: float) -> None:
+        self.smoothed, self.use = e.smoothed, use
+        self.model = (e.learned or e.model).during(e.name)
+        self.windows, begin = self._windows(replace(e.weak_windows, horizon=horizon), horizon)
+        until = begin + horizon
+        place = np.flatnonzero(self.windows.since <= until + 1e-9)
+        window = self.windows.sample_window[place]
+        last = place[np.append(window[1:] != window[:-1], True)] if place.size else place
+        late = max(LATE * horizon, 1.5 * self.smoothed.track.period)
+        last = last[self.windows.since[last] >= until - late]
+        # Three samples of the same window give the slope of the pose at the last of them.
+        last = last[last >= 2]
+        self._last = last[self.windows.sample_window[last - 2] == self.windows.sample_window[last]]
+        if not self._last.size:
+            raise InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")
+        window = self.windows.sample_window[self._last]
+        self._since = self.windows.since
+        time = self.windows.start[window] + self._since[self._last]
+        self.first = np.searchsorted(self.smoothed.time, self.windows.start[window] + begin - 1e-6)
+        self.rows = np.searchsorted(self.smoothed.time, time - 1e-6)
+        self.measured = np.hstack([self.windows.measured[self._last], self.smoothed.nu[self.rows]])
+
+    def _windows(self, w: WeakWindows, horizon: float) -> tuple[Windows, float]:
+        """The windows, and the time in each from which on it counts [s]."""
+        if self.use is None:
+            return Windows([self.smoothed], horizon), 0.0
+        windows = predicted_windows(w, self.use)
+        if windows is None:
+            raise InputError(f"run '{self.smoothed.track.run.name}' has no window of {horizon:g} s")
+        return windows, self.use.run_in(self.smoothed)
+
+    @property
+    def start(self) -> np.ndarray:
+        """(w,), times at which the predictions that are judged begin [s]."""
+        return self.smoothed.time[self.first]
+
+    @cached_property
+    def motion(self) -> np.ndarray:
+        """(w, 6), the predicted motion at the horizon."""
+        if self.use is not None:
+            return self._at_end(window_residuals(self.smoothed, self.use, self.windows))
+        return self._at_end(self.windows.residuals(self.model))
+
+    def finer(self, parts: int) -> np.ndarray:
+        """The predicted motion (w, 6) where each step is divided into some parts."""
+        if self.use is not None:
+            return self._at_end(window_residuals(self.smoothed, self.use, self.windows, parts))
+        return self._at_end(self.windows.finer(parts).residuals(self.model))
+
+    def from_others(self, states: Sequence[Smoothed]) -> list[np.ndarray]:
+        """The predicted motion (w, 6) from each of some other states of the run on."""
+        if self.use is not None:
+            return [self._at_end(window_residuals(s, self.use, self.windows)) for s in states]
+        together = Windows(states, self.windows.length).residuals(self.model)
+        return [self._at_end(r) for r in np.split(together, len(states))]
+
+    def motions(self, models: Sequence[Model]) -> list[np.ndarray]:
+        """The predicted motion (w, 6) of each of some models of this project."""
+        return [self._at_end(r) for r in self.windows.residuals_of_each(models)]
+
+    def _at_end(self, residuals: np.ndarray) -> np.ndarray:
+        """The last pose, and the slope of the parabola through the last three as velocity."""
+        pose = self.windows.measured - residuals
+        k = self._last
+        t0, t1, t2 = (self._since[j] for j in (k - 2, k - 1, k))
+        one, two = pose[k - 1] - pose[k - 2], pose[k] - pose[k - 1]
+        one[:, 2], two[:, 2] = wrap(one[:, 2]), wrap(two[:, 2])
+        one, two = one / (t1 - t0)[:, None], two / (t2 - t1)[:, None]
+        rate = two + (two - one) * ((t2 - t1) / (t2 - t0))[:, None]
+        psi = pose[k, 2]
+        u, v = rotate_to_body(psi, rate[:, 0], rate[:, 1])
+        return np.column_stack([pose[k], u, v, rate[:, 2]])
+
+
+def difference(motion: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Motions (..., 6) less others, headings wrapped."""
+    found = motion - other
+    found[..., 2] = wrap(found[..., 2])
+    return found
+
+
+def judged(quantity: str, off: np.ndarray) -> np.ndarray:
+    """(w,), what a difference (w, 6) is in a quantity that is judged: of position the distance."""
+    assert quantity in JUDGED
+    return np.hypot(off[:, 0], off[:, 1]) if quantity == "position" else off[:, INDEX[quantity]]

@@ -1,0 +1,239 @@
+"""The record of a validation: criteria, what the data say of them, and all that it was made with."""
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ships.naming import DEFAULT as USUAL
+
+from ..execution.result_folder import sha256, together
+from ..report.content import fmu_result, sensor_results, versions
+from ..report.result_keys import FmuResult
+from ..session import Comparison
+from .budget import Learned, read_learned, sources_of
+from .criterion import Criterion, ReadCriteria, now, read_criteria
+from .judged_criterion import Judgement, Predicted, judge
+from .predictions import Predictions
+from .record_files import FILES, write_record
+from .record_keys import (
+    BudgetResult,
+    CriteriaResult,
+    FileResult,
+    JudgementResult,
+    RangeResult,
+    RecordContent,
+)
+from .validity import covered, window_means
+
+Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """What criteria say of a model, see :func:`validate`.
+
+    Attributes:
+        content: of ``validation.json``, but for the reports and the key.
+        judgements: with the errors of all windows.
+    """
+
+    content: RecordContent
+    judgements: Sequence[Judgement]
+
+    def write(self, folder: str | Path, sign: str | Path | None = None) -> list[str]:
+        """Write the record and its report into a folder, all files or none.
+
+        Args:
+            folder: made if it is not there.
+            sign: file of the private key (Ed25519, PEM) that signs the record; None: it is not signed.
+
+        Returns:
+            The names of the files.
+
+        Raises:
+            InputError: no such key, or nothing can be written.
+        """
+        with together(Path(folder), FILES) as new:
+            return self.write_into(new, sign)
+
+    def write_into(self, folder: Path, sign: str | Path | None) -> list[str]:
+        """The same in a folder that is there, file by file."""
+        return write_record(self.content, self.judgements, folder, sign)
+
+    def __str__(self) -> str:
+        return "\n".join(lines(self.content))
+
+
+def lines(content: RecordContent) -> Iterator[str]:
+    """The outcome, a line for each criterion."""
+    for j in content.judgements:
+        yield f"{j.criterion}: {j.outcome}. {j.requirement}: {j.reason}."
+
+
+def validate(
+    comparison: Comparison,
+    criteria: str | Path | ReadCriteria,
+    learned: str | Path | None = None,
+    files: Files | None = None,
+    command: str | None = None,
+) -> Validation:
+    """Judge by criteria that were written down before how well a model agrees with measured runs.
+
+    Args:
+        comparison: of the model with the runs, from :func:`diagnosis.compare`.
+        criteria: the file that holds them.
+        learned: result folder of ``diagnosis.learn`` that made the model, which says how uncertain its
+            parameters are and what acts unrecorded.
+        files: further files that the result depends on, by what they are for, such as ``model``.
+        command: that the record tells; None: that of this program.
+
+    Raises:
+        InputError: the criteria or the folder cannot be used.
+    """
+    read = criteria if isinstance(criteria, ReadCriteria) else read_criteria(criteria)
+    known = None if learned is None else read_learned(learned)
+    predicted: dict[float, list[Predicted]] = {}
+    notes: list[str] = []
+    for c in read.content.criteria:
+        if c.horizon not in predicted:
+            predicted[c.horizon] = list(_predicted(comparison, c.horizon, known, notes))
+    given = [e.name for e in comparison.evaluations]
+    judgements = [judge(c, given, predicted[c.horizon]) for c in read.content.criteria]
+    every = {**(files or {}), "learned": () if known is None else known.files}
+    described = comparison.evaluations[0].model.ship.description
+    fmu = fmu_result(comparison)
+    content = RecordContent(
+        made=now(),
+        command=command or " ".join(sys.argv),
+        versions=versions(),
+        model=fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
+        ship=USUAL if described is None else described.name,
+        fmu=fmu,
+        files=[*_data(comparison), *_files(every)],
+        criteria=CriteriaResult(
+            path=str(read.path),
+            sha256=read.sha256,
+            modified=read.modified,
+            read=read.read,
+            purpose=read.content.purpose,
+        ),
+        judgements=[_result(j) for j in judgements],
+        validity=[
+            RangeResult(
+                signal=name, unit=unit, least=q[0], q05=q[1], median=q[2], q95=q[3], greatest=q[4]
+            )
+            for name, (unit, q) in covered(comparison.evaluations).items()
+        ],
+        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
+        notes=list(dict.fromkeys(notes)),
+        not_covered=list(_not_covered(comparison, judgements, fmu)),
+    )
+    return Validation(content, judgements)
+
+
+def _predicted(
+    comparison: Comparison, horizon: float, learned: Learned | None, notes: list[str]
+) -> Iterator[Predicted]:
+    """The runs in windows of a length; of others, and of sources that are not known, a note."""
+    for e in comparison.evaluations:
+        try:
+            p = Predictions(e, comparison.use, horizon)
+        except InputError as error:
+            notes.append(str(error))
+            continue
+        found = sources_of(p, learned)
+        notes += [f"{source.replace('_', ' ')}: {why}" for source, why in found.notes.items()]
+        yield Predicted(e.name, p, found, window_means(p))
+
+
+def _data(comparison: Comparison) -> Iterator[FileResult]:
+    for e in comparison.evaluations:
+        path = e.weak_windows.run.file
+        if path is not None:
+            yield _file("data", path)
+            beside = path.with_name(f"{path.name}.json")
+            if path.is_file() and beside.is_file():
+                yield _file("layout of data", beside)
+
+
+def _files(files: Files) -> Iterator[FileResult]:
+    for role, paths in files.items():
+        several = [] if paths is None else [paths] if isinstance(paths, (str, Path)) else paths
+        for path in several:
+            yield _file(role, Path(path))
+
+
+def _file(role: str, path: Path) -> FileResult:
+    return FileResult(role=role, path=str(path), sha256=sha256(path))
+
+
+def _result(j: Judgement) -> JudgementResult:
+    c, f = j.criterion, j.criterion.factor
+    some, whole = j.errors.size > 0, 1.0 if c.statistic != "rms" else f
+    estimate, low, high = (None, None, None) if j.interval is None else (x / whole for x in j.interval)
+    return JudgementResult(
+        criterion=c.title,
+        requirement=c.text,
+        outcome=j.outcome,
+        reason=j.reason,
+        runs=[*j.runs],
+        unit=c.unit,
+        tolerance=c.tolerance,
+        windows=j.errors.size,
+        independent=j.independent,
+        E=float(np.mean(j.errors)) / f if some else None,
+        rms=float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
+        largest=float(np.max(np.abs(j.errors))) / f if some else None,
+        estimate=estimate,
+        low=low,
+        high=high,
+        budget=_budget(j, c),
+    )
+
+
+def _budget(j: Judgement, c: Criterion) -> BudgetResult | None:
+    b = j.budget
+    if b is None:
+        return None
+
+    def scaled(u: float | None) -> float | None:
+        return None if u is None else u / c.factor
+
+    return BudgetResult(
+        u_D=scaled(b.measurement),
+        initial_state=scaled(b.initial_state),
+        parameters=scaled(b.parameters),
+        process_noise=scaled(b.process_noise),
+        u_input=scaled(b.u_input),
+        u_num=scaled(b.numerical),
+        u_val=scaled(b.u_val),
+        unknown=b.unknown,
+    )
+
+
+def _not_covered(
+    comparison: Comparison, judgements: Sequence[Judgement], fmu: FmuResult | None
+) -> Iterator[str]:
+    """What nobody may conclude from the record."""
+    yield "Speeds, drift angles, yaw rates and commands outside the validity range."
+    horizons = sorted({j.criterion.horizon for j in judgements})
+    yield f"Predictions over other times than {', '.join(f'{h:g}' for h in horizons)} s."
+    judged = {j.criterion.quantity for j in judgements if j.outcome != "cannot be judged"}
+    rest = [q for q in ("position", "heading", "u", "v", "r") if q not in judged]
+    if rest:
+        yield f"Errors of {', '.join(rest)}: no criterion on them is judged."
+    for j in judgements:
+        unknown = [] if j.budget is None else j.budget.unknown
+        if unknown:
+            yield f"{j.criterion.title}: u_val is without {', '.join(unknown)}, which are not known."
+    if fmu is not None and fmu.whole_runs:
+        yield "Predictions from a measured state: the velocity of the FMU cannot be set."
+    yield "Systematic errors of sensors that no other channel shows."
+    if all(e.weak_windows.run.trial is None for e in comparison.evaluations):
+        yield "Measures of manoeuvring trials: no run is one."
+    else:
+        yield "Measures of manoeuvring trials, which comparison.json has, and no criterion."

@@ -1,0 +1,56 @@
+"""The files of a record: the report as HTML and PDF, the record, its signature."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ..execution.result_folder import sha256
+from ..report.document import Document, Plot, write_document
+from ..report.svg import style
+from .error_figure import error_figure
+from .judged_criterion import Judgement
+from .pdf import write_pdf
+from .record_keys import FileResult, RecordContent
+from .sections import sections
+from .signature import public_key, sign
+
+RECORD, PAGE, PDF, SIGNATURE = (f"validation.{kind}" for kind in ("json", "html", "pdf", "sig"))
+FILES = (RECORD, PAGE, PDF, SIGNATURE)
+TITLE = "Validation record"
+
+
+def write_record(
+    content: RecordContent, judgements: Sequence[Judgement], folder: Path, key: str | Path | None
+) -> list[str]:
+    """Write all files into a folder that is there; returns their names.
+
+    The record has the hashes of the report and the public key, so it is written, and signed, last.
+
+    Raises:
+        InputError: no such key.
+    """
+    if key is not None:
+        content = content.model_copy(update={"public_key": public_key(key)})
+    parts = [*sections(content)]
+    with style():
+        plots = _plots(judgements)
+        write_pdf(folder / PDF, TITLE, parts, [p.figure for p in plots])
+        write_document(
+            folder / PAGE, Document(TITLE, sections=[replace(parts[0], plots=plots), *parts[1:]])
+        )
+    reports = [FileResult(role="report", path=name, sha256=sha256(folder / name)) for name in FILES[1:3]]
+    text = content.model_copy(update={"reports": tuple(reports)}).model_dump_json(indent=2) + "\n"
+    (folder / RECORD).write_bytes(text.encode())
+    if key is None:
+        return [*FILES[:3]]
+    (folder / SIGNATURE).write_bytes(sign(text.encode(), key))
+    return [*FILES]
+
+
+def _plots(judgements: Sequence[Judgement]) -> list[Plot]:
+    """The errors of each criterion's windows."""
+    return [
+        Plot(error_figure(j), f"{j.criterion.title}: error of each window, and the tolerance.")
+        for j in judgements
+        if j.errors.size
+    ]

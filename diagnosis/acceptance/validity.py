@@ -1,0 +1,68 @@
+"""What data cover: speeds, drift, rates and commands, by quantiles and extremes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..predictors import at_samples
+from ..predictors.evaluation import Evaluation
+from ..runs import OF_UNIT, QUANTITY, Smoothed
+from .predictions import Predictions
+
+QUANTILES = (0.05, 0.5, 0.95)
+MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
+# By the quantity of a command.
+SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
+SLOW = 0.1  # of the speed that a run reaches, below which there is no drift angle; chosen
+
+
+def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
+    """Signal -> its values (n,) at the samples of a run, SI; NaN where it is not known."""
+    u, v, r = smoothed.nu.T
+    speed = np.hypot(u, v)
+    with np.errstate(invalid="ignore"):
+        under_way = speed > SLOW * np.nanmax(speed)
+    drift = np.where(under_way, np.arctan2(-v, u), np.nan)
+    motion = {"u": u, "v": v, "r": r, "speed": speed, "drift": drift}
+    return motion | {
+        n: x for n, x in at_samples(smoothed).items() if n not in {*motion, "x", "y", "psi"}
+    }
+
+
+def unit_of(signal: str, evaluation: Evaluation) -> str:
+    """SI unit of a signal of a run."""
+    if signal in MOTION:
+        return MOTION[signal]
+    commands = evaluation.model.ship.commands or {}
+    quantity = OF_UNIT[commands[signal]] if signal in commands else QUANTITY.get(signal, "command")
+    return SI[quantity]
+
+
+def window_means(p: Predictions) -> dict[str, np.ndarray]:
+    """Signal -> its mean (w,) over each window that is judged; of none known NaN."""
+    found = {}
+    for name, values in signals(p.smoothed).items():
+        known = np.isfinite(values)
+        sums = np.concatenate([[0.0], np.cumsum(np.where(known, values, 0.0))])
+        counts = np.concatenate([[0], np.cumsum(known)])
+        n = counts[p.rows + 1] - counts[p.first]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found[name] = (sums[p.rows + 1] - sums[p.first]) / n
+    return found
+
+
+def covered(evaluations: Sequence[Evaluation]) -> dict[str, tuple[str, list[float]]]:
+    """Signal -> its unit; least, 5 %, 50 %, 95 % and largest value over all samples that are used."""
+    found: dict[str, list[np.ndarray]] = {}
+    units = {}
+    for e in evaluations:
+        for name, values in signals(e.smoothed).items():
+            chosen = values[e.smoothed.used & np.isfinite(values)]
+            if chosen.size:
+                found.setdefault(name, []).append(chosen)
+                units[name] = unit_of(name, e)
+    return {n: (units[n], _spread(np.concatenate(parts))) for n, parts in found.items()}
+
+
+def _spread(values: np.ndarray) -> list[float]:
+    return np.quantile(values, [0.0, *QUANTILES, 1.0]).tolist()

@@ -1,0 +1,283 @@
+"""What the commands of the diagnosis share: options, a user's effects, progress, mistakes."""
+
+import argparse
+import io
+import shlex
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console, RenderableType
+
+from cosim import InputError
+from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
+from cosim.interrupts import Held
+from fmus.ships.naming import DEFAULT
+
+from ..execution.progress import Advance, progress
+from ..execution.result_folder import default_folder, keep_inputs, sha256
+from ..search import Prior
+
+# Options that name files which decide a result.
+INPUTS = ("train", "test", "runs", "run", "model", "map", "effects", "criteria")
+MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
+RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
+
+
+def prior(text: str) -> Prior:
+    """What ``--prior`` says: one number, or names with numbers.
+
+    Raises:
+        argparse.ArgumentTypeError: neither.
+    """
+    try:
+        if "=" not in text:
+            return _share(text)
+        pairs = [part.split("=") for part in text.split(",")]
+        return {name.strip(): _share(share) for name, share in pairs}
+    except ValueError:
+        form = "a number of zero or more, or names with such numbers as in mass=0.01,thrust=0.5"
+        raise argparse.ArgumentTypeError(f"needs {form}, not '{text}'") from None
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < float("inf"):
+        raise ValueError
+    return value
+
+
+class Done(NamedTuple):
+    """How a command ended: its exit code, and what it shows."""
+
+    code: int
+    shown: Iterable[RenderableType]
+
+
+def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser with the options that both commands have."""
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
+    )
+    made.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="model to begin with: a parameter set .ssv, an .fmu, or a system, .ssp or scenario .json "
+        "(the nominal one)",
+    )
+    made.add_argument(
+        "--effects",
+        type=Path,
+        metavar="FILE.py",
+        action="append",
+        default=[],
+        help="a file of model effects of your own; may be repeated",
+    )
+    ship_option(made)
+    made.add_argument(
+        "--anyway",
+        action="store_true",
+        help="go on though a run's units, signs or columns seem to be other ones than said",
+    )
+    made.add_argument(
+        "--horizon",
+        type=float,
+        metavar="SECONDS",
+        help="length of the windows in which models predict the runs (8 s, times the scale of the ship)",
+    )
+    return made
+
+
+def map_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--map``."""
+    made.add_argument(
+        "--map",
+        type=Path,
+        metavar="FILE.json",
+        help="which variables of an FMU given by --model are which signals (as names and units tell)",
+    )
+
+
+def ship_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--ship``."""
+    made.add_argument(
+        "--ship",
+        metavar="NAME|FILE.toml",
+        help="the ship that was measured: a shipped one, or a description of your own (as the logs "
+        "of runs say, else cse1)",
+    )
+
+
+def analysis_parser(
+    name: str, description: str, epilog: str, estimates: str, fewest: str = "+"
+) -> argparse.ArgumentParser:
+    """A parser with what the analyses of the thesis share: runs, ``--estimates``, ``--out``.
+
+    Args:
+        name: of the command, and of its result folder.
+        description: what it does.
+        epilog: examples and exit codes.
+        estimates: where velocities come from by default.
+        fewest: ``+``: one run at the least; ``*``: none.
+    """
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
+    )
+    made.add_argument(
+        "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
+    )
+    made.add_argument(
+        "--estimates",
+        choices=("smoothed", "mdf"),
+        default=estimates,
+        help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
+        f"derivative filter ({estimates})",
+    )
+    out_options(made, Path("results", name))
+    return made
+
+
+def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
+    """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
+    made = command_parser(
+        f"diagnosis.{name}",
+        description,
+        epilog,
+    )
+    made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
+    made.add_argument(
+        "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"
+    )
+    made.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="observer, guidance and controller's parameters, in place of the run's own scenario",
+    )
+    out_options(made, Path("results", name))
+    return made
+
+
+def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
+    """Add ``--out`` and ``--overwrite``.
+
+    Args:
+        made: of the command.
+        usual: result folder without ``--out``, unless the result of other inputs is there.
+    """
+    made.add_argument(
+        "--out",
+        type=folder_name,
+        metavar="DIR",
+        help=f"result folder ({usual}; where the result of other inputs is, {usual}_2, ...)",
+    )
+    made.add_argument("--overwrite", action="store_true", help=f"use {usual}, whatever is there")
+    made.set_defaults(usual=usual)
+
+
+def inputs_of(options: argparse.Namespace) -> dict[str, str]:
+    """The files that a command reads, as they were named -> SHA-256."""
+    given = [getattr(options, name, None) for name in INPUTS]
+    paths = [p for each in given for p in (each if isinstance(each, list) else [each]) if p is not None]
+    return {str(path): sha256(Path(path)) for path in paths}
+
+
+def import_later_parts() -> None:
+    """Import what is needed once runs are smoothed; it takes a second."""
+    for name in ("diagnosis.session", "diagnosis.report.page", "matplotlib.figure"):
+        import_module(name)
+
+
+def command_of(name: str) -> str:
+    """The command line as it could be given again."""
+    return shlex.join(["python", "-m", f"diagnosis.{name}", *sys.argv[1:]])
+
+
+def _ship_of(options: argparse.Namespace) -> str | None:
+    """The ship that the logs among the runs are of, told; None: the usual one, or no log tells.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    from ..runs import ship_of_logs  # only now: it takes a second to import
+
+    told = ship_of_logs(_runs(options))
+    if told is None:
+        return None
+    ship, path = told
+    complain(f"the ship is {ship}, as '{path}' says; --ship means another one", "note: ")
+    return ship
+
+
+def _refuse_other_ships(options: argparse.Namespace) -> None:
+    """Refuse logs of other ships, for analyses of the thesis' model.
+
+    Raises:
+        InputError: there is one.
+    """
+    from ..runs import ship_of_logs  # only now: it takes a second to import
+
+    told = ship_of_logs(_runs(options))
+    if told is not None:
+        raise InputError(f"'{told[1]}' is of {told[0]}; this analysis knows {DEFAULT} alone")
+
+
+def _runs(options: argparse.Namespace) -> list[Path]:
+    """The measured runs among the arguments."""
+    given = [getattr(options, name, None) or [] for name in RUNS]
+    return [path for each in given for path in (each if isinstance(each, list) else [each])]
+
+
+def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
+    """Choose the result folder where there is no ``--out``; returns the inputs in that case."""
+    if options.out is not None:
+        return None
+    inputs = inputs_of(options)
+    options.out = default_folder(options.usual, inputs, options.overwrite)
+    return inputs
+
+
+def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.Namespace) -> int:
+    """Do the work of a command, and show what it found.
+
+    Args:
+        work: is given the options and a callback for progress.
+        options: of the command line; ``out`` is filled in.
+
+    Returns:
+        The exit code.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
+    errors = Console(stderr=True, highlight=False, soft_wrap=True)
+    with Held() as interrupts:
+        interrupts.allow()
+        try:
+            if "ship" not in vars(options):
+                _refuse_other_ships(options)
+            elif options.ship is None:
+                options.ship = _ship_of(options)
+            inputs = _place(options)
+            with progress(errors) as advance:
+                done = work(options, advance)
+        except InputError as error:
+            complain(error)
+            return BAD_INPUT
+        interrupts.hold()  # the files are there: what was found is shown
+        if inputs is not None:
+            keep_inputs(options.out, inputs)
+            if options.out != options.usual:
+                note = f"another result is in '{options.usual}'; this one is in '{options.out}'"
+                complain(note, "note: ")
+        output = Output(highlight=False, markup=False)
+        for part in done.shown:
+            output.print(part)
+        interrupts.finish()
+    return done.code

@@ -1,1 +1,0 @@
-"""Fit to what is shown: predictions over some seconds, with a posterior and bands."""

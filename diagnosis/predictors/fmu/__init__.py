@@ -1,0 +1,1 @@
+"""Models that this project did not make: FMUs for co-simulation as predictors of measured runs."""

@@ -1,0 +1,253 @@
+"""Which variable of an FMU is which signal of a run: told by names and units, or by a map file.
+
+A map has the form of the file beside a measurement, once for inputs, outputs and start values::
+
+    {
+        "inputs": {"tau_X": "Thrust.X", "rudder.delta": {"name": "delta", "unit": "deg", "flip": true}},
+        "outputs": {"x": "north", "y": "east", "psi": {"name": "hdg", "unit": "deg"}},
+        "start": {"u": "u_0", "v": "v_0", "r": "r_0"},
+        "run_in": 60.0,
+    }
+
+Inputs for a force or an acceleration that acts beside all else stand in ``beside``, by ``tau_X`` or
+``u_dot`` and so on. A number in place of an output is one that the FMU lacks, as the sway of what moves
+ahead alone. A variable whose unit the map does not tell is in the one that its FMU declares, else in SI.
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from cosim import BASE_UNITS, InputError, Unit
+from cosim.errors import most_alike, nearest
+from cosim.fmu import Model, Variable
+from fmus.base_units import base_exponents
+
+from ...runs import QUANTITY, UNITS, Column, meaning
+
+POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
+MOTION = (*POSE, *VELOCITY)
+PROPOSED = ("inputs", "outputs", "start")
+GROUPS = (*PROPOSED, "beside")
+# Inputs that act beside all else: forces, or accelerations.
+BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
+          "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
+SHOWN = 40  # characters of what a broken file holds that a message shows (chosen)
+# What marks a variable as a start value, before or behind the name of the signal.
+BEFORE, BEHIND = re.compile(r"(initial|init|start)_?"), re.compile(r"_?(0|initial|init|start)")
+SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
+           "moment": "N.m", "shaft speed": "1/s", "command": "1", "acceleration": "m/s2",
+           "angular acceleration": "rad/s2"}  # fmt: skip
+
+
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+
+
+class VariableMap(BaseModel):
+    """The content of a map file; a signal without a variable is null or missing."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    inputs: dict[str, Column | None] = Field(default_factory=dict, description="commands or forces")
+    outputs: dict[str, Column | Number | None] = Field(
+        default_factory=dict, description="pose or velocity; a number [SI] where it stays the same"
+    )
+    start: dict[str, Column | None] = Field(default_factory=dict, description="start values")
+    beside: dict[str, Column | None] = Field(
+        default_factory=dict, description="forces or accelerations that act beside all else"
+    )
+    run_in: float | None = Field(
+        default=None, ge=0.0, allow_inf_nan=False, description="time before a whole run counts [s]"
+    )
+
+    @field_validator(*GROUPS, mode="before")
+    @classmethod
+    def _names_alone(cls, value: Any) -> Any:
+        told = value.items() if isinstance(value, dict) else ()
+        return {s: {"name": c} if isinstance(c, str) else c for s, c in told} or value
+
+    def told(self, group: str) -> dict[str, Column]:
+        """The signals of a group that have a variable."""
+        every: Mapping[str, Column | float | None] = getattr(self, group)
+        return {signal: column for signal, column in every.items() if isinstance(column, Column)}
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The outputs that stay the same [SI]."""
+        return {signal: x for signal, x in self.outputs.items() if isinstance(x, float)}
+
+    @property
+    def known(self) -> set[str]:
+        """The outputs that have a variable, or stay the same."""
+        return {*self.told("outputs"), *self.fixed}
+
+    def content(self) -> dict[str, Any]:
+        """As JSON holds it: a signal with the name of its variable alone, where no more is to tell."""
+        told = self.model_dump(exclude_defaults=True)
+        for group in (g for g in GROUPS if g in told):
+            for signal, column in told[group].items():
+                if isinstance(column, dict) and column.keys() == {"name"}:
+                    told[group][signal] = column["name"]
+        return told
+
+
+def read_map(path: Path) -> VariableMap:
+    """A map from its file.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return VariableMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part)[:SHOWN] for part in first["loc"])
+        extra = first["type"] == "extra_forbidden" and len(first["loc"]) == 1
+        hint = nearest(str(first["loc"][0]), VariableMap.model_fields) if extra else ""
+        raise InputError(f"'{path}': {place}: {first['msg']}{hint}") from None
+    except RecursionError:
+        raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Group -> signal -> quantity of all that a map may have, of a run with some commands."""
+    motion = {signal: QUANTITY[signal] for signal in MOTION}
+    start = {**motion, **commands}
+    return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
+
+
+def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
+    """The map that names and units of an FMU tell.
+
+    Args:
+        model: the FMU.
+        commands: of the runs: signal -> quantity.
+    """
+    found: dict[str, Any] = {}
+    every = quantities(commands)
+    for group, known in ((g, every[g]) for g in PROPOSED):
+        signals: dict[str, Column | None] = dict.fromkeys(known)
+        meant = [(v, *_signal(v.name, group, known)) for v in _candidates(model, group)]
+        for v, signal, flip in sorted(meant, key=lambda m: not _same(m[0].name, m[1])):
+            if signal in known and signals[signal] is None and _fits(v.unit, known[signal]):
+                signals[signal] = Column(name=v.name, flip=flip)
+        found[group] = signals
+    return VariableMap(**found)
+
+
+def completed(given: VariableMap, model: Model, commands: Mapping[str, str], where: str) -> VariableMap:
+    """A map with the units that the FMU declares, checked against it.
+
+    Args:
+        given: from a file, or proposed.
+        model: the FMU.
+        commands: of the runs: signal -> quantity.
+        where: what messages call the map.
+
+    Raises:
+        InputError: no such signal or variable, or a unit of another quantity.
+    """
+    found: dict[str, Any] = {"run_in": given.run_in}
+    for group, known in quantities(commands).items():
+        variables = {v.name: v for v in _candidates(model, group)}
+        found[group] = dict(given.fixed) if group == "outputs" else {}
+        for signal, column in given.told(group).items():
+            place = f"{where}: {group}.{signal[:SHOWN]}"
+            if signal not in known:
+                raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
+            if column.name not in variables:
+                hint = nearest(column.name, variables)
+                raise InputError(f"{place}: the FMU has no such variable '{column.name[:SHOWN]}'{hint}")
+            if column.factor == 0.0:
+                raise InputError(f"{place}.factor is not zero")
+            if column.unit is not None and column.unit not in UNITS[known[signal]]:
+                hint = nearest(column.unit, UNITS[known[signal]])
+                raise InputError(f"{place}: '{column.unit[:SHOWN]}' is no unit of {signal}{hint}")
+            found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
+    return VariableMap(**found)
+
+
+def unmatched(found: VariableMap, model: Model) -> list[str]:
+    """What an FMU lacks in order to be held against a run, a part of a sentence each."""
+    lacking = []
+    outputs = found.known
+    if not any(set(group) <= outputs for group in (POSE, VELOCITY)):
+        missing = [s for s in (POSE if outputs & {"x", "y"} else MOTION) if s not in outputs]
+        lacking.append(f"no output is {_with_hints(missing, model, 'outputs')}")
+    if not found.told("inputs"):
+        lacking.append(f"no input is {_with_hints(found.inputs, model, 'inputs')}")
+    return lacking
+
+
+def _with_hints(signals: Iterable[str], model: Model, group: str) -> str:
+    known = [v.name for v in _candidates(model, group)]
+    near = {signal: most_alike(signal, known) for signal in signals}
+    told = ", ".join(s if n is None else f"{s} (near: '{n}')" for s, n in near.items())
+    return f"{told}; its {group} are {', '.join(known[:8]) or 'none'}{', ...' if known[8:] else ''}"
+
+
+def _candidates(model: Model, group: str) -> list[Variable]:
+    """The variables of an FMU that can be in a group of a map."""
+    real = [v for v in model.variables.values() if v.type == "Real"]
+    if group == "start":
+        return [v for v in real if model.can_be_set(v)]
+    return [v for v in real if v.causality == ("output" if group == "outputs" else "input")]
+
+
+def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]:
+    """The signal that a variable's name means, whole or its last part, and whether it is flipped."""
+    for part in (name, name.rpartition(".")[2]):
+        for core in _cores(part) if group == "start" else [part]:
+            found = meaning(core, known)
+            if found[0]:
+                return found
+    return "", False
+
+
+def _same(name: str, signal: str) -> bool:
+    """Whether a variable bears a signal's own name, which goes before other names of it."""
+    return bool(signal) and name.casefold().replace(".", "_").startswith(
+        signal.casefold().replace(".", "_")
+    )
+
+
+def _cores(name: str) -> list[str]:
+    """A start value's name without what marks it as one."""
+    lower = name.casefold()
+    marks: list[tuple[re.Pattern[str], Callable[[re.Match[str]], str]]] = [
+        (re.compile(f"{BEFORE.pattern}(.+)"), lambda m: m[2]),
+        (re.compile(f"(.+?){BEHIND.pattern}"), lambda m: m[1]),
+    ]
+    cores = [core(m) for pattern, core in marks if (m := pattern.fullmatch(lower))]
+    return [core for core in cores if len(core) > 1 or core in MOTION]
+
+
+def _fits(unit: Unit | None, quantity: str) -> bool:
+    """Whether a variable's unit is one of the quantity, as far as it is known."""
+    return unit is None or unit.name in UNITS[quantity] or _is_of(unit, quantity)
+
+
+def _is_of(unit: Unit, quantity: str) -> bool:
+    exponents = base_exponents(SI_UNIT[quantity])
+    return unit.exponents == tuple(exponents.get(base, 0) for base in BASE_UNITS)
+
+
+def _with_unit(column: Column, v: Variable, quantity: str, where: str) -> Column:
+    """A column with the unit of its variable, where the map does not tell another one."""
+    unit = v.unit
+    if column.unit is not None or unit is None:
+        return column
+    if unit.name in UNITS[quantity]:
+        return column.model_copy(update={"unit": unit.name})
+    if not _is_of(unit, quantity):
+        raise InputError(
+            f"{where}: '{v.name}' is in '{unit.name}', which is no unit of {quantity}; tell its unit"
+        )
+    scaled = {"factor": column.factor * unit.factor, "offset": column.offset * unit.factor + unit.offset}
+    return column.model_copy(update=scaled)

@@ -1,0 +1,142 @@
+"""A foreign FMU with what was found beside it, as one FMU."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import cosim
+from cosim.export import export_fmu
+from cosim.process import scratch_folder
+from cosim.system import prepare
+from fmus.addition import ACCELERATION, FORCE, Line
+from fmus.build import BuildError, build, native_targets
+
+from ...runs import UNITS, Column
+from ..ship_model import Model
+from ..weak_form import WeakWindows, omega
+from .fmu_windows import Use, step_of
+from .variable_map import BESIDE, VariableMap
+
+SLIGHT = 1e-9  # of the ship's forces: less is none
+FOREIGN, ADDED = "model", "found"  # instances of the container
+
+NONE = "No FMU with what was found is written"
+SOURCE = '''"""What was found beside {name}."""
+
+from fmus.addition import Line, addition
+from fmus.ship import ship
+from fmus.ship_description import Description, Part, Value
+
+COMPONENT = addition(ship(description={description!r}), {arguments})
+'''
+
+
+def write_wrapper(
+    path: Path, use: Use, start: Model, learned: Model, runs: Sequence[WeakWindows]
+) -> tuple[str, VariableMap | None]:
+    """Write an FMU of a foreign one and of what was found beside it.
+
+    Args:
+        path: of the file.
+        use: how the foreign one predicts.
+        start: that moves as it does.
+        learned: the same with what was found.
+        runs: on which that was.
+
+    Returns:
+        What was written, or what is needed for it, in a sentence; the map of the new FMU, or None.
+    """
+    change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
+    needed = np.abs(change).max(axis=0) > SLIGHT * np.array(start.ship.scale.forces)
+    takes = {*use.map.told("inputs"), *use.map.told("beside")}
+    missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
+    if not needed.any():
+        return "Nothing is added to the FMU.", None
+    if missing:
+        axes = " and ".join(f"{FORCE[k]} or {ACCELERATION[k]}" for k in missing)
+        needs = f"{use.fmu.name} has no input for a force or an acceleration beside all else"
+        return f"{NONE}: {needs}; it needs {axes}, which the map tells under 'beside'.", None
+    if start.ship.effects.files:
+        return f"{NONE}: the ship has effects of your own.", None
+    try:
+        with scratch_folder() as folder:
+            system = prepare(cosim.load_scenario(_scenario(use, start, learned, folder, runs)))
+            try:
+                export_fmu(system, path, overwrite=True, expose=_start_values(use))
+            finally:
+                system.close()
+    except (cosim.InputError, BuildError) as error:
+        return f"{NONE}: {error}.", None
+    return f"{path.name} is {use.fmu.name} with what was found.", _map(use)
+
+
+def _scenario(
+    use: Use, start: Model, learned: Model, folder: Path, runs: Sequence[WeakWindows]
+) -> dict[str, Any]:
+    """The two FMUs, wired; values pass as they are, for the addition converts them."""
+    groups = {group: use.map.told(group) for group in ("outputs", "inputs", "beside")}
+    told: dict[str, Line | float] = {**_lines(use, groups["outputs"]), **use.map.fixed}
+    parts = [
+        {part: {n: float(x) for n, x in getattr(m, part).items()} for part in ("vessel", "thrusters")}
+        for m in (start, learned)
+    ]
+    arguments = (*parts, told, *(_lines(use, groups[g]) for g in ("inputs", "beside")))
+    source = folder / f"{ADDED}.py"
+    description = start.ship.description
+    text = ", ".join(map(repr, arguments))
+    source.write_text(SOURCE.format(name=use.fmu.name, description=description, arguments=text))
+    try:
+        (made,) = build(source, folder, native=native_targets())
+    except BuildError:  # no compiler
+        (made,) = build(source, folder)
+    wires = [(f"{FOREIGN}.{c.name}", f"{ADDED}.from_{s}") for s, c in groups["outputs"].items()]
+    for group, mark in (("inputs", "to"), ("beside", "add")):
+        wires += [
+            (f"{ADDED}.{mark}_{_plain(s)}", f"{FOREIGN}.{c.name}") for s, c in groups[group].items()
+        ]
+    h = step_of(runs[0].smoothed)
+    return {
+        "name": "wrapper",
+        "step": h,
+        "stop": round(max(float(w.run.time[-1] - w.run.time[0]) for w in runs) / h) * h,
+        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(use.fmu.path)}},
+        "connections": wires,
+        "transformations": {target: {"factor": 1.0} for _, target in wires},
+    }
+
+
+def _plain(signal: str) -> str:
+    """A signal's name as that of a variable: ``rudder_delta`` of ``rudder.delta``."""
+    return signal.replace(".", "_")
+
+
+def _lines(use: Use, columns: Mapping[str, Column]) -> dict[str, Line]:
+    """Signal in SI by an FMU's variable."""
+    found = {}
+    for signal, c in columns.items():
+        unit = UNITS[{**use.quantity, **BESIDE}[signal]].get(c.unit or "", 1.0)
+        found[_plain(signal)] = Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
+    return found
+
+
+def _start_values(use: Use) -> list[str]:
+    parameters = (use.fmu.model.variables[c.name] for c in use.map.told("start").values())
+    return [f"{FOREIGN}.{v.name}" for v in parameters if v.causality == "parameter"]
+
+
+def _map(use: Use) -> VariableMap:
+    """The map of the container: commands in SI, all else as of the foreign FMU."""
+
+    def inside(columns: Mapping[str, Column]) -> dict[str, Column]:
+        return {s: c.model_copy(update={"name": f"{FOREIGN}.{c.name}"}) for s, c in columns.items()}
+
+    exposed = _start_values(use)
+    start = inside(use.map.told("start"))
+    return VariableMap(
+        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in use.map.told("inputs")},
+        outputs={**inside(use.map.told("outputs")), **use.map.fixed},
+        start={s: c for s, c in start.items() if c.name in exposed},
+        run_in=use.map.run_in,
+    )

@@ -1,0 +1,278 @@
+"""Many short predictions at once, with the very physics of the vessel and the thrusters.
+
+The functions of :mod:`fmus` run on arrays: one column for each window, one row for each set of
+parameters.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fmus.actuators.response import Prepared
+from fmus.frames import rotate_to_body
+from fmus.ops import when, wrap
+from fmus.signals import Force
+from fmus.vessel import vessel
+
+from ..runs import Smoothed, idle
+from ..runs.files.reading import Run
+from .ship_model import Model
+from .thrust import Integral, Response, commanded_shares, drive_of, inflow
+
+# s, times the scale of the ship; of the integration, where its error is far below the noise of any
+# measurement
+LONGEST_STEP = 0.02
+COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
+HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
+UNSURE = 3.0  # standard deviations of a speed within which it may be none
+CLOSE = 1e-12  # m and rad, to which a true pose is found
+INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Windows, of one run or more with commands in one layout, that are predicted together.
+
+    Attributes:
+        runs: each run with the rows of the first samples of its windows.
+        h: step of integration [s], a whole part of the time between two rows.
+        steps: in a window.
+    """
+
+    runs: tuple[tuple[Smoothed, np.ndarray], ...]
+    h: float
+    steps: int
+
+    def first(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
+        """(..., w): what an array (n, ...) of each run holds where windows begin."""
+        return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
+
+    @property
+    def _measured(self) -> list[Run]:
+        return [smoothed.track.run for smoothed, _ in self.runs]
+
+    @property
+    def powered(self) -> bool:
+        """Whether any run tells the power of its thrusters."""
+        return any(run.power is not None for run in self._measured)
+
+    def drive(self, model: Model) -> Prepared:
+        """The thrusters of a model, in the layout of the runs' commands."""
+        return drive_of(self._measured[0], model)
+
+    def times(self, clock: float) -> list[np.ndarray]:
+        """Middle of each step, (steps, w) for each run, as commands are stamped.
+
+        Args:
+            clock: seconds by which a pose is older than its stamp.
+        """
+        middle = (np.arange(self.steps)[:, None] + 0.5) * self.h - clock
+        return [smoothed.time[rows] + middle for smoothed, rows in self.runs]
+
+    def power(self, clock: float) -> np.ndarray:
+        """(steps, m, w): settings of the thrusters' power, argument as of :meth:`times`."""
+        settings = max(1 if r.power is None else r.power.shape[1] for r in self._measured)
+        found = []
+        for run, time in zip(self._measured, self.times(clock), strict=True):
+            row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+            found.append(np.ones((*row.shape, settings)) if run.power is None else run.power[row])
+        return np.concatenate(found, axis=1).transpose(0, 2, 1)
+
+    def given(self, model: Model) -> tuple[np.ndarray, np.ndarray] | None:
+        """What is given beside all else, mean over each step; None: nothing is.
+
+        Returns:
+            Force (steps, 3, 1, w), and its slopes by pose and velocity (steps, 3, 6, 1, w).
+        """
+        if not model.given:
+            return None
+        found = []
+        for smoothed, rows in self.runs:
+            t, given = smoothed.time, model.given[smoothed.track.run.name]
+            table = np.concatenate([given.still[..., None], given.slope], axis=2)
+            edges = np.concatenate([t[:1], 0.5 * (t[1:] + t[:-1]), t[-1:]])
+            time = t[rows] + self.h * np.arange(self.steps + 1)[:, None]
+            found.append(np.diff(Integral(edges, table, table[0])(time), axis=0) / self.h)
+        together = np.moveaxis(np.concatenate(found, axis=1), 1, -1)[..., None, :]
+        return together[:, :, 0], together[:, :, 1:]
+
+    def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
+        """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
+        found = []
+        for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
+            response = Response(smoothed.track.run, model, not at_rest(smoothed))
+            if response.slow or self.h > COARSE * smoothed.track.period:
+                start = smoothed.time[rows] + np.arange(self.steps)[:, None] * self.h
+                found.append(response.mean(start, start + self.h))
+            else:
+                commands = held(smoothed, model, time)
+                found.append((commands, commands))
+        given, acting = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        return given.transpose(0, 2, 1)[:, :, None], acting.transpose(0, 2, 1)[:, :, None]
+
+
+def at_rest(smoothed: Smoothed) -> bool:
+    """Whether a ship hardly moves at the start of a run, for its noise and its usual speeds."""
+    first = np.isfinite(smoothed.nu[:, 0]).argmax()
+    usual = np.sqrt(np.nanmean(smoothed.nu**2, axis=0))
+    still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
+    still = np.maximum(still, HARDLY * usual)
+    return bool((np.abs(smoothed.nu[first]) < still).all())
+
+
+def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
+    """Commanded shares of full force (steps, w, k) of a run at times (steps, w) [s]."""
+    run = smoothed.track.run
+    row = np.searchsorted(run.time, time, side="right") - 1
+    found = commanded_shares(run, model)[np.maximum(row, 0)]
+    if at_rest(smoothed):
+        found[row < 0] = 0.0
+    return found
+
+
+def predict(starts: Starts, model: Model) -> np.ndarray:
+    """The measured pose as a model predicts it.
+
+    Args:
+        starts: where to begin.
+        model: its parameters may be arrays (p, 1), for p models at once.
+
+    Returns:
+        (steps + 1, 3, p, w): pose [m, m, rad] at each step.
+    """
+    names = [smoothed.track.run.name for smoothed, _ in starts.runs]
+    if model.runs.keys() & set(names):
+        each = zip(starts.runs, names, strict=True)
+        parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
+        return np.concatenate(parts, axis=-1)
+    body, thrust = model.hull, arriving(starts, model)
+    shape = np.broadcast_shapes(*sizes(body.params, model.drive.params), thrust[1].shape[-2:])
+    found = np.empty((starts.steps + 1, 3, *shape))
+    with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
+        for k, s in enumerate(propagate(starts, model, thrust)):
+            found[k] = np.stack(np.broadcast_arrays(*vessel.measured(s, body)))
+    return found
+
+
+def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Commands that arrive and shares of full force that act, each (steps, k, p or 1, w)."""
+    found = [starts.arriving(single) for single in singles(model)]
+    given, acting = (np.concatenate(part, axis=2) for part in zip(*found, strict=True))
+    return given, acting
+
+
+def propagate(
+    starts: Starts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
+) -> Iterator[vessel.State]:
+    """The state at the start, and after each step; arrays (p, w) or what broadcasts to that.
+
+    Args:
+        starts: where to begin.
+        model: as of :func:`predict`.
+        thrust: commands that arrive and shares that act, from :func:`arriving`.
+    """
+    body, drive, h = model.hull, starts.drive(model), starts.h
+    layout = drive.effects.layout
+    power = starts.power(model.clock) if starts.powered else None
+    thrusters, beside = drive, starts.given(model)
+    s = first_state(starts, body)
+    yield s
+    for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
+        with np.errstate(all="ignore"):
+            if power is not None:
+                thrusters = layout.powered(drive, power[k])
+            now = layout.running(s.t + h, *inflow(s, model), tuple(given), thrusters)
+            tau = Force(*layout.act(tuple(shares), now, thrusters))
+            if beside is None:
+                s = moved(s, tau, body, h)
+            else:
+                s = vessel.integrate(s, tau, body, h, _with(beside[0][k], beside[1][k]))
+        yield s
+
+
+def _with(still: np.ndarray, slope: np.ndarray) -> Callable[..., Any]:
+    """Law of the motion with a force (3, 1, w) beside all else, and its slopes (3, 6, 1, w)."""
+
+    def law(s: vessel.State, tau: Force, b: Any) -> Any:
+        beside = still + sum(slope[:, k] * x for k, x in enumerate(s[:6]))
+        return vessel.disturbed(s, Force(*(f + g for f, g in zip(tau, beside, strict=True))), b)
+
+    return law
+
+
+def by_clock(models: Sequence[Model]) -> Iterator[tuple[list[int], Model]]:
+    """Models of one ship that are predicted at once, those with the same clock; which, and in one."""
+    for clock in sorted({m.clock for m in models}):
+        chosen = [k for k, m in enumerate(models) if m.clock == clock]
+        yield chosen, stacked([models[k] for k in chosen])
+
+
+def stacked(models: Sequence[Model]) -> Model:
+    """Several models with the same clock as one whose parameters are arrays (p, 1) where they differ."""
+
+    def together(part: str) -> dict[str, Any]:
+        values: list[Mapping[str, float]] = [getattr(m, part) for m in models]
+        names = dict.fromkeys(name for each in values for name in each)
+        of = models[0].ship.parameters[part]
+        columns = {n: np.array([v.get(n, of[n].start) for v in values]) for n in names}
+        return {n: x[:, None] if np.ptp(x) else float(x[0]) for n, x in columns.items()}
+
+    return replace(models[0], vessel=together("vessel"), thrusters=together("thrusters"))
+
+
+def singles(model: Model) -> list[Model]:
+    """The models of one whose thrusters' parameters are arrays (p, 1); itself where none is."""
+    many = [np.size(v) for v in model.thrusters.values() if isinstance(v, np.ndarray)]
+    if not many:
+        return [model]
+
+    def one(values: Mapping[str, Any], k: int) -> dict[str, float]:
+        return {n: float(v[k, 0]) if isinstance(v, np.ndarray) else v for n, v in values.items()}
+
+    return [replace(model, thrusters=one(model.thrusters, k)) for k in range(max(many))]
+
+
+def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
+    """The ship a step later."""
+    return when(
+        b.disturbed,
+        lambda: vessel.integrate(s, tau, b, h, vessel.disturbed),
+        lambda: vessel.integrate(s, tau, b.hull, h),
+    )
+
+
+def sizes(*groups: Any) -> list[tuple[int, ...]]:
+    """Shapes (p, 1) of the parameters that are arrays."""
+    found: list[tuple[int, ...]] = []
+    for item in groups:
+        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)]
+    return found
+
+
+def first_state(starts: Starts, b: vessel.Prepared) -> vessel.State:
+    """Where the smoother says that each window begins, seen through the model's measurement effects."""
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), b)
+    time = starts.first(lambda s: s.time) + 0.0 * pose[0]
+    return vessel.State._make([*pose, *nu, time])
+
+
+def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
+    """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
+    x, y, psi = true_pose(eta, b)
+    ahead, astern = true_pose(eta + INSTANT * eta_dot, b), true_pose(eta - INSTANT * eta_dot, b)
+    x_dot, y_dot, r = ((a - b) / (2.0 * INSTANT) for a, b in zip(ahead, astern, strict=True))
+    return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
+
+
+def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
+    """The pose, each (p, w), that the measurement effects turn into a measured one; by iteration."""
+    pose = [m[None] for m in measured]
+    for _ in range(8):
+        x, y, psi = vessel.measured(vessel.State(*pose), b)
+        off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
+        if max(np.abs(o).max(initial=0.0) for o in off) < CLOSE:
+            break
+        pose = [a + b for a, b in zip(pose, off, strict=True)]
+    return pose

@@ -1,0 +1,224 @@
+"""Windows that models are fitted on: predicted pose at a few instants of each, and what is known of it.
+
+Every window starts from the smoothed state. All windows of all runs are integrated together, all
+parameters' finite differences as further rows, with the functions of vessel and thrusters.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from fmus.ops import wrap
+from fmus.signals import Force
+from fmus.vessel import vessel
+
+from ..runs import Smoothed
+from .prediction import Starts, arriving, propagate
+from .ship_model import Model
+from .thrust import Response
+from .windows import usable_windows
+
+INSTANTS = 16  # of a window at which pose and prediction are compared
+PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
+ROOM = 40_000  # windows of models in one integration: in arrays of that size numpy's overhead is small
+UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
+VELOCITY = 1e-4  # m/s, rad/s, times the scale of the ship; step of the derivatives of the acceleration
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A model's motion about its predictions.
+
+    Attributes:
+        slope: (w, T, 6, 6), derivative of the rate of (x, y, psi, u, v, r), from instant to instant.
+        by_mass: (3, 3), acceleration by a force.
+        every: time between instants [s].
+    """
+
+    slope: np.ndarray
+    by_mass: np.ndarray
+    every: float
+
+    def __getitem__(self, windows: np.ndarray) -> "Linear":
+        """The motion in some of the windows."""
+        return Linear(self.slope[windows], self.by_mass, self.every)
+
+
+@dataclass(frozen=True, eq=False)
+class Around:
+    """A model's predictions in windows, and what changes them.
+
+    Attributes:
+        residuals: (w, T, 3), measured minus predicted pose [m, m, rad], heading wrapped.
+        slopes: (w, T, 3, q), change of the predicted pose by one unit of each of some parameters.
+        motion: about the predictions, for their uncertainty.
+    """
+
+    residuals: np.ndarray
+    slopes: np.ndarray
+    motion: Linear
+
+
+class Shooting:
+    """The windows of one length of some runs with one kind of commands.
+
+    Args:
+        runs: smoothed runs.
+        length: of the windows [s].
+
+    Attributes:
+        run, start: (w,), number of each window's run, and when it starts [s].
+        since: (T,), time from a window's start to its instants [s].
+        measured: (w, T, 3), pose [m, m, rad], the mean of the samples around each instant.
+        noise: (w, T, 3), its variance by the measurement's noise, UNKNOWN without a sample.
+        at_start: (w, 6), variance of x, y, psi, u, v, r where windows begin.
+    """
+
+    def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
+        parts = [usable_windows(smoothed, length) for smoothed in runs]
+        rows = [p.first_rows for p in parts]
+        self.every = length / INSTANTS
+        groups = tuple(zip(runs, rows, strict=True))
+        self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS)
+        self.since = self.every * np.arange(1.0, INSTANTS + 1.0)
+        self.run = np.repeat(np.arange(len(runs)), [r.size for r in rows])
+        self.start = np.concatenate([s.time[r] for s, r in groups])
+        seen = [_seen(s, s.time[r][:, None] + self.since, 0.5 * self.every) for s, r in groups]
+        self.measured, self.noise = (np.concatenate(part) for part in zip(*seen, strict=True))
+        std = [np.hstack([s.eta_std[r], s.nu_std[r]]) for s, r in groups]
+        self.at_start = np.concatenate(std) ** 2
+        self._thrust: dict[object, tuple[object, tuple[np.ndarray, np.ndarray]]] = {}
+
+    def _states(self, model: Model, like: Model | None = None) -> list[vessel.State]:
+        """States at the start and at the instants; the thrusters respond as those of ``like``."""
+        like = like or model
+        if not like.runs:
+            return self._stepped(self.starts, model, like)
+        parts = []
+        for one in self.starts.runs:
+            name = one[0].track.run.name
+            starts = replace(self.starts, runs=(one,))
+            parts.append(self._stepped(starts, model.during(name), like.during(name)))
+        return [_beside(states) for states in zip(*parts, strict=True)]
+
+    def _stepped(self, starts: Starts, model: Model, like: Model) -> list[vessel.State]:
+        runs = tuple(smoothed.track.run.name for smoothed, _ in starts.runs)
+        key = Response.key(like)
+        if runs not in self._thrust or self._thrust[runs][0] != key:
+            self._thrust[runs] = key, arriving(starts, like)
+        steps = propagate(starts, model, self._thrust[runs][1])
+        return [s for k, s in enumerate(steps) if k % PARTS == 0]
+
+    def residuals(self, model: Model) -> np.ndarray:
+        """(w, T, 3): measured minus predicted pose [m, m, rad], heading wrapped."""
+        return _off(self.measured, _poses(self._states(model)[1:], model)[0])
+
+    def around(self, model: Model, steps: Mapping[str, float]) -> Around:
+        """A model's predictions and what changes them.
+
+        Args:
+            model: about which.
+            steps: parameter -> step of its finite difference.
+        """
+        key = Response.key(model)
+        changed = {n: model.plus({n: h}) for n, h in steps.items()}
+        same = [n for n, m in changed.items() if Response.key(m) == key]
+        size = max(1, ROOM // max(self.run.size, 1))
+        first = _together(model, {n: steps[n] for n in same[:size]})
+        states = self._states(first, model)
+        poses = _poses(states[1:], first)
+        base, found = poses[0], dict(zip(same, poses[1:], strict=False))
+        for k in range(size, len(same), size):
+            some = {n: steps[n] for n in same[k : k + size]}
+            further = _together(model, some)
+            found |= dict(zip(some, _poses(self._states(further, model)[1:], further)[1:], strict=True))
+        found |= {n: _poses(self._states(m)[1:], m)[0] for n, m in changed.items() if n not in found}
+        slopes = [_off(found[n], base) / h for n, h in steps.items()]
+        stacked = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
+        return Around(_off(self.measured, base), stacked, self._linear(states, model))
+
+    def _linear(self, states: Sequence[vessel.State], model: Model) -> Linear:
+        with np.errstate(all="ignore"):
+            rates = np.stack([_slope(s, model) for s in states], axis=1)
+        i11, i22, i23, i32, i33 = model.hull.hull.inverse
+        by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
+        return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
+
+    @cached_property
+    def runs(self) -> tuple[Smoothed, ...]:
+        return tuple(smoothed for smoothed, _ in self.starts.runs)
+
+
+def _seen(s: Smoothed, times: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pose (w, T, 3) about some times (w, T) [s], and its variance by noise: means of samples in reach.
+
+    The mean is that of the samples' distance from the smoothed pose, which hardly bends in between.
+    """
+    known = np.isfinite(s.eta[:, 0])
+    smooth = CubicHermiteSpline(s.time[known], s.eta[known], s.eta_dot[known])(times)
+    off = np.where(s.used[:, None], s.track.pose - s.eta, 0.0)
+    off[:, 2] = wrap(off[:, 2])
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(off, axis=0)])
+    counts = np.concatenate([[0], np.cumsum(s.used)])
+    low, high = (np.searchsorted(s.time, times + side) for side in (-reach, reach))
+    number = (counts[high] - counts[low])[..., None]
+    some = np.maximum(number, 1)
+    area = s.scale.length**2
+    noise = np.where(number > 0, s.noise**2 / some, UNKNOWN * np.array([area, area, 1.0]))
+    return smooth + (sums[high] - sums[low]) / some, noise
+
+
+def _beside(states: Sequence[vessel.State]) -> vessel.State:
+    """The states (p, w) of some runs in one; a run that no parameter moves has p = 1."""
+    models = max(np.broadcast_shapes(*map(np.shape, s))[0] for s in states)
+    whole = [[np.broadcast_to(x, (models, s.u.shape[-1])) for x in s] for s in states]
+    return vessel.State._make([np.concatenate(x, axis=-1) for x in zip(*whole, strict=True)])
+
+
+def _poses(states: Sequence[vessel.State], model: Model) -> np.ndarray:
+    """(p, w, T, 3): measured pose of states (p, w) of a model whose parameters may be arrays (p, 1)."""
+    with np.errstate(all="ignore"):
+        poses = [np.broadcast_arrays(*vessel.measured(s, model.hull)) for s in states]
+    return np.stack([np.stack(pose, axis=-1) for pose in poses], axis=-2)
+
+
+def _off(pose: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Difference of poses (..., 3), heading wrapped."""
+    with np.errstate(invalid="ignore"):
+        off = pose - other
+        off[..., 2] = wrap(off[..., 2])
+    return off
+
+
+def _together(model: Model, steps: Mapping[str, float]) -> Model:
+    """A model, and models that differ from it in one parameter each, as one with arrays (p, 1)."""
+    parts = {part: dict(getattr(model, part)) for part in model.ship.parameters}
+    for k, (name, step) in enumerate(steps.items()):
+        values = np.full((len(steps) + 1, 1), model.value(name))
+        values[k + 1] += step
+        parts[model.owner(name)][name] = values
+    return replace(model, **parts)
+
+
+def _slope(s: vessel.State, model: Model) -> np.ndarray:
+    """(w, 6, 6), derivative of the rate of pose and velocity by themselves, without thrust."""
+    at = vessel.State._make([np.broadcast_arrays(x, s.u)[0][0] for x in s])
+    none = Force(0.0, 0.0, 0.0)
+
+    def acceleration(state: vessel.State) -> np.ndarray:
+        rates = vessel.disturbed(state, none, model.hull)
+        return np.stack([np.broadcast_to(rate, at.u.shape) for rate in rates], axis=-1)
+
+    c, sn = np.cos(at.psi), np.sin(at.psi)
+    found = np.zeros((at.u.size, 6, 6))
+    found[:, 0, 2], found[:, 1, 2] = -sn * at.u - c * at.v, c * at.u - sn * at.v
+    found[:, 0, 3], found[:, 0, 4], found[:, 1, 3], found[:, 1, 4] = c, -sn, sn, c
+    found[:, 2, 5] = 1.0
+    base = acceleration(at)
+    for k, (name, speed) in enumerate(zip(("u", "v", "r"), model.ship.scale.speeds, strict=True)):
+        ahead = at._replace(**{name: getattr(at, name) + VELOCITY * speed})
+        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / (VELOCITY * speed)
+    return found

@@ -1,0 +1,292 @@
+"""The force of the thrusters along a measured run, by the very functions of the thrusters' FMU.
+
+What lies between a command and the share of full force that acts (delay, limited rate, lag, and a user's
+effects with a memory) is computed by :mod:`fmus.actuators.response` in short steps of a regular grid. A
+memory lasts only so long: the grid is cut into parts that are stepped side by side, each from the time
+before it that still matters. Weak form and predictions use the same result, :class:`Response`.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fmus.actuators.response import Prepared, at_rest, command_response, force_response
+from fmus.effects import Memory
+from fmus.vessel.vessel import State, water_velocity
+
+from ..runs.files.reading import Run
+from .ship_model import Model
+
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
+# s; longest step of the thrusters, as of the vessel: a force that lags is held over a step as in the
+# FMU, which is half a step earlier than a continuous lag.
+STEP = 0.02
+LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond what windows of some seconds show
+PART = 4.0  # s; about as long as a memory, which costs least
+
+
+def drive_of(run: Run, model: Model) -> Prepared:
+    """The thrusters of a model, in the layout of a run's commands."""
+    drive, layout = model.drive, model.ship.layout_of(run.commands)
+    return drive._replace(effects=drive.effects._replace(layout=layout))
+
+
+def commanded_shares(run: Run, model: Model) -> np.ndarray:
+    """(n, k), what the thrusters are commanded, as shares of full force or as it is."""
+    if run.commands is not None:
+        return run.commands
+    X, Y, N = run.tau_cmd.T
+    shares = model.drive.effects.layout.allocate((X, Y, N), model.drive.params)
+    return np.column_stack(np.broadcast_arrays(*shares))
+
+
+def full_thrust(model: Model) -> np.ndarray:
+    """(3,), force and moment [N, N, N m] that the model's thrusters give at the most on each axis."""
+    return np.array(model.drive.effects.layout.full(model.drive.params))
+
+
+def inflow(s: State, model: Model) -> tuple[Any, Any, Any]:
+    """u, v, r of a ship as the FMU of its thrusters meets the water [m/s, m/s, rad/s].
+
+    That of CyberShip Enterprise 1 knows the velocity over ground alone.
+    """
+    if model.ship.description is None:
+        return s.u, s.v, s.r
+    u_c, v_c = water_velocity(s, model.hull)
+    return s.u - u_c, s.v - v_c, s.r
+
+
+def thrust(run: Run, model: Model, between: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] that acts from each sample to the next.
+
+    Args:
+        run: its time and power.
+        model: whose thrusters act.
+        between: (1 to 3, k, n), what becomes of the commands, :attr:`Response.between_samples`.
+        nu: (n, 3), body-fixed velocity, of :func:`inflow`.
+    """
+    drive = drive_of(run, model)
+    layout = drive.effects.layout
+    if run.power is not None:
+        drive = layout.powered(drive, run.power.T)
+    total = np.zeros((3, run.time.size))
+    points = between[1:] if len(between) > 1 else between
+    now = layout.running(run.time, *nu.T, tuple(between[0]), drive)
+    for acting in points:
+        force = layout.act(tuple(acting), now, drive)
+        for axis in range(3):
+            total[axis] += force[axis] / len(points)
+    return total.T
+
+
+class Response:
+    """What the commands of a run become before they are forces.
+
+    Args:
+        run: its commands.
+        model: whose thrusters follow them.
+        moving: whether the ship was under way when the run began, so that its first command held before;
+            else nothing was commanded before.
+
+    Attributes:
+        drive: the thrusters, in the layout of the run's commands.
+        slow: whether they have any memory.
+    """
+
+    def __init__(self, run: Run, model: Model, moving: bool = False) -> None:
+        self.run, self.model, self.moving = run, model, moving
+        self.drive = drive = drive_of(run, model)
+        self._memories = [
+            (acts, member, memory)
+            for of in ("command", "force")
+            for k, member, memory in drive.effects.remembering[of]
+            if (acts := drive.slow[k])
+        ]
+        self.slow = bool(self._memories) or any(rate > 0.0 for rate in drive.params.rate)
+
+    @staticmethod
+    def key(model: Model) -> tuple[Any, ...]:
+        """What the response depends on, to be kept while it stays the same."""
+        p = model.drive.params
+        return p.dynamics, p.rate, p.allocation, model.clock
+
+    @property
+    def between_samples(self) -> np.ndarray:
+        """Means (2, k, n) from each sample to the next: commands that arrive, shares that act.
+
+        Where these are the same there is one of them. Where forces are not in proportion to what acts,
+        and that changes from sample to sample, it is told at the two points of Gauss' rule.
+        """
+        if not self.slow and self.model.clock == 0.0:
+            means = np.array([commanded_shares(self.run, self.model)])
+        else:
+            ends = np.append(self.run.time, self.run.time[-1] + self._period)
+            means = np.array(self.mean(ends[:-1], ends[1:]))
+            if self.slow and self.drive.effects.layout.curved:
+                middle = 0.5 * (ends[:-1] + ends[1:])
+                halves = (self.mean(a, b)[1] for a, b in ((ends[:-1], middle), (middle, ends[1:])))
+                off = np.subtract(*halves) / np.sqrt(3.0)
+                means = np.array([means[0], means[1] + off, means[1] - off])
+        lasting = means[:1] if (means[0] == means[-1]).all() else means
+        return np.ascontiguousarray(np.moveaxis(lasting, 1, -1))
+
+    def mean(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Means over intervals of the run's time: commands that arrive, and shares that act.
+
+        Args:
+            start, end: (...) [s].
+
+        Returns:
+            Two arrays (..., k).
+        """
+        a, b = self._elapsed(start), self._elapsed(end)
+        given, acting = ((at(b) - at(a)) / like(b - a, 1) for at in self._integrals)
+        return given, acting
+
+    @cached_property
+    def _period(self) -> float:
+        return float(np.median(np.diff(self.run.time)))
+
+    @cached_property
+    def _clock(self) -> np.ndarray:
+        """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
+        gaps = np.minimum(np.diff(self.run.time), LONGEST_MEMORY * self.model.ship.scale.time)
+        return np.concatenate([[0.0], np.cumsum(gaps)])
+
+    def _elapsed(self, time: np.ndarray) -> np.ndarray:
+        """The run's times [s], those before and after it included, in the time of :attr:`_clock`."""
+        t = self.run.time
+        inside = np.interp(time, t, self._clock)
+        return inside + np.minimum(time - t[0], 0.0) + np.maximum(time - t[-1], 0.0)
+
+    @cached_property
+    def _commands(self) -> "Integral":
+        """Integral of the commands as they were given; the clock of the pose is late."""
+        shares = commanded_shares(self.run, self.model)
+        before = shares[0] if self.moving else 0.0 * shares[0]
+        edges = np.append(self._clock, self._clock[-1] + self._period) + self.model.clock
+        return Integral(edges, shares, before)
+
+    @cached_property
+    def _integrals(self) -> tuple["Integral", "Integral"]:
+        if not self.slow:
+            return self._commands, self._commands
+        return self._of_steps(*stepped(self.drive, self.commanded, self.step))
+
+    @property
+    def step(self) -> float:
+        """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
+        fine = self._period / np.ceil(self._period / (STEP * self.model.ship.scale.time) - 1e-6)
+        kept = [
+            self._lasts(member, memory) / (memory.keeps - 1)
+            for _, member, memory in self._memories
+            if memory.keeps
+        ]
+        return float(max([fine, *kept]))
+
+    def _lasts(self, member: Any, memory: Memory) -> float:
+        return float(memory.lasts(*self.drive.params.dynamics[member.parameters]))
+
+    @property
+    def _steps(self) -> int:
+        return int(np.ceil(self._clock[-1] / self.step + 1.0)) + 1
+
+    @property
+    def _part(self) -> int:
+        """Steps of a part."""
+        return int(np.ceil(PART * self.model.ship.scale.time / self.step)) + 1
+
+    @cached_property
+    def commanded(self) -> np.ndarray:
+        """(m, parts, k), mean commands in each step; before each part those that it remembers."""
+        drive, h, part = self.drive, self.step, self._part
+        memory = sum(self._lasts(member, m) for _, member, m in self._memories)
+        largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
+        rates = np.broadcast_to(drive.params.rate, largest.shape)
+        memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
+        longest = LONGEST_MEMORY * self.model.ship.scale.time
+        before = int(np.ceil(min(memory, longest) / h)) + 1
+        rows = np.arange(-before, part)[:, None] + part * np.arange(-(-self._steps // part))
+        commands = np.diff(self._commands(h * np.arange(self._steps + 2)), axis=0) / h
+        return np.where(
+            like(rows < 0, 1), self._commands.before, commands[np.clip(rows, 0, self._steps)]
+        )
+
+    def _of_steps(self, given: np.ndarray, acting: np.ndarray) -> tuple["Integral", "Integral"]:
+        """Integrals of what becomes of :attr:`commanded` in its steps."""
+        edges = self.step * np.arange(self._steps + 1)
+        found = []
+        for signal in (given, acting):
+            parts = np.moveaxis(signal[-self._part :], 1, 0)
+            values = parts.reshape(-1, *signal.shape[2:])[: self._steps]
+            found.append(Integral(edges, values, self._commands.before))
+        return found[0], found[1]
+
+    def take(self, given: np.ndarray, acting: np.ndarray) -> None:
+        """Know what becomes of :attr:`commanded`, as :func:`stepped` beside other runs."""
+        self._integrals = self._of_steps(given, acting)
+
+
+def stepped(drive: Prepared, commanded: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """What becomes of commands in steps of h [s]: those that arrive, and the shares that act.
+
+    Args:
+        drive: thrusters, at rest at first.
+        commanded: (m, parts, k), parts side by side.
+        h: step.
+    """
+    past = at_rest(drive.effects)
+    given = np.empty_like(commanded)
+    acting = np.empty_like(commanded)
+    for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
+        past, arriving = command_response(past, tuple(each), drive, h)
+        past, shares = force_response(past, arriving, drive, h)
+        for one in range(commanded.shape[-1]):
+            given[k, ..., one], acting[k, ..., one] = arriving[one], shares[one]
+    return given, acting
+
+
+def step_together(responses: Sequence[Response]) -> None:
+    """Step the same thrusters in several runs side by side, which takes hardly longer than in one."""
+    groups: dict[tuple[float, int, int, int], list[Response]] = {}
+    for r in responses:
+        if r.slow:
+            m, _, k = r.commanded.shape
+            groups.setdefault((r.step, m, k, id(r.drive.effects.layout)), []).append(r)
+    for (h, *_), group in groups.items():
+        commanded = np.concatenate([r.commanded for r in group], axis=1)
+        last = np.cumsum([r.commanded.shape[1] for r in group])[:-1]
+        parts = (np.split(x, last, axis=1) for x in stepped(group[0].drive, commanded, h))
+        for r, given, acting in zip(group, *parts, strict=True):
+            r.take(given, acting)
+
+
+class Integral:
+    """The integral of a signal that is constant between edges, and before and after them.
+
+    Args:
+        edges: (K + 1,) [s].
+        values: (K, ...).
+        before: (...), its value before the first edge.
+    """
+
+    def __init__(self, edges: np.ndarray, values: np.ndarray, before: np.ndarray) -> None:
+        steps = like(np.diff(edges), values.ndim - 1)
+        self.edges, self.values, self.before = edges, values, before
+        self._sums = np.concatenate([0.0 * values[:1], np.cumsum(values * steps, axis=0)])
+
+    def __call__(self, time: np.ndarray) -> np.ndarray:
+        """The integral from the first edge to times (...) [s]."""
+        time = np.asarray(time)
+        k = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.values) - 1)
+        left = time - self.edges[k]
+        further = self.before.ndim
+        slope = np.where(like(left < 0.0, further), self.before, self.values[k])
+        return self._sums[k] + slope * like(left, further)
+
+
+def like(x: np.ndarray, further: int) -> np.ndarray:
+    """An array with further axes of length one behind its own."""
+    return x.reshape(*x.shape, *[1] * further)

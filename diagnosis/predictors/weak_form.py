@@ -1,0 +1,389 @@
+"""The model error over windows, without ever forming an acceleration (weak form).
+
+The equation of motion is multiplied with a smooth kernel w over a window and integrated; by parts, the
+acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from fmus.hull import accelerated
+from fmus.scale import REFERENCE, Scale
+from fmus.signals import Force
+from fmus.vessel import vessel
+
+from ..execution.parallel import for_each
+from ..runs import Smoothed
+from ..runs.files.reading import Run
+from ..runs.smoothing.smoother import breaks
+from .prediction import at_rest, true_motion
+from .ship_model import Model
+from .thrust import Response, inflow, step_together, thrust
+
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
+WIDTH = 3.0  # s
+EVERY = 0.5  # s
+HORIZON = 8.0  # s, of predictions. Chosen: motions of the unstable nominal hull grow at up to 0.18 1/s
+# Windows of 3 s every 0.5 s overlap: so many carry as much as one that is independent. The
+# correlations of the kernel (1 - s^2)^3 at shifts of 0.5 s sum to 3.7; rounded up.
+OVERLAP = 4.0
+BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
+BLOCKS = 64
+AT_EDGE = 1e-9  # of the half width of a window
+KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
+ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
+# Bytes for commands that thrusters with a memory respond to: of 700 s with two sets of thrusters those
+# of 30 such models.
+MEMORIES = 8e7
+
+
+def kernel(s: np.ndarray) -> np.ndarray:
+    """(1 - s^2)^3 of unit area over [-1, 1]."""
+    return 35.0 / 32.0 * (1.0 - s * s) ** 3
+
+
+def kernel_integral(s: np.ndarray) -> np.ndarray:
+    return 35.0 / 32.0 * (s - s**3 + 0.6 * s**5 - s**7 / 7.0)
+
+
+def kernel_moment(s: np.ndarray) -> np.ndarray:
+    """Integral of s (1 - s^2)^3 of the kernel, zero at the ends."""
+    return -35.0 / 256.0 * (1.0 - s * s) ** 4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WeakWindows:
+    """The windows of one run that can be used, and the integrals over them.
+
+    Attributes:
+        smoothed: the run.
+        middle: (K,) [s].
+        block: (K,), number of the block that the middle lies in.
+        smooth, slope, held: (K, n), integrals of w times a smooth signal, of -dw/dt times one, and of w
+            times one that is held from each sample to the next. They are exact for signals that are
+            straight between samples, however far apart these are.
+        horizon: length of the windows in which models predict the run [s].
+        memory: parts of the model error that were computed lately.
+    """
+
+    smoothed: Smoothed
+    middle: np.ndarray
+    block: np.ndarray
+    smooth: csr_matrix
+    slope: csr_matrix
+    held: csr_matrix
+    horizon: float
+    memory: dict[str, dict[Any, Any]] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        time = self.run.time
+        seconds, count = time[-1] - time[0], self.middle.size
+        return f"<run {self.run.name}: {time.size} samples in {seconds:.6g} s, {count} windows>"
+
+    @property
+    def run(self) -> Run:
+        return self.smoothed.track.run
+
+    @property
+    def scale(self) -> Scale:
+        """Of the ship."""
+        return self.smoothed.scale
+
+    @property
+    def width(self) -> float:
+        """Of a window [s]."""
+        return WIDTH * self.scale.time
+
+    @property
+    def every(self) -> float:
+        """From a window to the next [s]."""
+        return EVERY * self.scale.time
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """(n,), samples at which there is a smoothed state; the others have weight zero."""
+        return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
+
+    def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
+        """A part of the model error, from memory if it was computed for the same parameters lately.
+
+        Of two models that differ in the hull alone the thrust is the same, and so on.
+        """
+        kept = self.memory.setdefault(what, {})
+        found = kept.pop(key, None)
+        if found is None:
+            found = make()
+            most = room // found.nbytes if isinstance(found, np.ndarray) else KEPT
+            while len(kept) >= max(most, KEPT):
+                del kept[next(iter(kept))]
+        kept[key] = found  # the last in order is the latest
+        return found
+
+
+def places(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+    """Numbers of the windows that samples at times (n,) lie in: over a gap of years there are none."""
+    width, every = WIDTH * scale.time, EVERY * scale.time
+    last = np.floor((t[-1] - t[0] - width + 1e-9) / every)
+    reach = np.ceil(width / 2 / every)
+    near = np.unique(np.round((t - t[0] - width / 2) / every))
+    found = np.unique(near[:, None] + np.arange(-reach, reach + 1.0))
+    return found[(found >= 0.0) & (found <= last)]
+
+
+def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindows:
+    """The windows of a run with half of the samples or more, all commands, and thrusters at work.
+
+    Args:
+        smoothed: the run.
+        horizon: length of the windows in which models predict it [s]; by default that of its ship.
+    """
+    run, scale = smoothed.track.run, smoothed.scale
+    t, half = run.time, 0.5 * WIDTH * scale.time
+    middles = t[0] + half + EVERY * scale.time * places(t, scale)
+    known = np.isfinite(smoothed.nu).all(axis=1)
+    fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
+    gone = np.cumsum(np.concatenate([[0], ~known]))
+    busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
+    first = np.searchsorted(t, middles - half, side="left")
+    last = np.searchsorted(t, middles + half, side="right")
+    count = last - first
+    # Stretches know nothing of each other: no window lies in two.
+    parts = np.cumsum(np.concatenate([[0], breaks(np.arange(t.size), smoothed.track)]))
+    whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
+    kept = (
+        whole
+        & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
+        & (count > 3)
+        & (gone[last] == gone[first])
+        & (2 * (fresh[last] - fresh[first]) >= count)
+        & (busy[last] > busy[first])
+    )
+    middles, first, last = middles[kept], first[kept], last[kept]
+    # Where no sample is at its edge, a window begins between two.
+    first = np.where(t[first] > middles - half + AT_EDGE * half, np.maximum(first - 1, 0), first)
+    last = np.where(t[last - 1] < middles + half - AT_EDGE * half, np.minimum(last + 1, t.size), last)
+    rows = np.repeat(np.arange(middles.size), last - first)
+    columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
+    starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
+    area, share, step = _span(t, middles[rows], half, columns)
+    area_before, share_before, step_before = _span(t, middles[rows], half, columns - 1)
+    shape = (middles.size, t.size)
+    block = max(BLOCK * scale.time, float(t[-1] - t[0]) / BLOCKS)
+
+    def matrix(values: np.ndarray) -> csr_matrix:
+        return csr_matrix((values, columns, starts), shape=shape)
+
+    return WeakWindows(
+        smoothed,
+        middles,
+        np.floor((middles - t[0]) / block).astype(int),
+        matrix(area - share + share_before),
+        matrix(area_before / step_before - area / step),
+        matrix(area),
+        horizon or HORIZON * scale.time,
+    )
+
+
+def _span(
+    t: np.ndarray, middle: np.ndarray, half: float, row: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of the time from a row to the next: the kernel's area, its part of the next row, and its length.
+
+    Args:
+        t: (n,), times of the rows [s].
+        middle: (m,), of windows [s].
+        half: their half width [s].
+        row: (m,), a row of each; before the first and after the last there is no time.
+    """
+    a, b = t[np.maximum(row, 0)], t[np.minimum(row + 1, t.size - 1)]
+    low, high = (np.clip((x - middle) / half, -1.0, 1.0) for x in (a, b))
+    area = kernel_integral(high) - kernel_integral(low)
+    step = np.where(b > a, b - a, 1.0)
+    moment = half * (kernel_moment(high) - kernel_moment(low)) + (middle - a) * area
+    return area, moment / step, step
+
+
+def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
+    """Runs of which no two have the same name: those that had it are numbered."""
+    found, seen = [], Counter[str]()
+    for w in data:
+        name, s = w.run.name, w.smoothed
+        seen[name] += 1
+        if seen[name] > 1:
+            run = replace(w.run, name=f"{name} ({seen[name]})")
+            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
+        found.append(w)
+    return found
+
+
+def omega(w: WeakWindows, model: Model) -> np.ndarray:
+    """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
+
+    An acceleration counts as a force by the inertia of the model that this one was made from.
+    """
+    model = model.during(w.run.name)
+    of_pose = model.ship.effects.of_kind("measurement")
+    names = [p.name for e in of_pose if e.function is not None for p in e.parameters]
+    measured = tuple((name, model.vessel.get(name, 0.0)) for name in names)
+    ship = (measured, tuple(sorted(model.vessel.items())))
+    water = model.hull.params.water
+    drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
+    eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
+    free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
+
+    def met() -> np.ndarray:
+        return halfway(w, inflow_along(w, model, eta, nu))
+
+    def drives() -> np.ndarray:
+        return w.held @ thrust_along(w, model, w.recall("met", (measured, water), met))
+
+    driven = _acting(w, model, w.recall("driven", drive, drives), eta, nu)
+    return (change - free - by_mass(model, driven)) @ model.reference_mass.T
+
+
+def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
+    model = model.during(w.run.name)
+    eta = np.where(w.known[:, None], w.smoothed.eta, 0.0)
+    hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
+    driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
+    return hull + _acting(w, model, driven, eta, nu)
+
+
+def _acting(
+    w: WeakWindows, model: Model, driven: np.ndarray, eta: np.ndarray, nu: np.ndarray
+) -> np.ndarray:
+    """Force (K, 3) on the hull, for that of the thrusters over the windows, with what is given."""
+    force = driven @ model.effective_thrust.T
+    given = model.given.get(w.run.name)
+    return force if given is None else force + w.smooth @ given.at(eta, nu)
+
+
+def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
+    """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
+
+    That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
+    sideways, what its inertia asks for the motion that was measured.
+
+    Args:
+        data: windows of each run.
+        model: by whose inertia an acceleration is a force.
+    """
+    force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
+    idle = ~force.any(axis=0)
+    if idle.any():
+        nu = [np.where(w.known[:, None], w.smoothed.nu, 0.0) for w in data]
+        change = np.concatenate([w.slope @ x for w, x in zip(data, nu, strict=True)])
+        force[:, idle] = (change @ model.reference_mass.T)[:, idle]
+    return force
+
+
+def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Velocity (n, 3) with which a ship's thrusters meet the water, at its pose and velocity (n, 3)."""
+    return np.column_stack(inflow(vessel.State._make([*eta.T, *nu.T, w.run.time]), model))
+
+
+def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
+
+    Args:
+        w: windows of the run.
+        model: whose thrusters.
+        nu: (n, 3), of :func:`inflow_along`; by default that of the smoothed motion, halfway.
+    """
+    model = model.during(w.run.name)
+    if nu is None:
+        s, known = w.smoothed, w.known[:, None]
+        eta, nu = (np.where(known, x, 0.0) for x in (s.eta, s.nu))
+        nu = halfway(w, inflow_along(w, model, eta, nu))
+    return thrust(w.run, model, _response(w, model), nu)
+
+
+def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
+    """Velocity (n, 3) between each sample of a run and the next, at which a thruster's force is taken.
+
+    A force that goes with speed, as a rudder's, would else come half a sampling period late.
+
+    Args:
+        w: windows of the run.
+        nu: (n, 3), at the samples, zero where it is not known.
+    """
+    middle = nu.copy()
+    half = np.where(w.known[:-1] & w.known[1:], 0.5, 0.0)
+    middle[:-1] += half[:, None] * np.diff(nu, axis=0)
+    return middle
+
+
+def arriving(w: WeakWindows, model: Model) -> np.ndarray:
+    """Commands (sets, k, n) that reach the model's thrusters, mean from each sample to the next."""
+    return _response(w, model)[0]
+
+
+def _response(w: WeakWindows, model: Model) -> np.ndarray:
+    key = Response.key(model)
+    return w.recall("response", key, lambda: _response_to(w, model).between_samples, MEMORIES)
+
+
+def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
+    """tau (n, 3) [N, N, N m] of a run's commands at rest, as late as the model's thrusters follow."""
+    if not Response(w.run, model).slow:
+        return w.run.tau_cmd
+    return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
+
+
+def _response_to(w: WeakWindows, model: Model) -> Response:
+    return Response(w.run, model, not at_rest(w.smoothed))
+
+
+def remember_responses(data: Sequence[WeakWindows], models: Sequence[Model]) -> None:
+    """Compute what the thrusters of some models make of the commands of all runs, and keep it."""
+    missing: dict[Any, dict[str, tuple[WeakWindows, Model]]] = {}
+    for w in data:
+        for model in (m.during(w.run.name) for m in models):
+            key = Response.key(model)
+            if key not in w.memory.get("response", {}):
+                missing.setdefault(key, {})[w.run.name] = w, model
+
+    def between(one: dict[str, tuple[WeakWindows, Model]]) -> list[np.ndarray]:
+        responses = [_response_to(*of_run) for of_run in one.values()]
+        step_together(responses)
+        return [r.between_samples for r in responses]
+
+    found = for_each(between, [*missing.values()])
+    for (key, one), of_runs in zip(missing.items(), found, strict=True):
+        for (w, _), of_run in zip(one.values(), of_runs, strict=True):
+            w.recall("response", key, lambda of_run=of_run: of_run, MEMORIES)
+
+
+def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust.
+
+    Args:
+        model: of the ship.
+        time: (n,) [s].
+        eta: (n, 3) true pose [m, m, rad].
+        nu: (n, 3) body-fixed velocity over ground.
+    """
+    s = vessel.State._make([*eta.T, *nu.T, time])
+    nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
+    return np.column_stack(np.broadcast_arrays(*nu_dot))
+
+
+def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
+    """M^-1 of a force (n, 3)."""
+    X, Y, N = force.T
+    return np.column_stack(accelerated(model.hull.hull.inverse, X, Y, N))
+
+
+def _motion(w: WeakWindows, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
+    motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
+    # Columns in one piece each: all that is computed of them goes along time.
+    eta, nu = (np.where(w.known, np.concatenate(part), 0.0).T for part in motion)
+    return eta, nu, w.slope @ nu

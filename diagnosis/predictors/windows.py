@@ -1,0 +1,260 @@
+"""Window prediction error: how far a model departs from the measurement within some seconds.
+
+A run is cut into consecutive windows, the remainder is dropped. In each the model starts from the
+smoothed state, with the thrusters' history from the commands before, and is compared with every raw
+sample that is no spike. Longer predictions say nothing: the nominal hull is unstable.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ops import wrap
+
+from ..runs import Smoothed
+from .prediction import LONGEST_STEP, Starts, by_clock, predict
+from .ship_model import Model
+from .weak_form import HORIZON
+
+# Times the scale of the ship.
+FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
+LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
+MIN_COVERAGE = 0.5  # of a window's samples; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class WindowErrors:
+    """Root mean square errors of prediction in each window; inf where the model diverges.
+
+    Attributes:
+        run: (w,), number of each window's run.
+        start: (w,), when it starts [s].
+        samples: (w,), number of samples that it was compared with.
+        position: (..., w) [m], over north and east together.
+        heading: (..., w) [rad].
+    """
+
+    run: np.ndarray
+    start: np.ndarray
+    samples: np.ndarray
+    position: np.ndarray
+    heading: np.ndarray
+
+    def over_all(self, run: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Position [m] and heading [rad], over all samples of one run or of all; NaN without any.
+
+        Returns:
+            Two arrays without the last axis of ``position``.
+        """
+        chosen = np.ones(self.run.size, bool) if run is None else self.run == run
+        n = self.samples[chosen]
+        squares = (np.square(e[..., chosen]) @ n for e in (self.position, self.heading))
+        with np.errstate(invalid="ignore"):
+            position, heading = (np.sqrt(s / np.sum(n)) for s in squares)
+        return position, heading
+
+
+class Windows:
+    """The windows of some runs, in which models are compared with the measurement.
+
+    Args:
+        runs: smoothed runs of one ship.
+        length: of the windows [s]; by default that of the ship.
+
+    Attributes:
+        length: of the windows [s].
+        run, start: (w,), number of each window's run, and when it starts [s].
+        sample_window: (samples,), the window of each sample that is used.
+        measured: (samples, 3), the raw pose [m, m, rad].
+        since: (samples,), time since its window began [s].
+
+    Raises:
+        InputError: no run has a window with enough samples.
+    """
+
+    def __init__(self, runs: Sequence[Smoothed], length: float | None = None) -> None:
+        self.length = length or HORIZON * runs[0].scale.time
+        parts = [usable_windows(smoothed, self.length) for smoothed in runs]
+        counts = [p.first_rows.size for p in parts]
+        if not sum(counts):
+            raise InputError(f"no window of {self.length:.3g} s has enough samples")
+        before = np.cumsum([0, *counts[:-1]])
+        self.run = np.repeat(np.arange(len(parts)), counts)
+        self.start = np.concatenate([p.time[p.first_rows] for p in parts])
+        self.sample_window = np.concatenate([p.window + a for p, a in zip(parts, before, strict=True)])
+        self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
+        self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
+        self._groups: list[tuple[Starts, np.ndarray]] = []
+        for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
+            members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
+            starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
+            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
+            self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
+
+    def after(self, seconds: float) -> "Windows":
+        """The same windows without the samples of their first seconds.
+
+        Raises:
+            InputError: nothing is left of one.
+        """
+        kept = copy(self)
+        late = self.since >= seconds
+        kept.sample_window, kept.since = self.sample_window[late], self.since[late]
+        kept.measured = self.measured[late]
+        if np.unique(kept.sample_window).size < self.run.size:
+            raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
+        return kept
+
+    def finer(self, parts: int) -> "Windows":
+        """The same windows, predicted with steps that are divided into so many."""
+        kept = copy(self)
+        kept._groups = [
+            (replace(s, h=s.h / parts, steps=s.steps * parts), windows) for s, windows in self._groups
+        ]
+        return kept
+
+    def residuals(self, model: Model | None = None) -> np.ndarray:
+        """Measured minus predicted pose at each sample that is used.
+
+        Args:
+            model: the nominal one by default; a parameter that is an array (p, 1) stands for p models
+                at once.
+
+        Returns:
+            (samples, 3) [m, m, rad], heading wrapped; (p, samples, 3) for p models.
+
+        Raises:
+            InputError: an unknown name.
+        """
+        model = model or Model()
+        shapes = [np.shape(v)[:1] for v in (*model.vessel.values(), *model.thrusters.values())]
+        models = np.broadcast_shapes(*shapes)
+        found = np.empty((*(models or (1,)), *self.measured.shape))
+        for starts, windows in self._groups:
+            place = np.full(self.run.size, -1)
+            place[windows] = np.arange(windows.size)
+            mine = place[self.sample_window] >= 0
+            column = place[self.sample_window[mine]]
+            steps = predict(starts, model)
+            pose = between_steps(steps, column, self.since[mine] / starts.h)
+            found[:, mine] = self.measured[mine] - pose
+        found[..., 2] = wrap(found[..., 2])
+        return found if models else found[0]
+
+    def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
+        """Residuals (samples, 3) of some models, many predicted at once."""
+        found: dict[int, np.ndarray] = {}
+        for chosen, together in by_clock(models):
+            each = np.broadcast_to(self.residuals(together), (len(chosen), *self.measured.shape))
+            found |= zip(chosen, each, strict=True)
+        return [found[k] for k in range(len(models))]
+
+    def errors(self, model: Model | None = None) -> WindowErrors:
+        """The window prediction error of a model, argument as of :meth:`residuals`."""
+        return self.summary(self.residuals(model))
+
+    def summary(self, residuals: np.ndarray) -> WindowErrors:
+        """Root mean squares by window of the result (..., samples, 3) of :meth:`residuals`."""
+        samples = np.bincount(self.sample_window, minlength=self.run.size)
+        edges = np.cumsum([0, *samples[:-1]])  # samples lie window by window
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.add.reduceat(np.nan_to_num(residuals**2, nan=np.inf), edges, axis=-2)
+            mean = squares / samples[:, None]
+            position, heading = np.sqrt(mean[..., 0] + mean[..., 1]), np.sqrt(mean[..., 2])
+        return WindowErrors(self.run, self.start, samples, position, heading)
+
+
+class RunWindows(NamedTuple):
+    """The windows of one run that can be used.
+
+    Attributes:
+        smoothed: the run.
+        first_rows: (w,), row of each window's first sample.
+        rows, window: (samples,), row and window of each sample that is used.
+    """
+
+    smoothed: Smoothed
+    first_rows: np.ndarray
+    rows: np.ndarray
+    window: np.ndarray
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.smoothed.time
+
+    @property
+    def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
+        """Step of integration [s], which divides the sample period; names of the commands."""
+        row = round(float(np.median(np.diff(self.time))), 9)
+        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
+        return row / parts, self.smoothed.track.run.signals
+
+
+def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
+    """The windows of a length [s] of a run that have their first sample and at least half of all."""
+    track, used, period = smoothed.track, smoothed.used, smoothed.track.period
+    since = smoothed.time - smoothed.time[0] + 0.25 * period
+    number = np.floor(since / length).astype(int)
+    complete = int((since[-1] + period) // length)
+    measured = np.flatnonzero(~track.between & (number < complete))
+    _, at = np.unique(number[measured], return_index=True)
+    first = measured[at]  # the first sample of each window that has any
+    prompt = since[first] - length * number[first] < period
+    chosen, samples = np.unique(number[used], return_counts=True)
+    full = chosen[samples >= MIN_COVERAGE * round(length / period)]
+    first = first[prompt & used[first] & np.isin(number[first], full)]
+    rows = np.flatnonzero(used & np.isin(number, number[first]))
+    return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def free_runs(
+    smoothed: Smoothed, models: Sequence[Model], begin: float = -np.inf
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """A run as models predict it from one state, by the commands that were given.
+
+    Args:
+        smoothed: the run, of which ``LONGEST_FREE`` seconds at the most.
+        models: what predicts it.
+        begin: the state is that of the last sample before [s], else of the first there is.
+
+    Returns:
+        (n,), times at equal distances [s], and for each model (n, 3), pose [m, m, rad]; not finite where
+        the model runs away.
+    """
+    usable = np.flatnonzero(smoothed.used)
+    before = usable[smoothed.time[usable] <= begin]
+    first = before[-1:] if before.size else usable[:1]
+    step, _ = RunWindows(smoothed, first, first, first).step_and_commands
+    h = max(step, FREE_STEP * smoothed.scale.time)
+    longest = LONGEST_FREE * smoothed.scale.time
+    seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
+    starts = Starts(((smoothed, first),), h, int(seconds / h))
+    found: dict[int, np.ndarray] = {}
+    for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
+        poses = predict(starts, together)
+        found |= {k: poses[:, :, min(n, poses.shape[2] - 1), 0] for n, k in enumerate(chosen)}
+    times = smoothed.time[first[0]] + h * np.arange(starts.steps + 1)
+    return times, [found[k] for k in range(len(models))]
+
+
+def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Predicted pose at the samples, by linear interpolation between steps.
+
+    Args:
+        predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
+        column: (samples,), the window of each sample.
+        place: (samples,), number of steps from the window's start to it, a fraction included.
+
+    Returns:
+        (p, samples, 3) [m, m, rad].
+    """
+    step = np.clip(np.floor(place + 1e-6).astype(int), 0, len(predicted) - 2)
+    low, high = (predicted[k, :, :, column] for k in (step, step + 1))
+    with np.errstate(invalid="ignore", over="ignore"):
+        change = high - low
+        change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
+        return (low + (place - step)[:, None, None] * change).transpose(2, 0, 1)

@@ -1,0 +1,225 @@
+"""Which samples of a measured run are usable: faults are counted and reported, never repaired."""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ops import wrap
+from fmus.scale import REFERENCE, Scale
+
+from .columns.unit_check import refuse_time, refuse_units
+from .files.reading import Run
+from .files.telegrams import filled
+
+# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
+SHORTEST = 8.0  # s, of a run: one prediction window
+# Of what regular sampling would give, gaps of up to GAP seconds filled. Chosen: what is rarer comes in
+# bursts, of which nothing can be differentiated.
+SPARSE, GAP = 0.05, 30.0
+MOST_OUT = 0.1  # largest share of rows whose time may be out of order (chosen)
+LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate around it (chosen)
+# s, or LONG periods if that is longer: gaps are told, and over one between commands none is known.
+# Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
+HELD = 0.5
+EMPTY = 2.5  # sampling periods between two measurements, of which the rows between may be empty (chosen)
+NEAR = 1.0  # s, before and after a gap of the heading, by whose yaw rate it is unwrapped (chosen)
+
+
+class Counts(NamedTuple):
+    """Samples of a run, and what became of them: used is the rest."""
+
+    samples: int
+    frozen: int
+    dropped: int
+    spikes: int
+    used: int
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A run with its samples judged.
+
+    Attributes:
+        run: its rows in the order of time, rows without a time of their own left out.
+        pose: (n, 3), pose [m, m, rad], heading continuous over turns; NaN where it is not valid.
+        frozen: (n,), all three channels repeat the measurement before.
+        dropped: (n,), NaN, infinite, or all three zero.
+        between: (n,), rows of a log between two measurements of a slower measurement system.
+        period: of the measurement [s].
+        out: rows left out, as their time stamp is missing, repeated or goes backwards.
+        notes: what was found, a line each.
+        scale: of the ship.
+    """
+
+    run: Run
+    pose: np.ndarray
+    frozen: np.ndarray
+    dropped: np.ndarray
+    between: np.ndarray
+    period: float
+    out: int
+    notes: tuple[str, ...]
+    scale: Scale = REFERENCE
+
+    @cached_property
+    def valid(self) -> np.ndarray:
+        """(n,), rows with a new measurement."""
+        return ~(self.frozen | self.dropped | self.between)
+
+    @cached_property
+    def silences(self) -> np.ndarray:
+        """(n,), number of the part of the run that each row lies in; odd parts are without commands.
+
+        A log in which most commands are missing writes them when they change: there they are held.
+        """
+        time, held = self.run.time, self.run.held
+        given = time if held is None or 2 * int(held.sum()) > time.size else time[~held]
+        silent = np.diff(given) > max(HELD * self.scale.time, LONG * float(np.median(np.diff(time))))
+        last, next_one = given[:-1][silent], given[1:][silent]
+        return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
+
+    def counts(self, spikes: int = 0) -> Counts:
+        """What became of the samples."""
+        frozen, dropped = int(self.frozen.sum()), int(self.dropped.sum()) + self.out
+        samples = int((~self.between).sum()) + self.out
+        return Counts(samples, frozen, dropped, spikes, samples - frozen - dropped - spikes)
+
+
+def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
+    """Judge the samples of a run.
+
+    Args:
+        run: as it was read.
+        anyway: whether a speed that no ship has, or a heading in degrees, is believed.
+        scale: of the ship.
+
+    Raises:
+        InputError: too short, time not in order, another unit than said, nothing valid, no motion.
+    """
+    where = f"run '{run.name}'"
+    kept = in_order(run.time)
+    out = run.time.size - kept.size
+    if out > MOST_OUT * run.time.size:
+        raise InputError(f"{where}: time does not grow in {out} of {run.time.size} rows")
+    notes = list(run.notes)
+    if out:
+        notes.append(f"{out} rows left out: time missing, repeated or backwards")
+        run = run.rows(kept)
+    with np.errstate(over="ignore"):
+        row = float(np.median(np.diff(run.time))) if kept.size > 1 else 0.0
+    seconds = float(run.time[-1] - run.time[0]) + row if kept.size > 1 else 0.0
+    shortest = SHORTEST * scale.time
+    if seconds < shortest * (1.0 - 1e-6):
+        raise InputError(f"{where} is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed")
+    dropped = lost(run.pose)
+    repeats = repeated(run.pose, ~dropped)
+    fresh = np.flatnonzero(~dropped & ~repeats)
+    if fresh.size < 4:
+        raise InputError(f"{where} does not move: its pose is frozen or missing throughout")
+    between = np.zeros_like(repeats)
+    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2])
+    if between.any():
+        fresh = fresh[~between[fresh]]
+        notes.append("rows between two measurements were filled by straight lines: they do not count")
+    period = float(np.median(np.diff(run.time[fresh])))
+    refuse_time(row, seconds, where, run.called or {}, scale)
+    steps = np.minimum(np.diff(run.time), GAP * scale.time)
+    if SPARSE * steps.sum() > row * run.time.size:
+        raise InputError(
+            f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
+        )
+    if period > 1.5 * row:  # a log that is faster than the measurement
+        after = np.searchsorted(fresh, np.arange(repeats.size))
+        last = run.time[fresh][np.maximum(after - 1, 0)]
+        between |= repeats & (run.time - last < period - 0.5 * row)
+        until = run.time[fresh][np.minimum(after, fresh.size - 1)] - last
+        between |= np.isnan(run.pose).all(axis=1) & (until < EMPTY * period)
+        dropped &= ~between
+        notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
+    frozen = repeats & ~between
+    pose = np.where((dropped | repeats | between)[:, None], np.nan, run.pose)
+    refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
+    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period, NEAR * scale.time)
+    _moves(pose[fresh], where)
+    notes += _gaps(run.time[fresh] - run.time[0], max(HELD * scale.time, LONG * period))
+    return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
+
+
+def in_order(time: np.ndarray) -> np.ndarray:
+    """Rows of the longest part of some times [s] that grows strictly; non-finite ones are left out."""
+    rows = np.flatnonzero(np.isfinite(time))
+    if (np.diff(time[rows]) > 0.0).all():
+        return rows
+    ends: list[float] = []  # the smallest time at which a part of that length can end
+    last: list[int] = []
+    before = np.full(time.size, -1)
+    for row in rows.tolist():
+        place = bisect_left(ends, time[row])
+        before[row] = last[place - 1] if place else -1
+        ends[place : place + 1] = [float(time[row])]
+        last[place : place + 1] = [row]
+    found = [last[-1]]
+    while before[found[-1]] >= 0:
+        found.append(int(before[found[-1]]))
+    return np.array(found[::-1])
+
+
+def lost(pose: np.ndarray) -> np.ndarray:
+    """(n,): where a pose (n, 3) is no measurement: NaN, infinite, or all zero."""
+    return ~np.isfinite(pose).all(axis=1) | (pose == 0.0).all(axis=1)
+
+
+def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """(n,): where a pose, or channels of it, (n, k), is to the bit the last one that was there."""
+    rows = np.flatnonzero(there)
+    repeats = np.zeros(there.size, bool)
+    repeats[rows[1:]] = (np.diff(pose[rows], axis=0) == 0.0).all(axis=1)
+    return repeats
+
+
+def unwrap(time: np.ndarray, psi: np.ndarray, period: float, reach: float = NEAR) -> np.ndarray:
+    """The heading [rad] continuous over turns.
+
+    Over a long gap it may have turned by more than half a turn: then that step is taken which comes
+    nearest to what the yaw rate just before and just after, within some reach [s], would have turned it.
+    """
+    step, dt = wrap(np.diff(psi)), np.diff(time)
+    rate = step / dt
+    for k in np.flatnonzero(dt > LONG * period):
+        near = (np.abs(time[1:] - time[k]) < reach) | (np.abs(time[:-1] - time[k + 1]) < reach)
+        near &= dt <= LONG * period
+        turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
+        step[k] = turn + wrap(step[k] - turn)
+    return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
+
+
+def _moves(pose: np.ndarray, where: str) -> None:
+    """Refuse a run in which there is nothing but noise."""
+    reach = np.diff(np.quantile(pose, (0.1, 0.9), axis=0), axis=0)[0]
+    if not (reach > 6.0 * noise(pose)).any():
+        raise InputError(f"{where} does not move: its pose is noise around a place")
+
+
+def noise(values: np.ndarray) -> np.ndarray:
+    """Standard deviation of the noise of each channel, from third differences.
+
+    Args:
+        values: (n, channels) in a row; that some steps are longer than others does little harm, as
+            the median is taken.
+    """
+    third = np.abs(np.diff(values, 3, axis=0))
+    return 1.4826 * np.median(third, axis=0) / np.sqrt(20.0)
+
+
+def _gaps(time: np.ndarray, least: float) -> list[str]:
+    """A line for the gaps above some time [s] between times since the start, if there are any."""
+    dt = np.diff(time)
+    long = dt > least
+    if not long.any():
+        return []
+    longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"
+    return [f"a gap of {longest}" if long.sum() == 1 else f"{long.sum()} gaps, the longest {longest}"]

@@ -1,0 +1,145 @@
+"""The line for the file beside a measurement, where it seems to be read otherwise than meant."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from cosim import InputError
+
+from ..files.text_layout import text_layout
+from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
+
+SI = ("s", "m", "rad", "N", "N.m", "1", "m/s", "rad/s", "m/s2")  # need not be said
+SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+
+
+class Change(NamedTuple):
+    """What a signal should be read as.
+
+    Attributes:
+        source: the signal whose column it should have.
+        sign: of its axis.
+        factor: of its unit.
+        offset: what is added then [SI].
+    """
+
+    source: str
+    sign: float = 1.0
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | None = None) -> str:
+    """What to put into the file beside a measurement so that columns are read otherwise.
+
+    Args:
+        path: of the measurement; None if it is in no file.
+        changes: signal -> what it should be read as.
+        name: of the column; None: as it is.
+
+    Returns:
+        The end of a sentence; empty where there is no such file, as beside a log.
+    """
+    if path is None or path.is_dir() or path.suffix not in (".csv", ".parquet") or not changes:
+        return ""
+    layout = read_layout(path) or Layout()
+    columns = {}
+    for signal, (source, sign, factor, offset) in changes.items():
+        column = layout.column(source)
+        units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
+        wanted = factor * units.get(column.unit or "", 1.0)
+        unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
+        flip = column.flip != (sign < 0.0)
+        other = {"name": name or column.name, "unit": unit, "factor": column.factor, "flip": flip}
+        other["noise"] = column.noise
+        other["offset"] = sign * column.offset
+        if unit is None:
+            other |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
+        if offset:
+            other["offset"] += float(f"{offset / units.get(unit or '', 1.0):.4g}")
+        columns[signal] = Column.model_validate(other).model_dump(exclude_defaults=True)
+        if columns[signal].get("unit") in SI:
+            del columns[signal]["unit"]
+    return f"; {_line(path, {'columns': columns})}"
+
+
+def _line(path: Path, told: Mapping[str, Any]) -> str:
+    return f"put {json.dumps(told)} into '{path}.json'"
+
+
+def refuse_separator(path: Path, header: str) -> None:
+    """Refuse a CSV file whose one column is a row of cells, between other separators.
+
+    Raises:
+        InputError: with the line that tells the separator.
+    """
+    found = text_layout(path, UTF_8)
+    if found is None or found.separator == Layout().separator:
+        return
+    raise InputError(
+        f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
+        f"{found.separator!r}; {_line(path, found.model_dump(exclude_defaults=True))}"
+    )
+
+
+def _put(path: Path, layout: Layout, **changes: Any) -> str:
+    """What to put into the file beside a measurement, with what it says now."""
+    return _line(path, layout.model_dump(exclude_defaults=True) | changes)
+
+
+def refuse_encoding(path: Path, layout: Layout) -> None:
+    """Refuse a CSV file whose text is not UTF-8, unless another encoding was told.
+
+    Raises:
+        InputError: with the line that tells the encoding that it may have.
+    """
+    content = path.read_bytes()
+    if layout.encoding == UTF_8 and b"\0" not in content:
+        line = _put(path, layout, encoding="latin-1")
+        raise InputError(f"'{path}' is no text in UTF-8; if it is in Latin-1, {line}")
+
+
+def refuse_preamble(path: Path, layout: Layout, names: Sequence[str]) -> None:
+    """Refuse a CSV file whose names of columns are in a later line than was told.
+
+    Raises:
+        InputError: with the line that tells where they are.
+    """
+    if layout.column("time").name in names:
+        return
+    found = text_layout(path, layout.encoding)
+    if found is None or (found.skip, found.separator) == (layout.skip, layout.separator):
+        return
+    line = _put(path, layout, **found.model_dump(exclude_defaults=True))
+    raise InputError(f"'{path}' has the names of its columns in line {found.skip + 1}; {line}")
+
+
+def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
+    """Refuse a CSV file with a line of units below the names, unless that was told.
+
+    Raises:
+        InputError: with the line that tells it.
+    """
+    cells = table.drop(columns=layout.column("time").name, errors="ignore").head(2).astype("string")
+    numbers = cells.apply(lambda column: pd.to_numeric(column.str.replace(",", "."), errors="coerce"))
+    if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
+        return
+    if numbers.iloc[0].isna().all():
+        shown = ", ".join(cells.iloc[0])[:SHOWN]
+        told = _put(path, layout, units_line=True)
+        raise InputError(
+            f"'{path}' has a line of units below the names ({shown}); {told}, with the units of "
+            'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
+        )
+
+
+def decimal_comma(path: Path, layout: Layout, cell: str) -> str:
+    """The end of a message about a cell that is no number: what to do if it is one such as 0,5."""
+    if not DECIMAL_COMMA.fullmatch(cell.strip()):
+        return ""
+    return f"; if a comma begins the decimals, {_put(path, layout, decimal=',')}"

@@ -1,0 +1,290 @@
+"""Measured runs in one form, from whatever file they are in.
+
+Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and commands (see
+:mod:`.columns` for other names and units), a log of this project (its folder or file), and the MATLAB
+files that NTNU publishes of CyberShip Enterprise 1.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from cosim import InputError
+from cosim.errors import nearest
+from cosim.results import read_options
+from fmus.ship import Ship, ship
+from fmus.ship_description import Description
+
+from ..columns.channels import BESIDE, outputs
+from ..columns.columns import (
+    ALL,
+    FIVE,
+    LOG,
+    OF_UNIT,
+    POSE,
+    POWER,
+    QUANTITY,
+    TAU,
+    THREE,
+    Layout,
+    layout_of,
+    log_layout,
+    log_of,
+    read_layout,
+    signals,
+    to_si,
+)
+from ..columns.side_car import refuse_preamble, refuse_separator, refuse_units
+from ..columns.unit_factors import UNITS
+from .csv_tables import csv_names, csv_table
+from .matlab_files import read_matlab
+from .table_cells import date_stamps, numbers
+
+LOGS = ("log.csv", "log.parquet")
+# Real commands overshoot by rounding; far beyond they are in another unit.
+MOST_COMMAND = 1.05  # of the full command
+# N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
+# below where sums of squares overflow.
+MOST_FORCE, MOST_POWER = 1e9, 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One measured run, as it was found. A command acts from its time to the next.
+
+    Attributes:
+        name: of the file, or of the folder of a log.
+        time: (n,) [s].
+        pose: (n, 3), measured north, east, heading [m, m, rad]; lost samples are NaN or zeros.
+        tau_cmd: (n, 3), commanded force [N, N, N m] after clipping.
+        commands: (n, k), in one of :attr:`fmus.ship.Ship.layouts`; None if not known.
+        power: (n, m), force of thrusters as shares of that at full power; None if full.
+        notes: what was found that is not as it should be, a line each.
+        held: (n,), rows whose commands are missing in the file, and held; None if none is.
+        called: signal -> its column in the file, of those with another name; None if there is none.
+        file: that it was read from; None if it was not.
+        absent: commands that have no column, and are taken as zero.
+        signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
+        measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
+        noise: signal -> standard deviation that the file beside tells [SI].
+        ship: that was measured; None: CyberShip Enterprise 1.
+        trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
+    """
+
+    name: str
+    time: np.ndarray
+    pose: np.ndarray
+    tau_cmd: np.ndarray
+    commands: np.ndarray | None = None
+    power: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+    held: np.ndarray | None = None
+    called: Mapping[str, str] | None = None
+    file: Path | None = None
+    absent: tuple[str, ...] = ()
+    signals: tuple[str, ...] = THREE
+    measured: Mapping[str, np.ndarray] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+    ship: Description | None = None
+    trial: str | None = None
+
+    @property
+    def commanded(self) -> dict[str, np.ndarray]:
+        """Signal -> (n,), the commands in the form in which they were given."""
+        forms = [(self.signals, self.commands), (POWER, self.power)]
+        given = [form for form in forms if form[1] is not None] or [(TAU, self.tau_cmd)]
+        return {s: c for names, table in given for s, c in zip(names, table.T, strict=True)}
+
+    def rows(self, keep: np.ndarray) -> "Run":
+        """The run with only some of its rows."""
+        columns = {f.name: getattr(self, f.name) for f in fields(self)}
+        kept = {n: c[keep] for n, c in columns.items() if isinstance(c, np.ndarray)}
+        return replace(self, **kept, measured={s: c[keep] for s, c in self.measured.items()})
+
+
+def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None) -> Run:
+    """A measured run.
+
+    Args:
+        path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
+        layout: in place of what the file beside it says.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
+
+    Raises:
+        InputError: absent, unreadable, a column missing, or commands in another unit.
+    """
+    path = Path(path)
+    if path.is_dir():
+        found = [path / name for name in LOGS if (path / name).is_file()]
+        if not found:
+            raise InputError(f"no log in '{path}': log.csv is missing")
+        path = found[0]
+    elif not path.is_file():
+        near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
+    name = path.absolute().parent.name if path.name in LOGS else path.stem
+    of = of or ship()
+    is_matlab = path.suffix == ".mat" and of.commands is None
+    if is_matlab:
+        return replace(_run(name, read_matlab(path), f"'{path}'", of), file=path)
+    table = _tabular(path, layout, of.commands)
+    run = replace(_of_table(name, table, f"'{path}'", of), file=path)
+    told = read_options(path.parent).trial if path.name in LOGS else None
+    return run if told is None else replace(run, trial=told.kind)
+
+
+class _Table(NamedTuple):
+    """Signals of a table in SI, names of their columns where these are others, and their noise [SI]."""
+
+    columns: dict[str, np.ndarray]
+    called: dict[str, str]
+    noise: dict[str, float]
+    trial: str | None
+
+
+def _of_table(name: str, table: _Table, where: str, of: Ship) -> Run:
+    """A run of a table's signals."""
+    run = _run(name, table.columns, where, of)
+    return replace(run, called=table.called or None, noise=table.noise, trial=table.trial)
+
+
+def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
+    """A run of its signals, commands without a gap."""
+    forms = (FIVE, THREE) if of.commands is None else (tuple(of.commands),)
+    own = next((form for form in forms if form[0] in columns), forms[-1])
+    absent = tuple(s for s in TAU if s not in columns) if not columns.keys().isdisjoint(TAU) else ()
+    columns = columns | {s: np.zeros_like(columns["time"]) for s in absent}
+
+    def stack(group: tuple[str, ...]) -> np.ndarray | None:
+        return np.column_stack([columns[s] for s in group]) if group[0] in columns else None
+
+    tau, commands, power = (_held(stack(group)) for group in (TAU, own, POWER))
+    power = None if power is None else np.maximum(power, 0.0)
+    if of.commands is None and commands is not None:
+        most = float(np.abs(commands).max(initial=0.0))
+        if most > MOST_COMMAND:
+            raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
+    if power is not None and power.max(initial=0.0) > MOST_POWER:
+        raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
+    if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
+        raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
+    missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*ALL, *own)) if s in columns]
+    lost = sum(gaps.any() for gaps in missing)
+    if tau is None:
+        assert commands is not None
+        tau = of.commanded_force(commands, power)
+    notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
+    notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
+    pose = np.column_stack([columns[s] for s in POSE])
+    held = np.any(missing, axis=0) if lost else None
+    return Run(
+        name,
+        columns["time"],
+        pose,
+        tau,
+        commands,
+        power,
+        notes,
+        held,
+        absent=absent,
+        signals=own,
+        ship=of.description,
+        measured={s: c for s, c in columns.items() if s in {*BESIDE, *outputs(own)}},
+    )
+
+
+def _held(commands: np.ndarray | None) -> np.ndarray | None:
+    """Commands that keep their last value where one is missing, zero before the first."""
+    if commands is None:
+        return None
+    finite = np.where(np.isfinite(commands), commands, np.nan)
+    return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
+
+
+def _tabular(path: Path, layout: Layout | None, commands: Mapping[str, str] | None) -> _Table:
+    """Signals of a CSV or Parquet file."""
+    given = layout or read_layout(path)
+    try:
+        names = column_names(path, given or Layout())
+        if given is None and len(names) == 1:
+            refuse_separator(path, names[0])
+        layout = given or log_layout(path.parent, names, commands)
+        layout = layout or layout_of(names, {}, f"'{path}'", commands or ())
+        wanted = signals(layout, names, f"'{path}'", commands)
+        table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
+    except ImportError:
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+    except InputError:
+        raise
+    except Exception as error:  # a broken file makes the readers stumble in many ways
+        text = " ".join(str(error).split())
+        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
+    return _signals(table, layout, wanted, path, commands or {})
+
+
+def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None) -> Run:
+    """A measured run in a table.
+
+    Args:
+        frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
+            log of a run, :func:`cosim.log_frame`.
+        name: of the run.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
+
+    Raises:
+        InputError: a column is missing, or commands are in another unit.
+    """
+    of = of or ship()
+    where, names = f"the table '{name}'", [str(column) for column in frame.columns]
+    frame = frame.set_axis(names, axis=1)
+    is_log = LOG.column("x").name in names
+    log = LOG if of.commands is None else log_of(of.commands)
+    layout = log if is_log else layout_of(names, frame.attrs.get("units", {}), where, of.commands or ())
+    wanted = signals(layout, names, where, of.commands)
+    return _of_table(name, _signals(frame, layout, wanted, Path(name), of.commands or {}), where, of)
+
+
+def _signals(
+    table: pd.DataFrame,
+    layout: Layout,
+    wanted: Sequence[str],
+    path: Path,
+    commands: Mapping[str, str],
+) -> _Table:
+    columns, noise = {}, {}
+    quantities = QUANTITY | outputs(commands) | {s: OF_UNIT[unit] for s, unit in commands.items()}
+    for signal in wanted:
+        column = layout.column(signal)
+        cells = table[column.name]
+        stamps = date_stamps(cells, f"'{path}'") if signal == "time" else None
+        if stamps is None:
+            columns[signal] = to_si(numbers(cells, path, layout), signal, column, quantities[signal])
+        else:
+            columns[signal] = stamps
+        if column.noise is not None:
+            noise[signal] = column.noise * UNITS[quantities[signal]].get(column.unit or "", 1.0)
+    called = {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
+    return _Table(columns, called, noise, layout.trial)
+
+
+def column_names(path: Path, layout: Layout) -> list[str]:
+    """The names of the columns of a CSV or Parquet file."""
+    if path.suffix == ".parquet":
+        from pyarrow import parquet
+
+        return list(parquet.read_schema(path).names)
+    names = csv_names(path, layout)
+    refuse_preamble(path, layout, names)
+    return names
+
+
+def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
+    if path.suffix == ".parquet":
+        return pd.read_parquet(path, columns=wanted)
+    table = csv_table(path, layout, wanted)
+    refuse_units(path, layout, table)
+    return table

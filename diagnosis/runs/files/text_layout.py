@@ -1,0 +1,81 @@
+"""How the text of a table is laid out, read off its first lines."""
+
+import csv
+import math
+from collections import Counter
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+
+from ..columns.columns import UNITS, Layout
+
+SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
+LINES = 250  # that are looked at: far more than any preamble has (chosen)
+KNOWN = {unit for units in UNITS.values() for unit in units}
+
+
+def text_layout(path: Path, encoding: str) -> Layout | None:
+    """Separator, decimal mark, line of the names and of the units, as the first lines suggest.
+
+    Args:
+        path: of a CSV file.
+        encoding: of its text.
+
+    Returns:
+        A layout without columns; None if there is no table of numbers below a line of names.
+    """
+    with path.open(encoding=encoding, errors="replace", newline="") as file:
+        lines = list(islice(file, LINES))
+    found = [_with(separator, decimal, lines) for separator in SEPARATORS for decimal in ".,"]
+    best = max(found, key=lambda each: each[0])
+    return best[1]
+
+
+def table_cells(line: str, separator: str) -> list[str]:
+    """The cells of a line, without blanks around them."""
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+
+
+def bare_unit(text: str) -> str:
+    """A unit without the brackets around it."""
+    return text.strip().strip("[]()").strip()
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    if decimal == "," and "." in cell:
+        return False
+    try:
+        float(cell.replace(decimal, "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _with(separator: str, decimal: str, lines: Sequence[str]) -> tuple[float, Layout | None]:
+    """How much of the table is numbers with a separator and a decimal mark, and the layout of that."""
+    rows = [(k, table_cells(line, separator)) for k, line in enumerate(lines) if line.strip()]
+    widths = Counter(len(cells) for _, cells in rows)
+    width = max(widths, key=lambda n: widths[n], default=0)
+    if separator == decimal or width < 2:
+        return -1.0, None
+
+    def share(cells: Sequence[str]) -> float:
+        told = [cell for cell in cells if cell]
+        numbers = sum(_is_number(cell, decimal) for cell in told)
+        return numbers / len(told) if told and len(cells) == width else math.nan
+
+    shares = [share(cells) for _, cells in rows]
+    first = next((k for k, part in enumerate(shares) if part >= 0.5), 0)
+    if not first or len(rows[first - 1][1]) < 2:
+        return -1.0, None
+    told = [part for part in shares[first:] if math.isfinite(part)]
+    above = rows[first - 2][1] if first > 1 else []
+    below = rows[first - 1][1]
+    known = sum(bare_unit(cell) in KNOWN for cell in below)
+    # Names are all there and different.
+    is_units = len(above) == width == len(set(above) - {""}) and (
+        2 * known >= width or len(set(below)) < width
+    )
+    names = rows[first - 1 - is_units][0]
+    layout = Layout(separator=separator, decimal=decimal, skip=names, units_line=is_units)
+    return sum(told) / len(rows) + 1e-3 * (decimal == "."), layout

@@ -1,0 +1,108 @@
+"""What the channels of a run say of its motion, side by side: pose, velocity and yaw rate."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fmus.frames import rotate_to_earth
+
+from ..cleaning import in_order, lost, repeated
+from ..files.reading import Run
+from ..files.telegrams import filled
+
+FEWEST = 60  # samples; chosen: an estimate of a few constants and of two noises
+# Channels that give the velocity over ground, best first: with the heading, or without it.
+VELOCITIES = (("u", "v"), ("x_dot", "y_dot"), ("speed", "course"))
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The channels of a run, all of its rows in order.
+
+    Attributes:
+        run: its rows in the order of time.
+        rows: (k,), those with a measured pose.
+        psi: (n,), heading, continuous [rad].
+        velocity: (n, 2), over ground, north and east [m/s]; None if it is not measured.
+        rate: (n,), of turn [rad/s]; None if it is not measured.
+        by: the channels of the velocity.
+        filled: (n,), rows whose pose a line between two telegrams has filled.
+    """
+
+    run: Run
+    rows: np.ndarray
+    psi: np.ndarray
+    velocity: np.ndarray | None
+    rate: np.ndarray | None
+    by: tuple[str, str] | None
+    filled: np.ndarray
+
+    @property
+    def time(self) -> np.ndarray:
+        """(n,) [s], of the log."""
+        return self.run.time
+
+    @cached_property
+    def turned(self) -> np.ndarray:
+        """(n,): the yaw rate integrated over the log's time [rad]; zero where there is none."""
+        return integral(self.time, np.zeros_like(self.time) if self.rate is None else self.rate)
+
+    @cached_property
+    def gone(self) -> np.ndarray:
+        """(n, 2): the velocity integrated over the log's time [m]; zero where there is none."""
+        still = np.zeros((self.time.size, 2))
+        return integral(self.time, still if self.velocity is None else self.velocity)
+
+
+def evidence(run: Run) -> Evidence | None:
+    """What the channels of a run say; None where hardly anything is measured beside the pose."""
+    run = run.rows(in_order(run.time))
+    there = ~lost(run.pose)
+    fresh = np.flatnonzero(there & ~repeated(run.pose, there))
+    # A position that was held while the heading went on is of an earlier instant.
+    moved = np.flatnonzero(there & ~repeated(run.pose[:, :2], there))
+    fresh = moved if moved.size >= FEWEST else fresh
+    if fresh.size < FEWEST:
+        return None
+    between = np.zeros(run.time.size, bool)
+    between[fresh] = filled(run.time[fresh], run.pose[fresh, :2])
+    rows = fresh[~between[fresh]]
+    psi = np.interp(run.time, run.time[fresh], np.unwrap(run.pose[fresh, 2]))
+    by = next((pair for pair in VELOCITIES if all(_given(run, name) for name in pair)), None)
+    rate = _whole(run, "r") if _given(run, "r") else None
+    if by is None and rate is None:
+        return None
+    return Evidence(
+        run, rows, psi, None if by is None else velocity_over_ground(run, by, psi), rate, by, between
+    )
+
+
+def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n,) or (n, k) integrated from the first time [s] on, by trapezia."""
+    steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1)) * (values[1:] + values[:-1]) / 2.0
+    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(steps, axis=0)])
+
+
+def _given(run: Run, name: str) -> bool:
+    """Whether a channel is there in at least half of the rows, and does not stand still."""
+    values = run.measured.get(name)
+    return values is not None and np.isfinite(values).mean() > 0.5 and bool(np.nanstd(values) > 0.0)
+
+
+def _whole(run: Run, name: str) -> np.ndarray:
+    values = run.measured[name]
+    there = np.isfinite(values)
+    return np.interp(run.time, run.time[there], values[there])
+
+
+def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
+    """Velocity (n, 2) to north and east [m/s]."""
+    if by == ("x_dot", "y_dot"):
+        return np.column_stack([_whole(run, name) for name in by])
+    if by == ("speed", "course"):
+        speed, there = _whole(run, "speed"), np.isfinite(run.measured["course"])
+        course = np.unwrap(run.measured["course"][there])
+        course = np.interp(run.time, run.time[there], course)
+        return np.column_stack([speed * np.cos(course), speed * np.sin(course)])
+    return np.column_stack(rotate_to_earth(psi, _whole(run, "u"), _whole(run, "v")))

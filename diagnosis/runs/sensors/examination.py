@@ -1,0 +1,41 @@
+"""All checks of a run's channels, each on what the ones before have repaired."""
+
+from collections.abc import Callable
+
+from fmus.scale import Scale
+
+from ..files.reading import Run
+from .accelerations import accelerations
+from .motion import motion
+from .receivers import receivers
+from .sensor_finding import Examined
+from .through_water import through_water
+from .unit_faults import sway, units
+from .wraps import wraps
+
+# Each receives a run and the ship's scale; in the order in which one needs what others repair.
+CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
+    wraps,
+    units,
+    sway,
+    receivers,
+    motion,
+    accelerations,
+    through_water,
+)
+
+
+def examine(run: Run, scale: Scale) -> Examined:
+    """Hold channels that say the same twice against each other.
+
+    Args:
+        run: as it was read.
+        scale: of the ship.
+
+    Returns:
+        The run as far as its own channels repair it, and what they say of each other.
+    """
+    found = Examined(run)
+    for check in CHECKS:
+        found = found.plus(check(found.run, scale))
+    return found

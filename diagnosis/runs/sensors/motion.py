@@ -1,0 +1,358 @@
+"""Clock and constant faults of the channels of motion, estimated together."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from fmus.scale import Scale
+
+from ..cleaning import noise
+from ..files.reading import Run
+from .clock_path import DRIFT, HEADING, TURN, PathProblem, Solution, integral_of
+from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
+from .evidence import Evidence, evidence
+from .gaps import Gap, gaps
+from .repairing import Correction, corrected
+from .sensor_finding import Z95, Examined, SensorFinding
+
+SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
+# Fall of -2 log L by which a clock that wanders is believed: 0.1 % by chance is 10.8 for one variance.
+LIKELIER = 12.0
+DEVIATES = 20.0  # the same for the four coefficients of a compass' deviation: 0.1 % by chance is 18.5
+LEAST_CLOCK = 0.01  # of the rate: a clock that is nearer to one does no harm (chosen)
+STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
+TURNS = 0.02  # standard deviation of the yaw rate's scale up to which turns tell the clock (chosen)
+SWING = 2.0 * np.pi  # rad: headings all round, as a ship is swung to adjust its compass
+CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
+CLOCK_OR_COMPASS = "a compass that is off by heading would look the same"
+CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
+# Of what a clock changes, in squares of the standard deviations of its blocks: what way and turn may
+# differ by beyond noise. Chosen: with more, most of it is not what both tell.
+MOST_APART = 0.5
+TWO_CLOCKS = (
+    "position and speed would need another clock than heading and yaw rate: something else is wrong "
+    "there, such as a filter, or values that were held, and nothing but a delay is repaired"
+)
+STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
+LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
+LEAST_NOISE = 1e-6  # m, rad; keeps the equations well-posed where nothing is noisy
+
+
+class Motion(NamedTuple):
+    """Faults that were found.
+
+    Attributes:
+        problem: the equations.
+        solution: with a clock that wanders, or without.
+        wanders: whether it does.
+        kept: constant faults that are sure and matter.
+        either: whether a compass that is off by heading would look like that clock.
+        torn: whether way and turn would each need a clock of its own.
+    """
+
+    problem: PathProblem
+    solution: Solution
+    wanders: bool
+    kept: list[Column]
+    either: bool = False
+    torn: bool = False
+
+    @property
+    def std(self) -> np.ndarray:
+        """(k,), of the constants."""
+        return np.sqrt(np.diag(self.solution.covariance))
+
+
+def motion(run: Run, scale: Scale) -> Examined:
+    """Clock, scales, offsets, places and delays of velocity and yaw rate against the pose."""
+    e = evidence(run)
+    if e is None:
+        return Examined(run)
+    jumps = gaps(e)
+    try:
+        found = _estimated(e, columns(e, scale), jumps)
+    except LinAlgError:
+        return Examined(run, notes=("the channels beside the pose do not determine a motion",))
+    findings = [jump.finding for jump in jumps]
+    findings += _clock(found) + _constants(found, e)
+    late = [f for f in findings if f.kind == "delay"]
+    if late:  # its column is a tangent: all else is estimated once it is gone
+        first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
+        rest = motion(first, scale)
+        return replace(rest, findings=(*_added(late, rest.findings),))
+    fixes = [f for f in findings if f.repaired]
+    repaired = corrected(e, _correction(found, jumps, fixes)) if fixes else run
+    notes = (*_leeway(e), *((TWO_CLOCKS,) if found.torn else ()))
+    return Examined(repaired, tuple(findings), notes, _agreeing(found, e))
+
+
+def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iterator[SensorFinding]:
+    """Delays that were taken off with what is left of them, and all else.
+
+    What was taken off and found again with the other sign was none.
+    """
+    left = {(f.channel, f.kind): f.value for f in rest}
+    yield from (f for f in rest if (f.channel, f.kind) not in {(d.channel, d.kind) for d in late})
+    for f in late:
+        more = left.get((f.channel, f.kind), 0.0)
+        low, high = f.ci95[0] + more, f.ci95[1] + more
+        if not low < 0.0 < high:
+            yield replace(f, value=f.value + more, ci95=(low, high))
+
+
+def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFinding]) -> Correction:
+    """What findings say of the run."""
+    values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
+    rates = [f.value for f in fixes if f.kind == "clock_rate"]
+    wanders = found.wanders and not found.either
+    if not (wanders or rates or jumps):
+        return Correction(values)
+    problem, clock = found.problem, found.solution.clock
+    if not wanders:
+        clock = np.full_like(clock, rates[0] if rates else 1.0)
+    true = problem.edges[0] + integral_of(problem.edges, np.where(problem.cut, 1.0, clock))
+    return Correction(values, problem.edges, true, jumps)
+
+
+def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Motion:
+    """The likeliest clock and the constants that are sure."""
+    cut = [(jump.start, jump.end) for jump in jumps]
+    sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
+    sizes = max(float(np.hypot(*sigma[:2])), LEAST_NOISE), max(float(sigma[2]), LEAST_NOISE)
+    free = _without_level(e, every)
+    wandering = PathProblem(e, free, sizes, cut)
+    loose = wandering.solve()
+    if without := wandering.outliers(loose):
+        wandering = PathProblem(e, free, sizes, cut, without)
+        loose = wandering.solve()
+    problem = PathProblem(e, every, sizes, cut, without)
+    columns, solution = list(every), problem.solve(fixed_clock=True)
+    wanders = solution.criterion - loose.criterion > LIKELIER
+    wanders = wanders and _uneven(Motion(wandering, loose, True, []))
+    if wanders:
+        problem, columns, solution = wandering, free, loose
+    swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
+    # A compass that is off by heading looks like a wandering clock.
+    if e.rate is not None and (swung or wanders):
+        deviating = [*every, *deviations(e)]
+        even = PathProblem(e, deviating, sizes, cut, without)
+        told = even.solve(fixed_clock=True)
+        either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
+        if either and swung:
+            problem, columns, solution, wanders, either = even, deviating, told, False, False
+    either = either or (wanders and e.velocity is None)  # nor does a way tell of it
+    torn = wanders and not either and _two_clocks(Motion(problem, solution, True, columns))
+    if torn:  # nor is what is wrong a constant: of these a delay alone may have torn them
+        wanders, columns = False, [c for c in every if c.kind == "delay"]
+        problem = PathProblem(e, columns, sizes, cut, without)
+        solution = problem.solve(fixed_clock=True)
+    while len(kept := _sure(columns, solution)) < len(columns):
+        problem, columns = PathProblem(e, kept, sizes, cut, without), kept
+        solution = problem.solve(fixed_clock=not wanders)
+    return Motion(problem, solution, wanders, columns, either, torn)
+
+
+def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
+    """The constants that can be told beside a clock whose mean rate is free: one scale less."""
+    named = "r" if e.rate is not None else (e.by or ("",))[0]
+    return [c for c in every if (c.channel, c.kind) != (named, "scale")]
+
+
+def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
+    std = np.sqrt(np.diag(solution.covariance))
+    return [
+        c
+        for c, value, s in zip(every, solution.constants, std, strict=True)
+        if abs(value) > max(SURE * s, c.least) and s > 0.0
+    ]
+
+
+def _clock(found: Motion) -> list[SensorFinding]:
+    """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
+    if found.wanders:
+        stretches = [_rate(*each) for each in _stretches(found)]
+        if not found.either:
+            return stretches
+        alike, or_else = tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}"
+        return [
+            replace(each, alike=alike, repaired=False, sentence=each.sentence + or_else)
+            for each in stretches
+        ]
+    scales = _even(found)
+    if scales is None:
+        return []
+    value, s = scales
+    begin, end = found.problem.edges[[0, -1]].tolist()
+    text = f"the log's clock is off throughout: {value:.4g} s pass in a second of it, by speed and turn"
+    interval = value - Z95 * s, value + Z95 * s
+    alike = ("scale of all speeds and rates",)
+    return [SensorFinding("time", "clock_rate", value, "1", interval, begin, end, text, alike)]
+
+
+def _rate(begin: float, end: float, value: float, s: float) -> SensorFinding:
+    """A stretch in which the clock is off."""
+    way = "slow" if value > 1.0 else "fast"
+    text = f"the log's clock runs {way}: {value:.3g} s pass in a second of it"
+    interval = value - Z95 * s, value + Z95 * s
+    return SensorFinding("time", "clock_rate", value, "1", interval, begin, end, text)
+
+
+def _even(found: Motion) -> tuple[float, float] | None:
+    """Rate of a clock that runs evenly, and its standard deviation; None: channels agree on none."""
+    at = [k for k, c in enumerate(found.kept) if c.kind == "scale"]
+    if found.wanders or len(at) < 2:
+        return None
+    values, variances = found.solution.constants[at], found.std[at] ** 2
+    if abs(values[0] - values[1]) > max(SURE * np.sqrt(variances.sum()), LEAST_SCALE):
+        return None
+    weights = 1.0 / variances
+    return 1.0 - float((weights * values).sum() / weights.sum()), float(weights.sum() ** -0.5)
+
+
+def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
+    begin, end = found.problem.edges[[0, -1]].tolist()
+    by_clock = _even(found) is not None
+    turns = e.rate is not None and _turning(found)
+    made = []
+    for c, x, s in zip(found.kept, found.solution.constants.tolist(), found.std.tolist(), strict=True):
+        if c.kind == "scale" and by_clock:
+            continue
+        value, half = (1.0 / (1.0 - x), Z95 * s / (1.0 - x) ** 2) if c.kind == "scale" else (x, Z95 * s)
+        # No speed tells whether the clock is at fault; nearer to one it does no harm.
+        only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
+        alone = c.kind == "scale" and not found.wanders and (only or not turns)
+        alike = ("clock_rate",) if alone else ()
+        text = _told(c, value, e) + (f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}" if alone else "")
+        interval = value - half, value + half
+        made.append(
+            SensorFinding(c.channel, c.kind, value, c.unit, interval, begin, end, text, alike, not alone)
+        )
+    return made
+
+
+def _turning(found: Motion) -> bool:
+    """Whether the run turns so much that its turns tell the rate of the clock."""
+    e = found.problem.evidence
+    drift = found.solution.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
+    return float(np.hypot(drift, found.solution.std[HEADING])) < TURNS * float(np.ptp(e.psi))
+
+
+def _told(c: Column, value: float, e: Evidence) -> str:
+    """A constant fault in words."""
+    name = " and ".join(e.by) if e.by and c.channel == e.by[0] and e.by[0] != "speed" else c.channel
+    if c.kind == "scale":
+        return f"{name} read {abs(value - 1.0):.1%} too {'much' if value > 1.0 else 'little'}"
+    if c.kind == "delay":
+        return f"{name} come {value:.3g} s later than the pose"
+    if c.kind == "place":
+        way = {"x": ("ahead", "aft"), "y": ("to starboard", "to port")}[c.channel][value < 0.0]
+        return f"the position is measured {abs(value):.3g} m {way} of where the velocity is"
+    if c.kind in DEVIATIONS:
+        by = c.kind.removeprefix("deviation_").replace("sin_2", "sin 2").replace("cos_2", "cos 2")
+        return f"psi reads {np.degrees(value):.3g}° times {by} ψ too much, as a compass beside iron does"
+    if c.unit == "rad":
+        return f"{name} and the axes of the velocity differ by {np.degrees(value):.3g}°"
+    return f"{name} is {np.degrees(value):.3g}°/s too large"
+
+
+class _Blocks(NamedTuple):
+    """Mean rate of the clock over blocks of time, its standard deviation; begin and end of each [s]."""
+
+    mean: np.ndarray
+    std: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+
+
+def _blocks(found: Motion) -> _Blocks:
+    edges, clock = found.problem.edges, found.solution.clock
+    steps = np.where(found.problem.cut, 0.0, np.diff(edges))
+    wide = max(STRETCH, (edges[-1] - edges[0]) / MOST_STRETCHES)
+    part = ((edges[:-1] - edges[0]) / wide).astype(int)
+    weights = np.zeros((part.max() + 1, edges.size))
+    weights[part, np.arange(part.size)] = steps
+    weights = weights[weights.sum(axis=1) > 0.5 * wide]
+    weights /= weights.sum(axis=1)[:, None]
+    first = np.array([edges[np.flatnonzero(w)[0]] for w in weights])
+    last = np.array([edges[np.flatnonzero(w)[-1] + 1] for w in weights])
+    return _Blocks(weights[:, :-1] @ clock, found.solution.system.mean_clock(weights), first, last)
+
+
+def _uneven(found: Motion) -> bool:
+    """Whether the clock is off its own mean somewhere, so that no constant fault can be it."""
+    b = _blocks(found)
+    off = np.abs(b.mean - np.average(b.mean, weights=b.std**-2.0))
+    return bool((off > np.maximum(SURE * b.std, LEAST_CLOCK)).any())
+
+
+def _two_clocks(found: Motion) -> bool:
+    """Whether way and turn contradict a clock: it acts alike on both, so that each alone tells it."""
+    p, e = found.problem, found.problem.evidence
+    if e.velocity is None or e.rate is None:
+        return False
+    alone = []
+    for needs, part in (
+        ("velocity", replace(e, rate=None)),
+        ("rate", replace(e, velocity=None, by=None)),
+    ):
+        # A scale of the speed is the mean rate of the way's own clock, which does not count here.
+        own = [c for c in found.kept if c.needs == needs and (needs == "rate" or c.kind != "scale")]
+        problem = PathProblem(part, own, p.noise, p.gaps, p.without)
+        alone.append(_blocks(Motion(problem, problem.solve(), True, own)))
+    way, turn = alone
+    weight = 1.0 / (way.std**2 + turn.std**2)
+    rates = np.array([way.mean - turn.mean, _blocks(found).mean])
+    rates -= np.average(rates, axis=1, weights=weight)[:, None]
+    apart, off = (weight * rates**2).sum(axis=1).tolist()
+    return apart - weight.size > MOST_APART * off
+
+
+def _stretches(found: Motion) -> list[tuple[float, float, float, float]]:
+    """Begin, end [s] and mean rate of the clock with its standard deviation, where it is off."""
+    mean, std, first, last = _blocks(found)
+    off = np.where(np.abs(mean - 1.0) > np.maximum(SURE * std, LEAST_CLOCK), np.sign(mean - 1.0), 0.0)
+    found_at, k = [], 0
+    while k < off.size:
+        end = k
+        while end + 1 < off.size and off[end + 1] == off[k]:
+            end += 1
+        if off[k]:
+            of = slice(k, end + 1)
+            value = float(np.average(mean[of], weights=last[of] - first[of]))
+            s = float(np.sqrt((std[of] ** 2).sum()) / (end + 1 - k))
+            found_at.append((float(first[k]), float(last[end]), value, s))
+        k = end + 1
+    return found_at
+
+
+def _leeway(e: Evidence) -> tuple[str, ...]:
+    """What no redundant channel tells: a heading axis that is off, or a force from the side."""
+    if e.by != ("u", "v") or e.rate is None:
+        return ()
+    u, v = e.run.measured["u"][e.rows], e.run.measured["v"][e.rows]
+    rate = np.abs(e.rate[e.rows])
+    fast = np.abs(u) > 0.5 * np.nanquantile(np.abs(u), 0.9)
+    straight = fast & (rate < STRAIGHT * np.quantile(rate, 0.98))
+    if straight.sum() < len(e.rows) // 20:
+        return ()
+    angle = np.arctan2(v[straight], np.abs(u[straight]))
+    middle, spread = float(np.median(angle)), float(np.median(np.abs(angle - np.median(angle))))
+    if not max(LEAST_LEEWAY, 2.0 * spread) < abs(middle) < MOST_LEEWAY:
+        return ()
+    return (
+        f"on straight legs the ship goes {np.degrees(middle):.2g}° to one side: the heading's axis is "
+        "off, or a force pushes to that side; position, speed and heading cannot tell these apart",
+    )
+
+
+def _agreeing(found: Motion, e: Evidence) -> dict[str, float]:
+    """Channels that the pose agrees with, and how far in one sampling period."""
+    period = float(np.median(np.diff(e.time[e.rows])))
+    std = found.solution.std
+    agreed = {name: float(std[DRIFT] / np.sqrt(period)) for name in (e.by or ()) if name != "course"}
+    if e.rate is not None:
+        agreed["r"] = float(std[TURN] / np.sqrt(period))
+    return agreed

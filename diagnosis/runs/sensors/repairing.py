@@ -1,0 +1,133 @@
+"""A run without the faults of its channels, by what these say of each other, without a ship's model."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fmus.frames import rotate_to_body, rotate_to_earth
+
+from ..files.reading import Run
+from .constants import DEVIATIONS
+from .evidence import Evidence
+from .gaps import Gap
+
+TWICE = 2.0  # times nearer to no leeway, from which on an axis is taken as the right one (chosen)
+MOST_LEGS = 0.3  # of the largest yaw rate: rows that turn less are straight enough (chosen)
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What is to be done.
+
+    Attributes:
+        values: (channel, kind) -> size of each constant fault.
+        log: (m,), times of the log [s]; None: the clock is right.
+        true: (m,), true times of the same instants [s].
+        gaps: jumps of the clock.
+    """
+
+    values: Mapping[tuple[str, str], float]
+    log: np.ndarray | None = None
+    true: np.ndarray | None = None
+    gaps: Sequence[Gap] = ()
+
+    def of(self, channel: str, kind: str, usual: float = 0.0) -> float:
+        """Size of a fault; some usual value where there is none."""
+        return self.values.get((channel, kind), usual)
+
+
+def corrected(e: Evidence, fix: Correction) -> Run:
+    """The run with a right clock, and with velocity and yaw rate as the place of the position has them.
+
+    Of a log that was filled between telegrams only the rows with a telegram keep a pose where the clock
+    is repaired: others are on no line any more.
+    """
+    run, time = e.run, e.time
+    measured, pose = dict(run.measured), run.pose.copy()
+    deviation = sum(
+        (fix.of("psi", k) * law(e.psi) for k, law in DEVIATIONS.items()), np.zeros(time.size)
+    )
+    psi, pose[:, 2] = e.psi - deviation, pose[:, 2] - deviation
+    rate = e.rate
+    if rate is not None:
+        late = _later(time, rate, fix.of("r", "delay"))
+        rate = (late - fix.of("r", "offset")) / fix.of("r", "scale", 1.0)
+        measured["r"] = np.where(np.isfinite(measured["r"]), rate, np.nan)
+    if e.velocity is not None and e.by is not None:
+        velocity = _punctual(e, fix.of(e.by[0], "delay")) / fix.of(e.by[0], "scale", 1.0)
+        heading = fix.of("psi", "offset")
+        axes = fix.of(e.by[1], "offset") * (-1.0 if e.by[1] == "y_dot" else 1.0)
+        turned = (heading or axes) + (deviation if e.by == ("u", "v") else np.zeros(time.size))
+        velocity = np.column_stack(rotate_to_body(turned, *velocity.T))
+        if heading and heading_is_off(e, heading):
+            psi, pose[:, 2] = psi - heading, pose[:, 2] - heading
+        ahead, aside = fix.of("x", "place"), fix.of("y", "place")
+        turning = rate if rate is not None else np.gradient(psi, time)
+        swing = rotate_to_earth(psi, -aside * turning, ahead * turning)
+        measured |= _as_given(e, velocity + np.column_stack(swing), psi)
+    repaired = replace(run, pose=pose, measured=measured)
+    return repaired if fix.log is None or fix.true is None else _retimed(repaired, e, fix)
+
+
+def heading_is_off(e: Evidence, offset: float) -> bool:
+    """Whether rather the heading is off than the axes of the velocity.
+
+    A ship goes ahead where nothing pushes: what of track against heading, and of the velocity in its own
+    axes, has clearly less leeway on straight legs is right.
+
+    Args:
+        e: evidence.
+        offset: by which heading and axes of the velocity differ [rad].
+    """
+    assert e.velocity is not None
+    rate = np.abs(np.gradient(e.psi, e.time)) if e.rate is None else np.abs(e.rate)
+    straight = rate <= MOST_LEGS * np.quantile(rate, 0.95)
+    u, v = rotate_to_body(e.psi, *e.velocity.T)
+    leeway = float(np.median(np.arctan2(v, np.abs(u))[straight]))
+    return TWICE * abs(leeway) < abs(leeway - offset)
+
+
+def _later(time: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
+    """Values (n,) or (n, k) as they are some time [s] later."""
+    if not delay:
+        return values
+    flat = values.reshape(time.size, -1)
+    moved = [np.interp(time + delay, time, column) for column in flat.T]
+    return np.column_stack(moved).reshape(values.shape)
+
+
+def _punctual(e: Evidence, delay: float) -> np.ndarray:
+    """Velocity (n, 2) over ground without a delay [s] of its channels."""
+    assert e.velocity is not None
+    if e.by != ("u", "v"):
+        return _later(e.time, e.velocity, delay)
+    body = _later(e.time, np.column_stack(rotate_to_body(e.psi, *e.velocity.T)), delay)
+    return np.column_stack(rotate_to_earth(e.psi, *body.T))
+
+
+def _as_given(e: Evidence, velocity: np.ndarray, psi: np.ndarray) -> dict[str, np.ndarray]:
+    """Velocity (n, 2) over ground in the channels in which it was measured."""
+    assert e.by is not None
+    if e.by == ("x_dot", "y_dot"):
+        made = velocity.T
+    elif e.by == ("speed", "course"):
+        made = np.array([np.hypot(*velocity.T), np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))])
+    else:
+        made = np.array(rotate_to_body(psi, *velocity.T))
+    there = [np.isfinite(e.run.measured[name]) for name in e.by]
+    return {name: np.where(t, m, np.nan) for name, t, m in zip(e.by, there, made, strict=True)}
+
+
+def _retimed(run: Run, e: Evidence, fix: Correction) -> Run:
+    """The run on its true time: rows within a jump of the clock are left out."""
+    assert fix.log is not None
+    assert fix.true is not None
+    clock = np.interp(run.time, fix.log, fix.true)
+    clock += np.minimum(run.time - fix.log[0], 0.0) + np.maximum(run.time - fix.log[-1], 0.0)
+    keep = np.ones(run.time.size, bool)
+    for gap in fix.gaps:
+        clock += np.where(run.time >= gap.end, gap.missing, 0.0)
+        keep &= (run.time <= gap.start) | (run.time >= gap.end)
+    pose = np.where(e.filled[:, None], np.nan, run.pose)
+    return replace(run, time=clock, pose=pose).rows(keep)

@@ -1,0 +1,165 @@
+"""Channels in another unit, or with another sign, than was said."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fmus.frames import rotate_to_body, rotate_to_earth
+from fmus.scale import Scale
+
+from ..columns.columns import POSE
+from ..columns.unit_factors import UNITS
+from ..files.reading import Run
+from .blocked_fit import SURE, blocked_fit
+from .evidence import Evidence, evidence, integral
+from .sensor_finding import Z95, Examined, SensorFinding
+
+WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
+MOST = 0.35  # a factor nearer to one than this is a scale, and is estimated with all else (chosen)
+NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
+FEWEST = 8  # windows; chosen
+SIGN = "the other sign"  # and nothing else
+AGREED = 0.7  # correlation from which on two channels tell of the same (chosen)
+OPPOSITE = "its sign is the other one"
+
+
+def unit_factors(quantity: str) -> dict[str, float]:
+    """``UNIT in place of UNIT`` -> by how much numbers are too large when units are mistaken so."""
+    sizes = UNITS[quantity]
+    return {
+        f"{a} in place of {b}": sizes[b] / sizes[a] for a in sizes for b in sizes if sizes[a] != sizes[b]
+    }
+
+
+def units(run: Run, scale: Scale) -> Examined:
+    """Velocity and yaw rate that are many times what the pose says, or its opposite."""
+    found = mirrored(run)
+    e = evidence(found.run)
+    if e is None:
+        return found
+    if e.rate is not None:
+        found = _judged(found, e, ("r",), "rate", *_windows(e, e.psi[:, None], e.turned[:, None]))
+    if e.velocity is not None and e.by is not None:
+        names = ("speed",) if e.by[0] == "speed" else e.by
+        found = _judged(found, e, names, "speed", *_windows(e, _position(e), e.gone))
+    return found
+
+
+def mirrored(run: Run) -> Examined:
+    """A channel of the pose that has the other sign.
+
+    Heading and velocity in the ship's axes tell where it goes, the yaw rate how the heading turns: of
+    the three signs only one puts both right.
+    """
+    e = evidence(run)
+    if e is None or e.rate is None or e.by != ("u", "v") or _both_agree(e):
+        return Examined(run)
+    for k, name in enumerate(POSE):
+        pose = run.pose * np.where(np.arange(3) == k, -1.0, 1.0)
+        other = replace(run, pose=pose)
+        meant = evidence(other)
+        if meant is not None and _both_agree(meant):
+            ends = float(e.time[0]), float(e.time[-1])
+            text = f"{name} contradicts u, v and r: {OPPOSITE}"
+            finding = SensorFinding(name, "scale", -1.0, "1", (-1.0, -1.0), *ends, text)
+            return Examined(other, (finding,))
+    return Examined(run)
+
+
+def _both_agree(e: Evidence) -> bool:
+    """Whether the pose tells of the same motion as yaw rate and velocity, signs included."""
+    said = ((e.psi[:, None], e.turned[:, None]), (_position(e), e.gone))
+    return all(_alike(*_windows(e, *pair)) > AGREED for pair in said)
+
+
+def _alike(pose: np.ndarray, said: np.ndarray) -> float:
+    """Correlation of what pose and channels say of windows (k, d), about zero; 0 where nothing moves."""
+    sizes = (pose**2).sum() * (said**2).sum()
+    return float((pose * said).sum() / np.sqrt(sizes)) if sizes > 0.0 else 0.0
+
+
+def sway(run: Run, scale: Scale) -> Examined:
+    """A sway velocity with the other sign, which looks like a position measured elsewhere aboard.
+
+    What surge and sway alone move the ship by and that place are fitted together to the way of windows:
+    what a place adds comes with the yaw rate, sway later.
+    """
+    e = evidence(run)
+    if e is None or e.velocity is None or e.by != ("u", "v"):
+        return Examined(run)
+    still, one = np.zeros_like(e.time), np.ones_like(e.time)
+    surge, _ = rotate_to_body(e.psi, *e.velocity.T)
+    ahead = integral(e.time, np.column_stack(rotate_to_earth(e.psi, surge, still)))
+    places = (np.column_stack(rotate_to_earth(e.psi, *at)) for at in ((one, still), (still, one)))
+    way, *said = _windows(e, _position(e), ahead, e.gone - ahead, *places)
+    if len(way) < FEWEST:
+        return Examined(run)
+    columns = np.column_stack([x.T.ravel() for x in said])
+    value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
+    if not value[1] < -SURE * std[1]:
+        return Examined(run)
+    half = Z95 * std[1] / value[1] ** 2
+    factor, ends = 1.0 / value[1], (float(e.time[0]), float(e.time[-1]))
+    text = f"v is {factor:.3g} times what the pose says: {OPPOSITE}"
+    finding = SensorFinding("v", "scale", factor, "1", (factor - half, factor + half), *ends, text)
+    return Examined(replace(run, measured=dict(run.measured) | {"v": -run.measured["v"]}), (finding,))
+
+
+def _position(e: Evidence) -> np.ndarray:
+    """(n, 2), position in all rows [m]."""
+    at, time = e.rows, e.time
+    return np.column_stack([np.interp(time, time[at], e.run.pose[at, k]) for k in (0, 1)])
+
+
+def _windows(e: Evidence, *paths: np.ndarray) -> list[np.ndarray]:
+    """What pose and channels say of each window, (k, d) each."""
+    rows = e.rows
+    apart = max(1, round(WINDOW / float(np.median(np.diff(e.time[rows])))), 10)
+    return [np.diff(path[rows[::apart]], axis=0) for path in paths]
+
+
+def _judged(
+    found: Examined,
+    e: Evidence,
+    names: tuple[str, ...],
+    quantity: str,
+    pose: np.ndarray,
+    said: np.ndarray,
+) -> Examined:
+    """What the ratio of a channel to the pose says, and the run with the channel in its right unit."""
+    size = np.hypot.reduce(said, axis=1) if said.shape[1] > 1 else np.abs(said[:, 0])
+    much = size > 0.5 * np.quantile(size, 0.9)
+    if much.sum() < FEWEST:
+        return found
+    pose, said, size = pose[much], said[much], size[much]
+    ratio = (pose * said).sum(axis=1) / size**2
+    alike = _alike(pose, said)
+    told = " and ".join(names)
+    if abs(alike) < AGREED:
+        measured = {n: v for n, v in found.run.measured.items() if n not in names}
+        note = f"{told} and the pose do not tell of the same motion: {told} is left out"
+        return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
+    middle = float(np.median(ratio))
+    if abs(middle - 1.0) < MOST:
+        return found
+    value = 1.0 / middle
+    half = Z95 * 1.4826 * float(np.median(np.abs(1.0 / ratio - value))) / np.sqrt(ratio.size)
+    name, factor = _nearest(abs(value), unit_factors(quantity))
+    true = np.copysign(factor, value) if name else value
+    text = f"{told} is {value:.4g} times what the pose says"
+    text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
+    measured = dict(found.run.measured) | {n: found.run.measured[n] / true for n in names}
+    begin, end = float(e.time[0]), float(e.time[-1])
+    finding = SensorFinding(
+        names[0], "scale", value, "1", (value - half, value + half), begin, end, text
+    )
+    return replace(found, run=replace(found.run, measured=measured), findings=(*found.findings, finding))
+
+
+def _nearest(value: float, factors: Mapping[str, float]) -> tuple[str, float]:
+    """The mistake of units that is nearest to a factor, and its factor; no name: it is none."""
+    known = {"": value, **factors} if abs(value - 1.0) > NEAR else {SIGN: 1.0}
+    apart = {name: abs(np.log(value / f)) for name, f in known.items() if name}
+    best = min(apart, key=lambda name: apart[name])
+    return (best, known[best]) if apart[best] < NEAR else ("", value)

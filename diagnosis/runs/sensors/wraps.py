@@ -1,0 +1,64 @@
+"""Angles that were interpolated where they wrap: a line from 359 to 1 degree leads through 180."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fmus.scale import Scale
+
+from ..files.reading import Run
+from .sensor_finding import Examined, SensorFinding
+
+ANGLES = ("psi", "psi_2", "course")
+LARGE = 8.0  # times the usual step of an angle: no ship turns so much faster than it does else (chosen)
+LEAST = (
+    0.1  # rad; a smaller step is none of an angle that leads through a turn within a few rows (chosen)
+)
+MOST = int(2.0 * np.pi / LEAST)  # rows between two telegrams, of which a line leads through the turn
+
+
+def wraps(run: Run, scale: Scale) -> Examined:
+    """Rows of angles between a value before and one after a wrap."""
+    pose, measured, findings = run.pose.copy(), dict(run.measured), []
+    for name in ANGLES:
+        values = pose[:, 2] if name == "psi" else measured.get(name)
+        if values is None:
+            continue
+        repaired, rows = unwrapped(values)
+        if not rows.size:
+            continue
+        if name == "psi":
+            pose[:, 2] = repaired
+        else:
+            measured[name] = repaired
+        first, last = float(run.time[rows[0]]), float(run.time[rows[-1]])
+        text = f"{name} was interpolated where it wraps, in {rows.size} rows"
+        findings.append(
+            SensorFinding(name, "wrap", float(rows.size), "1", (rows.size, rows.size), first, last, text)
+        )
+    if not findings:
+        return Examined(run)
+    return Examined(replace(run, pose=pose, measured=measured), tuple(findings))
+
+
+def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An angle (n,) [rad] whose rows within a wrap are on the short way, and which rows these are."""
+    there = np.flatnonzero(np.isfinite(values))
+    angle, step = values[there].copy(), np.diff(values[there])
+    usual = float(np.median(np.abs(step))) if step.size else 0.0
+    large = np.abs(step) > max(LARGE * usual, LEAST)
+    same = large[1:] & large[:-1] & (np.sign(step[1:]) == np.sign(step[:-1]))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same, [0]]).astype(int)))
+    changed = []
+    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        a, b = begin, end + 1  # rows before and after all those large steps
+        total = angle[b] - angle[a]
+        turn = float(np.angle(np.exp(1j * total)))
+        if b - a > MOST or abs(total - turn) < np.pi or abs(turn) > 0.5 * abs(total):
+            continue
+        inside = np.arange(a + 1, b)
+        angle[inside] = angle[a] + turn * (inside - a) / (b - a)
+        changed += there[inside].tolist()
+    whole = values.copy()
+    whole[there] = angle
+    return whole, np.array(changed, int)

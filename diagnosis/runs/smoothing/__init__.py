@@ -1,0 +1,1 @@
+"""Pose, velocity, acceleration of a measured run with their uncertainty, without a model of a ship."""

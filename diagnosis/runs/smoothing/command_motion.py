@@ -1,0 +1,160 @@
+"""The motion that commands would give a ship that is nothing but a mass, and how late they act.
+
+    x(t):  (d/dt + 1/T)^2 x = R(psi) G tau(t - delay),
+
+on evenly spaced times, of commands that are held from row to row.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from fmus.scale import Scale
+
+from ..cleaning import Track
+from .spline import Knots
+
+# Of CyberShip Enterprise 1, times the scale of the ship.
+# m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
+IDLE = (0.02, 0.02, 0.05)
+FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
+
+
+def idle(scale: Scale) -> np.ndarray:
+    """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
+    return np.multiply(IDLE, scale.speeds)
+
+
+class CommandResponse(NamedTuple):
+    """The motion that follows from the commands, but for a smooth one.
+
+    Attributes:
+        eta, eta_dot, eta_ddot: (n, 3), pose and derivatives [m, m, rad; /s; /s2].
+        delay: from a command to its effect [s]; NaN where the commands explain nothing.
+        sure: whether the whole run agrees that there is a delay.
+    """
+
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+    delay: float = np.nan
+    sure: bool = False
+
+    @classmethod
+    def none(cls, n: int) -> "CommandResponse":
+        """No response, for n samples."""
+        still = np.zeros((n, 3))
+        return cls(still, still, still)
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """A run's commands and headings on evenly spaced times.
+
+    Attributes:
+        track: the run.
+        psi: (n,), its heading [rad], NaN where it is not known.
+        grid: knots of the stretches, independent of each other, times counted from the first sample.
+        at_rest: whether the ship hardly moves at first: then nothing was commanded before the run.
+    """
+
+    track: Track
+    psi: np.ndarray
+    grid: Knots
+    at_rest: bool = False
+
+    @property
+    def forgetting(self) -> float:
+        """T [s]."""
+        return FORGETTING * self.track.scale.time
+
+    @cached_property
+    def parts(self) -> list[np.ndarray]:
+        """Times [s] of each stretch, one for each measurement that there should be."""
+        first, h = self.track.run.time[0], self.track.period
+        return [
+            first + np.arange(a, b + h, h) for a, b in zip(self.grid.start, self.grid.end, strict=True)
+        ]
+
+    @cached_property
+    def even(self) -> np.ndarray:
+        """(m,), times [s] of all stretches."""
+        return np.concatenate(self.parts)
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """Index of the start of each stretch but the first among them."""
+        return np.cumsum([part.size for part in self.parts])[:-1]
+
+    @cached_property
+    def rotation(self) -> np.ndarray:
+        """(m,), from body to earth: a rotation in the complex plane, north its real axis."""
+        known = np.isfinite(self.psi)
+        return np.exp(1j * np.interp(self.even, self.track.run.time[known], self.psi[known]))
+
+    def delayed(self, delay: float) -> np.ndarray:
+        """(m, 3), mean of tau over each even step, as commanded ``delay`` [s] before [N, N, N m].
+
+        A mean, as rounded time stamps put the jump of a command a little before or behind a step's edge.
+        """
+        given = self.even - delay
+        return (self._impulse(given + self.track.period) - self._impulse(given)) / self.track.period
+
+    def lagging(self, tau: np.ndarray, lag: float) -> np.ndarray:
+        """Commands (m, 3) behind a lag of first order [s]; from zero in each stretch."""
+        kept = np.exp(-self.track.period / lag)
+        return self._recursion((1.0 - kept) * tau, kept)
+
+    @cached_property
+    def _impulses(self) -> np.ndarray:
+        """(n, 3), integral of the commands until each row [N s, N s, N m s]."""
+        run = self.track.run
+        steps = run.tau_cmd[:-1] * np.diff(run.time)[:, None]
+        return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+    def _impulse(self, time: np.ndarray) -> np.ndarray:
+        """Integral (m, 3) of the commands until times (m,) [s]."""
+        run = self.track.run
+        if self.at_rest:
+            time = np.maximum(time, run.time[0])
+        row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+        return self._impulses[row] + run.tau_cmd[row] * (time - run.time[row])[:, None]
+
+    def sampled(self, x: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
+        """Signals (m, k) at the run's rows."""
+        time = self.track.run.time[rows]
+        return np.column_stack([np.interp(time, self.even, column) for column in x.T])
+
+    def motion(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position and velocity (m, k) by accelerations (m, k), each held for a step.
+
+        (d/dt + 1/T)^2 x = a forgets, as a double integral would grow beyond all numbers. First comes
+        w = (d/dt + 1/T) x.
+        """
+        h, T = self.track.period, self.forgetting
+        kept = np.exp(-h / T)
+        w = self._recursion(T * (1.0 - kept) * a, kept)
+        x = self._recursion(h * kept * w + T * (T * (1.0 - kept) - h * kept) * a, kept)
+        return x, w - x / T
+
+    def _recursion(self, x: np.ndarray, kept: float) -> np.ndarray:
+        """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch."""
+        parts = [lfilter([0.0, 1.0], [1.0, -kept], part, axis=0) for part in np.split(x, self.first)]
+        return np.concatenate(parts)
+
+    def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
+        """The motion by gains (3, 3), body-fixed acceleration by a unit of each, and a delay [s]."""
+        surge, sway, yaw = (self.delayed(delay) @ gains.T).T
+        a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
+        x, x_dot = self.motion(a)
+        x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
+        eta, eta_dot, eta_ddot = (_channels(self.sampled(each)) for each in (x, x_dot, x_ddot))
+        return CommandResponse(eta, eta_dot, eta_ddot, delay)
+
+
+def _channels(x: np.ndarray) -> np.ndarray:
+    """North, east and heading (n, 3) of the first two as one complex number, and the third (n, 2)."""
+    return np.column_stack([np.real(x[:, 0]), np.imag(x[:, 0]), np.real(x[:, 1])])

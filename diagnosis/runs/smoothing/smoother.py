@@ -1,0 +1,294 @@
+"""Pose, velocity and acceleration of a measured run without any model of the ship.
+
+Each channel is modelled as a process driven by the commands (:mod:`.command_response`) and by white
+jerk, measured with white noise. The noise is estimated from third differences, the spectral density of
+the jerk by restricted maximum likelihood, and how it varies over time from the jerk that is found
+(:mod:`.likelihood`). A sample further than five standard deviations from its prediction by all others
+is a spike.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from cosim import InputError
+from fmus.frames import rotate_to_body
+from fmus.scale import Scale
+
+from ..cleaning import Counts, Track, noise
+from ..sensors.sensor_finding import Examined
+from .command_motion import Commands, idle
+from .command_response import with_commands
+from .delay import NOTICED
+from .likelihood import adapt
+from .measured_rates import ALONE, Agreeing, measured_rates
+from .outliers import TooFewError, robust
+from .penalised import Problem, solve
+from .spline import Knots, basis, inverse_band, knots, roughness, variance
+
+# Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
+# s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
+BREAK = 3.0
+SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
+AVERAGE = 8.0  # s over which the squared jerk is averaged; chosen, as long as a prediction window
+FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
+# [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
+LEAST_NOISE = 2e-5
+# The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
+# has a time constant of two sampling periods, 64 = 2^6.
+LOCAL = 64.0
+
+
+class PoseOnly(NamedTuple):
+    """How the pose alone is smoothed, its response to the commands left out.
+
+    Attributes:
+        rows: of the run, that are tried.
+        weights: of those in a stretch: 1, and 0 for a spike.
+        stiffness, smoothness: (3, intervals) and (3,), see :mod:`.penalised`.
+    """
+
+    rows: np.ndarray
+    weights: np.ndarray
+    stiffness: np.ndarray
+    smoothness: np.ndarray
+
+
+class Motion(NamedTuple):
+    """Pose, its derivatives and body-fixed velocity, (n, 3) each, as those of :class:`Smoothed`."""
+
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+    nu: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A smoothed run. All arrays (n, 3) are NaN where too much is missing.
+
+    Attributes:
+        track: the run with its samples judged.
+        spikes: (n,), samples refused by the outlier test.
+        eta, eta_dot, eta_ddot: pose, heading continuous, and derivatives [m, m, rad; /s; /s2].
+        nu: body-fixed velocity over ground [m/s, m/s, rad/s].
+        eta_std, eta_dot_std, eta_ddot_std, nu_std: their standard deviations.
+        noise: (3,), standard deviation of the measurement [m, m, rad].
+        jerk: (3,), mean spectral density of the jerk that is not the commands' [m2/s5, m2/s5, rad2/s5].
+        delay: from a command to its effect [s], as far as the pose shows it; NaN where it does not.
+        late: whether the whole run agrees on that delay.
+        pose_only: how the pose is smoothed without the commands, see :func:`without_commands`.
+        sensors: what the run's channels say of each other; None where nobody asked.
+    """
+
+    track: Track
+    spikes: np.ndarray
+    eta: np.ndarray
+    eta_dot: np.ndarray
+    eta_ddot: np.ndarray
+    nu: np.ndarray
+    eta_std: np.ndarray
+    eta_dot_std: np.ndarray
+    eta_ddot_std: np.ndarray
+    nu_std: np.ndarray
+    noise: np.ndarray
+    jerk: np.ndarray
+    delay: float
+    late: bool
+    pose_only: PoseOnly
+    sensors: Examined | None = None
+
+    @property
+    def time(self) -> np.ndarray:
+        """(n,) [s]."""
+        return self.track.run.time
+
+    @property
+    def scale(self) -> Scale:
+        """Of the ship."""
+        return self.track.scale
+
+    @property
+    def used(self) -> np.ndarray:
+        """(n,), samples that count: new, no spike, in a stretch that could be smoothed."""
+        return self.track.valid & ~self.spikes & np.isfinite(self.eta[:, 0])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was found in the data, a line each."""
+        if not (self.late and self.delay >= NOTICED * self.scale.time):
+            return self.track.notes
+        delay = (
+            f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
+        )
+        return (*self.track.notes, delay)
+
+    @property
+    def counts(self) -> Counts:
+        """What became of the samples."""
+        return self.track.counts(int(self.spikes.sum()))
+
+
+def smooth(track: Track, agreeing: Agreeing = ALONE) -> Smoothed:
+    """Smooth a run.
+
+    Args:
+        track: the run.
+        agreeing: channels of velocity and yaw rate that count beside the pose, and their noise.
+
+    Raises:
+        InputError: no stretch of it is dense enough, or its samples do not determine a motion.
+    """
+    try:
+        return _smooth(track, agreeing)
+    except LinAlgError as error:
+        raise InputError(
+            f"run '{track.run.name}': its samples do not determine a smooth motion ({error})"
+        ) from None
+
+
+def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
+    """The motion by the pose alone: its spline follows whatever is quick, and noise with it.
+
+    Args:
+        run: a smoothed run.
+        pose: (n, 3), that of the run by default; another one is judged anew.
+    """
+    if pose is None:
+        rows, weights, stiffness, smoothness = run.pose_only
+        p, origin = _problem(run.track, rows)
+        p = p._replace(stiffness=stiffness)
+    else:
+        _, _, origin, (p, smoothness, weights) = _judged(replace(run.track, pose=pose))
+    time = run.time - run.time[0]
+    where = within(p.grid, time)
+    coefficients = solve(p, smoothness, weights).coefficients
+    derivatives = (spread(basis(p.grid, time[where], k)(coefficients), where) for k in range(3))
+    return _motion(origin, *derivatives)
+
+
+def _motion(origin: np.ndarray, offset: np.ndarray, eta_dot: np.ndarray, eta_ddot: np.ndarray) -> Motion:
+    """The motion by the pose about an origin (3,), and its derivatives."""
+    eta = offset + origin
+    u, v = rotate_to_body(eta[:, 2], eta_dot[:, 0], eta_dot[:, 1])
+    return Motion(eta, eta_dot, eta_ddot, np.column_stack([u, v, eta_dot[:, 2]]))
+
+
+def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
+    """The spline that is to follow some rows of a run, with an even penalty, and its origin (3,)."""
+    time, scale = track.run.time - track.run.time[0], track.scale
+    with np.errstate(over="ignore"):  # of poses that are no place on earth
+        origin = np.nanmedian(track.pose, axis=0)
+    grid = knots(*stretches(rows, track), max(SPACING * scale.time, track.period))
+    dense = rows[within(grid, time[rows])]
+    z = track.pose[dense] - origin
+    sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
+    stiffness = np.ones((3, int(grid.intervals.sum())))
+    average = max(1, round(AVERAGE * scale.time / grid.spacing))
+    b = basis(grid, time[dense])
+    return Problem(dense, z, b, grid, roughness(grid), stiffness, sigma, average), origin
+
+
+def _judged(
+    track: Track,
+) -> tuple[np.ndarray, Problem, np.ndarray, tuple[Problem, np.ndarray, np.ndarray]]:
+    """Rows of a run in stretches that agree, their problem and origin, and :func:`.outliers.robust`."""
+    rows = np.flatnonzero(track.valid)
+    while True:
+        even, origin = _problem(track, rows)
+        local = np.full(3, LOCAL * (track.period / even.grid.spacing) ** 5)
+        try:
+            return rows, even, origin, robust(even, local)
+        except TooFewError as stretch:
+            rows = np.setdiff1d(rows, stretch.rows)
+
+
+def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
+    time, scale = track.run.time - track.run.time[0], track.scale
+    rows, even, origin, (adapted, smoothness, weights) = _judged(track)
+    grid, dense, sigma = even.grid, even.rows, even.sigma
+    inside = within(grid, time)
+    pose_only = PoseOnly(rows, weights, adapted.stiffness, smoothness)
+    fit = solve(adapted, smoothness, weights)
+    psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
+    first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
+    still = idle(scale)
+    slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
+    commands = Commands(track, psi, grid, bool(slow))
+    left = with_commands(even, adapted, smoothness, fit, weights, commands)
+    adapted, smoothness, fit, response = left
+    rates = measured_rates(track, dense, psi, agreeing, grid)
+    if rates is not None:
+        at, beside = rates
+        beside = beside._replace(z=beside.z - response.eta_dot[at])
+        adapted, smoothness = adapt(adapted._replace(rates=beside), smoothness, weights)
+        fit = solve(adapted, smoothness, weights)
+    inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
+    spikes = track.valid.copy()
+    spikes[rows] = False
+    spikes[dense] = weights == 0.0
+    derivatives = [basis(grid, time[inside], k) for k in range(3)]
+    known = zip(derivatives, response[:3], strict=True)
+    motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
+    eta_std, eta_dot_std, eta_ddot_std = (
+        spread(np.sqrt(variance(b, inverse)), inside) for b in derivatives
+    )
+    return Smoothed(
+        track,
+        spikes,
+        *motion,
+        eta_std,
+        eta_dot_std,
+        eta_ddot_std,
+        _body_std(motion, eta_std, eta_dot_std),
+        sigma,
+        sigma**2 / (smoothness * grid.spacing**5),
+        response.delay,
+        response.sure,
+        pose_only,
+    )
+
+
+def breaks(rows: np.ndarray, track: Track) -> np.ndarray:
+    """(n - 1,): between which of some rows (n,) of a run too much is missing to be bridged.
+
+    Where a pose is missing, the commands lead over the gap; where they are missing, too, nothing does.
+    """
+    long = np.diff(track.run.time[rows]) > max(BREAK * track.scale.time, 10.0 * track.period)
+    return long | (np.diff(track.silences[rows]) > 0)
+
+
+def stretches(rows: np.ndarray, track: Track) -> tuple[np.ndarray, np.ndarray]:
+    """Start and end [s], since the run's, of the parts between long gaps that have enough samples."""
+    time = track.run.time[rows] - track.run.time[0]
+    cut = np.flatnonzero(breaks(rows, track))
+    first, last = np.concatenate([[0], cut + 1]), np.concatenate([cut, [time.size - 1]])
+    enough = last - first + 1 >= FEWEST
+    if not enough.any():
+        raise InputError(f"run '{track.run.name}': nowhere {FEWEST} samples without a long gap")
+    return time[first[enough]], time[last[enough]]
+
+
+def within(grid: Knots, time: np.ndarray) -> np.ndarray:
+    """(n,), which times [s] lie in a stretch."""
+    stretch = np.searchsorted(grid.start, time, side="right") - 1
+    return (stretch >= 0) & (time <= grid.end[stretch])
+
+
+def spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Values (k, 3) in the k rows of a mask (n,), NaN in the others."""
+    found = np.full((where.size, values.shape[1]), np.nan)
+    found[where] = values
+    return found
+
+
+def _body_std(motion: Motion, eta_std: np.ndarray, eta_dot_std: np.ndarray) -> np.ndarray:
+    """Standard deviation of nu (n, 3), the heading's included; the channels are independent."""
+    psi, (u, v) = motion.eta[:, 2], motion.nu.T[:2]
+    c2, s2 = np.cos(psi) ** 2, np.sin(psi) ** 2
+    x, y = eta_dot_std[:, 0] ** 2, eta_dot_std[:, 1] ** 2
+    turn = eta_std[:, 2] ** 2
+    ahead, aside = c2 * x + s2 * y + v**2 * turn, s2 * x + c2 * y + u**2 * turn
+    return np.column_stack([np.sqrt(ahead), np.sqrt(aside), eta_dot_std[:, 2]])

@@ -1,0 +1,263 @@
+"""The candidates: what each effect of a ship would add to the model error, as regressors.
+
+The regressors of a candidate are computed by the model itself with the effect switched on, so that a
+formula stands in the declaration of the effect and nowhere else. An effect whose force is linear in its
+coefficients has one shape; any other has several, one for each value tried of what it is nonlinear in.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fmus.effects import Effect
+from fmus.effects.effect import APART
+from fmus.scale import Scale
+
+from ..execution.parallel import for_each
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.weak_form import remember_responses
+from .nonlinear.multistart import Landscape, best_values
+from .nonlinear.segmentation import FLOOR, intervals, problem
+
+# Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
+# Step of a finite difference where the model error is not linear.
+SMALL = 1e-3
+# A nonlinear effect without values of its own is tried at these multiples of the value at which its
+# force is as large as the model error, found between the smallest and the largest in steps of ten.
+MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
+SMALLEST, LARGEST = 1e-6, 1e6
+MOST = 0.5  # share of its largest force from which on it counts as saturated; chosen
+# Share of a curve's weight that a node must have: half a second of four minutes.
+INSIDE = 2e-3
+FEWEST = 3  # nodes of a curve: of fewer there is no bend
+SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One way in which an effect may act.
+
+    Attributes:
+        given: parameter -> value that makes the shape, an addition to the model.
+        fitted: parameters that scale it.
+        offset: (K, 3), the force of what is given alone; None where that is nothing.
+        columns: (K, 3, p), force for one unit of each fitted parameter.
+        unit: (p,), what one unit of each is at the size of the ship.
+        nuisance_offset: (q,), nuisance parameters together with what is given; None: as they are.
+        precision: (p, p), prior precision of the fitted ones; None: 0.
+    """
+
+    given: Mapping[str, float]
+    fitted: Sequence[str]
+    offset: np.ndarray | None
+    columns: np.ndarray
+    unit: np.ndarray
+    nuisance_offset: np.ndarray | None = None
+    precision: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect with the shapes that it can take on these data."""
+
+    effect: Effect
+    shapes: Sequence[Shape] = field(default_factory=list)
+
+
+def model_error(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
+    """Model error (K, 3) [N, N, N m] of all runs one after the other."""
+    return np.concatenate([omega(w, model) for w in data])
+
+
+def shape(
+    data: Sequence[WeakWindows],
+    model: Model,
+    base: np.ndarray,
+    given: Mapping[str, float],
+    fitted: Sequence[str],
+    step: float = 1.0,
+) -> Shape:
+    """What the model gains by an effect: minus the change of the model error, by steps of ``step``."""
+    start = model_error(data, model.plus(given)) if given else base
+    unit = np.array([model.unit(n) for n in fitted])
+    steps = zip(fitted, (step * unit).tolist(), strict=True)
+    columns = [(start - model_error(data, model.plus({**given, n: h}))) / h for n, h in steps]
+    stacked = np.stack(columns, axis=2) if columns else np.zeros((*base.shape, 0))
+    return Shape(dict(given), list(fitted), base - start if given else None, stacked, unit)
+
+
+def covered(columns: np.ndarray) -> np.ndarray:
+    """(p,), which nodes of a curve the data reach, and those between them.
+
+    A node counts from a share of INSIDE of what all nodes together give. What lies outside stays zero:
+    there the curve is the model's, and nothing is told of it.
+
+    Args:
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    weight = np.square(columns).sum(axis=(0, 1))
+    reached = np.flatnonzero(weight > INSIDE * max(float(weight.sum()), SLIGHT))
+    inside = np.zeros(weight.size, bool)
+    if reached.size:
+        inside[reached[0] : reached[-1] + 1] = True
+    return inside
+
+
+def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Prior precision of the values of a curve: its second differences are N(0, size^2).
+
+    The size is that at which the curve, were it the same everywhere, would be as large as the whole
+    model error: nodes without data follow their neighbours.
+
+    Args:
+        base: (K, 3), model error.
+        columns: (K, 3, p), force for one unit of each node.
+    """
+    unit = np.square(columns.sum(axis=2))
+    axes = unit.sum(axis=0) > 0.0
+    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
+    bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
+    return bend.T @ bend
+
+
+def curve(base: np.ndarray, plain: Shape, scale: Scale) -> list[Shape]:
+    """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
+    force = plain.columns * plain.unit / np.array(scale.forces)[:, None]
+    inside = covered(force)
+    if inside.sum() < FEWEST:
+        return []
+    unit = plain.unit[inside]
+    precision = smoothness(base / scale.forces, force[:, :, inside]) / np.outer(unit, unit)
+    fitted = [n for n, kept in zip(plain.fitted, inside, strict=True) if kept]
+    columns = plain.columns[:, :, inside]
+    return [replace(plain, fitted=fitted, columns=columns, unit=unit, precision=precision)]
+
+
+def values_to_try(
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect
+) -> list[Mapping[str, float]]:
+    """The values at which a nonlinear effect is tried."""
+    declared = e.search.values(model.values)
+    if e.search.intervals:
+        return with_intervals(data, model, base, e)
+    if declared or e.differentiable:
+        return declared
+    return [at for name in e.coefficients for at in scaled(data, model, base, e, name)]
+
+
+def spread(e: Effect) -> bool:
+    """Whether an effect has parameters that it is not linear in, and declares no values of them.
+
+    One with a memory takes long to compute: it is tried at few values.
+    """
+    several = bool(e.shape_parameters) or (not e.differentiable and len(e.coefficients) > 1)
+    told = e.search.times or e.search.tries or e.search.smooth
+    return several and not told and e.memory is None
+
+
+def by_starts(
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, step: float
+) -> list[Shape]:
+    """The shapes of an effect at the best values of what it is not linear in."""
+    sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR * model.ship.scale.forces
+
+    def force(values: Mapping[str, float]) -> np.ndarray:
+        changed = model.plus({n: x - model.value(n) for n, x in values.items()})
+        return ((base - model_error(data, changed)) / sigma).ravel()
+
+    def tried(shape: Mapping[str, float]) -> list[dict[str, float]]:
+        at = model.plus({n: x - model.value(n) for n, x in shape.items()})
+        return [{**v} for name in e.coefficients for v in scaled(data, at, base, e, name)]
+
+    poses = np.concatenate([w.smoothed.eta[w.known, :2] for w in data])
+    extent = float(np.linalg.norm(np.ptp(poses, axis=0)))
+    present = {p.name: model.value(p.name) for p in e.parameters}
+    units = {p.name: model.unit(p.name) for p in e.parameters}
+    of = Landscape(e, force, (base / sigma).ravel(), extent, present, units)
+    found, fitted = best_values(of, tried)
+    return [shape(data, model, base, additions(model, e, v), fitted, step) for v in found]
+
+
+def with_intervals(
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect
+) -> list[Mapping[str, float]]:
+    """The intervals in which an effect seems to act, as additions to a model; none: no values.
+
+    A single one without an end in each run that has any is the effect that lasts, if there is such.
+    """
+    p = problem(data, model, base, e)
+    spans = [] if p is None else intervals(p)
+    if p is None or not spans or not p.passing(spans):
+        return []
+    if e.search.lasting and p.without_end(spans):
+        return []
+    return [p.values(spans)]
+
+
+def additions(model: Model, e: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """Values to try as additions to a model: those of coefficients are, others are values themselves."""
+    return {n: x if n in e.coefficients else x - model.value(n) for n, x in values.items()}
+
+
+def scaled(
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect, name: str
+) -> Iterator[dict[str, float]]:
+    """Multiples of a coefficient's value at which its force is as large as the model error.
+
+    Where the force never is, because it saturates, of the value at which it has most of its largest.
+    The effect's other parameters are refined as well, from where they are.
+    """
+    allowed = next(p.range for p in e.parameters if p.name == name)
+    unit, forces_of = model.unit(name), model.ship.scale.forces
+    low = -LARGEST * unit if allowed.min is None else allowed.min
+    high = LARGEST * unit if allowed.max is None else allowed.max
+    wanted = float(np.square(base / forces_of).sum())
+    others = {n: model.value(n) for n in e.shape_parameters}
+    others |= {n: 0.0 for n in e.coefficients if n != name}
+    for sign in (1.0, -1.0):
+        forces: dict[float, float] = {}
+        size = SMALLEST * unit
+        while max(forces.values(), default=0.0) < wanted and low <= sign * size <= high:
+            change = base - model_error(data, model.plus({name: sign * size}))
+            forces[size] = float(np.square(change / forces_of).sum())
+            size *= 10.0
+        largest = max(forces.values(), default=0.0)
+        if largest > SLIGHT:
+            size = next(s for s, force in forces.items() if force >= MOST * largest)
+            values = [sign * k * size for k in MULTIPLES]
+            yield from ({**others, name: value} for value in values if low <= value <= high)
+
+
+def candidate(data: Sequence[WeakWindows], model: Model, base: np.ndarray, e: Effect) -> Candidate:
+    """An effect's shapes on these data."""
+    shapes: list[Shape] = []
+    # By inertia, current and measurement the model error changes smoothly, but not linearly.
+    hull = e.kind in ("force", "environment", "actuator") and e.linear
+    step = 1.0 if hull or not e.differentiable else SMALL
+    if e.differentiable and not e.search.times:
+        plain = shape(data, model, base, {}, e.fitted, step)
+        shapes += [plain] if not e.search.smooth else curve(base, plain, model.ship.scale)
+    if spread(e):
+        return Candidate(e, [*shapes, *by_starts(data, model, base, e, step)])
+    for values in values_to_try(data, model, base, e):
+        shapes.append(shape(data, model, base, additions(model, e, values), e.fitted, step))
+    return Candidate(e, shapes)
+
+
+def candidates(
+    data: Sequence[WeakWindows], model: Model, base: np.ndarray, known: Set[str] = frozenset()
+) -> list[Candidate]:
+    """All effects that the ship can have and that a regression can find, but those that are known.
+
+    Those of one actuator of several with one command only where each has commands of its own.
+    """
+    ship = model.ship
+    apart = ship.layouts[-1]
+    each = any(ship.layout_of(w.run.commands) is apart for w in data)
+    effects = [ship.effects[name] for name in ship.candidates if name not in known]
+    possible = [e for e in effects if e.search.by == "regression" and (each or APART not in e.needs)]
+    tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
+    remember_responses(data, [model, *map(model.plus, tried)])
+    found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
+    return [c for c in found if c.shapes]

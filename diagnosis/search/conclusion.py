@@ -1,0 +1,195 @@
+"""The end of a search: what was found, with intervals, shares and confidence, all fitted together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..predictors import Model
+from ..predictors.uncertainty import omega_std
+from .candidates import model_error
+from .confidence import Evidence, confidence, credible, evidence
+from .findings import Finding, Findings, Ranked, Suspect
+from .gram import Nuisance, block_folds, gram_table
+from .map_regression import Scored, regression, ridge, score
+from .prior import NominalPrior
+from .refinement import Estimate, TrainingSet, nuisance_of, refit
+
+SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
+NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class AcceptedEffect:
+    """An effect that was found, as long as its values still change.
+
+    Attributes:
+        id: of the effect.
+        names: of its parameters.
+        intervals: 95 % interval of each change point [s] and of each parameter that it is not smooth in.
+        weights: id -> probability of the effect and of its rivals, of the candidates together 1.
+    """
+
+    id: str
+    names: Sequence[str]
+    intervals: Mapping[str, tuple[float, float]]
+    weights: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What the selection of effects came to.
+
+    Attributes:
+        t: what it was fitted to.
+        at: the most likely model.
+        accepted: the effects found, in the order of acceptance.
+        ranked: candidates of the first step.
+        lacking: (K, 3), the first model error.
+    """
+
+    t: TrainingSet
+    at: Estimate
+    accepted: Sequence[AcceptedEffect]
+    ranked: Sequence[Ranked]
+    lacking: np.ndarray
+
+    @property
+    def model(self) -> Model:
+        """The most likely model."""
+        return self.at.model(self.t.prior)
+
+    @cached_property
+    def _nuisance(self) -> Nuisance:
+        return nuisance_of(self.t, self.at, self.t.error(self.at))
+
+    def findings(self, ids: Sequence[str] | None = None) -> Findings:
+        """What was found, or the findings with some of the effects only, the rest fitted anew."""
+        kept = [p for p in self.accepted if ids is None or p.id in ids]
+        if len(kept) < len(self.accepted):
+            gone = {n for p in self.accepted if p not in kept for n in p.names}
+            at = self.at.without(gone)
+            at = refit(self.t, at, self._of(at)).estimate
+            return replace(self, at=at, accepted=kept).findings()
+        names, std = self.at.fitted, laplace_std(self.t, self._nuisance)
+        nested, shares = self._nested()
+        effects = []
+        for k, p in enumerate(self.accepted):
+            values = {n: self.at.values[n] for n in p.names}
+            own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
+            seen, alike = self._evidence(p), credible(p.id, p.weights)
+            together = seen._replace(bagged=p.weights[p.id] + sum(p.weights[i] for i in alike))
+            effects.append(
+                Finding(
+                    p.id,
+                    values,
+                    own | dict(p.intervals),
+                    confidence(seen),
+                    alike,
+                    sum(shares[: k + 1]),
+                    shares[k],
+                    nested[k],
+                    seen,
+                    confidence(together),
+                )
+            )
+        t = self.t
+        prior, believed = t.prior, any(self.t.prior.std.values())
+        moved = dict(zip(prior.mean, self.at.offset.tolist(), strict=True)) if believed else {}
+        return Findings(
+            effects,
+            self.ranked,
+            self.model if effects else self.at.start,
+            suspected(prior, self.at.offset, std[len(names) :]) if believed else [],
+            np.asarray(t.sigma),
+            self.at.without(self.at.values).model(prior) if believed and not effects else None,
+            moved,
+            self._fold_models(),
+            self.findings,
+            self.at,
+            prior,
+        )
+
+    def _fold_models(self) -> list[Model]:
+        """The model fitted without each fold of the data, by one step about the fit to all."""
+        t, fitted = self.t, self.at.fitted
+        table = gram_table(t.error(self.at), t.blocks, [], self._nuisance, np.asarray(t.sigma))
+        all_of_it = regression(table, -1, 0)
+        models = []
+        for held in block_folds(t.data):
+            change = -all_of_it.fitted(table.total - table.grams[held].sum(axis=0)).left[1:]
+            step = dict(zip(fitted, change.tolist(), strict=False))
+            models.append(self.at.plus(step, change[len(fitted) :]).model(t.prior))
+        return models
+
+    def _of(self, at: Estimate) -> Nuisance:
+        """Nuisance parameters of a part of the effects, by slopes beside all of them."""
+        names = [*self.at.fitted, *self.t.prior.mean]
+        kept = [k for k, n in enumerate(names) if n in at.fitted or k >= len(self.at.fitted)]
+        a = self._nuisance
+        return Nuisance(a.columns[..., kept], a.precision[kept][:, kept], a.offset[kept], a.unit[kept])
+
+    def _nested(self) -> tuple[list[Model], list[float]]:
+        """The models with each effect and those before it, and its share of the first model error.
+
+        That is the fall of the cross-validated sum of squares; before the first effect stands the model
+        that the search started from.
+        """
+        t, models, shares = self.t, [], []
+        total = before = float(np.sum((self.lacking * t.weight) ** 2))
+        for k in range(len(self.accepted)):
+            at, nuisance = self.at, self._nuisance
+            later = {n for p in self.accepted[k + 1 :] for n in p.names}
+            if later:
+                at = at.without(later)
+                nuisance = self._of(at)
+                at = refit(t, at, nuisance).estimate
+                theta = [*[at.values[n] for n in at.fitted], *at.offset]
+                nuisance = replace(nuisance, offset=np.array(theta))
+            left = float(self._scored(at, nuisance).blocks.sum())
+            models.append(at.model(t.prior))
+            shares.append((before - left) / total)
+            before = left
+        return models, shares
+
+    def _scored(self, at: Estimate, nuisance: Nuisance) -> Scored:
+        """A model as it is, by fits to a part of the data, linear about it."""
+        t = self.t
+        table = gram_table(t.error(at), t.blocks, [], nuisance, np.asarray(t.sigma))
+        return score(table, -1, 1)
+
+    def _evidence(self, p: AcceptedEffect) -> Evidence:
+        data, model = self.t.data, self.model
+        left = model_error(data, model)
+        without = model_error(data, self.at.without(p.names).model(self.t.prior))
+        std = np.concatenate([omega_std(w, model) for w in data])
+        return evidence(p.weights[p.id], without - left, left, std, self.t.blocks)
+
+
+def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:
+    """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
+    A = np.moveaxis(nuisance.columns * t.weight[:, None], 2, 0).reshape(nuisance.offset.size, -1).T
+    H = A.T @ A + nuisance.precision
+    H += ridge(H, nuisance.unit)
+    return np.sqrt(np.diag(np.linalg.inv(H)))
+
+
+def interval(value: float, std: float) -> tuple[float, float]:
+    """95 % interval."""
+    return value - NORMAL_95 * std, value + NORMAL_95 * std
+
+
+def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray) -> list[Suspect]:
+    """Nominal coefficients whose posterior excludes what is believed of them, the furthest first.
+
+    Args:
+        prior: of all nominal coefficients.
+        offset, std: (q,), mean and standard deviation of the posterior, in prior standard deviations.
+    """
+    found = [
+        Suspect(name, float(k), prior.mean[name] + believed * float(k))
+        for (name, believed), k, s in zip(prior.std.items(), offset, std, strict=True)
+        if abs(k) > SUSPECT * s
+    ]
+    return sorted(found, key=lambda s: -abs(s.z))

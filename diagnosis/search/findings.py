@@ -1,0 +1,141 @@
+"""What an identification finds, whatever its method."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..predictors import Model
+from ..predictors.ship_model import parameter_and_run
+from .confidence import Evidence
+from .prior import NominalPrior
+
+if TYPE_CHECKING:
+    from .refinement import Estimate
+
+
+# Prior standard deviations beyond which a coefficient alone is no explanation; contract.
+MOST_MOVED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """A candidate in the order of its score.
+
+    Attributes:
+        id: of the effect.
+        score: cross-validated loss; lower is better.
+        q2: cross-validated share of the model error that it explains with the nominal coefficients.
+        beyond: share of what those coefficients leave, alone, that it explains; NaN: not known.
+        behind, behind_std: its score less that of the first, and the standard error of that difference,
+            paired over blocks; NaN: not known.
+    """
+
+    id: str
+    score: float
+    q2: float
+    beyond: float = np.nan
+    behind: float = np.nan
+    behind_std: float = np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """A nominal coefficient that is wrong.
+
+    Attributes:
+        name: of the coefficient.
+        z: by how many prior standard deviations.
+        value: what it is in the learned model, SI.
+    """
+
+    name: str
+    z: float
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One effect that was found.
+
+    Attributes:
+        id: of the effect.
+        values: its parameters as additions to the nominal ones; named ``parameter@run`` if of one run.
+        ci95: interval of each that is fitted, at the final step.
+        confidence: probability that it is a true cause; NaN where a method has none.
+        alike: the other ids of the smallest set that holds it and 95 % of the candidates' probability,
+            by the weights that its confidence comes from; the most likely first.
+        q2: cross-validated share of the model error that is explained, with all found before.
+        share: how much of the cross-validated model error went with this finding.
+        model: with this and all earlier findings.
+        evidence: what the confidence is made of; None where a method has none.
+        together: probability that it or one of ``alike`` is a true cause; NaN where a method has none.
+        doubt: what speaks against it beside the confidence, as a part of a sentence.
+    """
+
+    id: str
+    values: Mapping[str, float]
+    ci95: Mapping[str, tuple[float, float]]
+    confidence: float
+    alike: Sequence[str]
+    q2: float
+    share: float
+    model: Model = field(default_factory=Model)
+    evidence: Evidence | None = None
+    together: float = np.nan
+    doubt: str = ""
+
+    @property
+    def of_runs(self) -> list[str]:
+        """The runs in which alone it holds, such as times of failures; none: it holds in all."""
+        runs = (parameter_and_run(name)[1] for name in self.values)
+        return [*dict.fromkeys(run for run in runs if run)]
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What a method found.
+
+    Attributes:
+        effects: in the order of acceptance.
+        ranking: of the first step.
+        model: with all effects; where there are none, the model that it started from.
+        suspects: nominal coefficients that are wrong, with values as in ``model``, or, where there is no
+            effect, as in ``refitted``.
+        sigma: (3,), noise of each axis [N, N, N m].
+        refitted: the most likely model without an effect, but other nominal coefficients; None where a
+            method does not fit them.
+        moved: nominal coefficient -> by how many prior standard deviations the fit moved it.
+        fold_models: the model fitted without each fold of the training runs, see
+            :func:`.gram.block_folds`; empty where a method has none.
+        refit: the findings with some of the effects only, everything else fitted anew; None where a
+            method cannot.
+        estimate: the most likely parameters, from which a fit to predictions begins; None where a method
+            has no such.
+        searched: the prior of the coefficients in which its offsets are.
+    """
+
+    effects: Sequence[Finding] = field(default_factory=list)
+    ranking: Sequence[Ranked] = field(default_factory=list)
+    model: Model = field(default_factory=Model)
+    suspects: Sequence[Suspect] = field(default_factory=list)
+    sigma: np.ndarray = field(default_factory=lambda: np.ones(3))
+    refitted: Model | None = None
+    moved: Mapping[str, float] = field(default_factory=dict)
+    fold_models: Sequence[Model] = ()
+    refit: "Callable[[Sequence[str]], Findings] | None" = None
+    estimate: "Estimate | None" = None
+    searched: NominalPrior | None = None
+
+    @property
+    def plausible(self) -> bool:
+        """Whether no nominal coefficient is further from what is believed of it than MOST_MOVED."""
+        return all(abs(z) <= MOST_MOVED for z in self.moved.values())
+
+    def plausible_by(self, prior: NominalPrior) -> bool:
+        """The same by another prior than that of the search, which believes in all to a tenth."""
+        if self.searched is None or self.estimate is None:
+            return self.plausible
+        offset = prior.rescaled(self.estimate.offset, self.searched)
+        return bool((np.abs(offset) <= MOST_MOVED).all())

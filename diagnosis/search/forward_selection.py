@@ -1,0 +1,220 @@
+"""Forward selection: the effect that is missing first, then the next, until nothing more is sure.
+
+Each step scores every effect by block-cross-validated MAP regression, refines the best by Gauss-Newton,
+and accepts the first if it is beyond chance and does no harm in runs that it was not fitted to. The
+model then takes the effect in, so that the next step starts from a model that is right so far; what was
+found is refined along with each candidate. With a second effect in, each effect is searched again.
+
+One of two causes, alone, may well do harm where the other acts most: an effect that explains much and
+harms is kept on trial for one step, and stays if it and the next do no harm together.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fmus.effects import Effect
+
+from ..predictors import Model, WeakWindows
+from ..predictors.weak_form import commanded
+from .conclusion import AcceptedEffect, Selection
+from .findings import Finding, Findings, Ranked
+from .gram import RUN
+from .map_regression import Scored, first_share
+from .nonlinear.profile import profiled
+from .nonlinear.waves import Waves, find_waves
+from .prior import MEASURED, NominalPrior, Prior
+from .refinement import Estimate, TrainingSet, nuisance_of, refit
+from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
+from .significance import better, beyond_chance, harmful, matters
+
+MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
+REPLICATES = 200  # of the bootstrap: the standard error of a share is 3.5 % at the most
+ROUNDS = 2  # of searching all effects again, at the most; chosen
+
+
+class ForwardSelection:
+    """Block-cross-validated forward selection of MAP regressions with Gauss-Newton refinement."""
+
+    name = "selection"
+
+    def fit(
+        self,
+        runs: Sequence[WeakWindows],
+        model: Model,
+        prior: Prior,
+        advance: Callable[[str], None],
+        seed: int,
+    ) -> Findings:
+        """The effects that a model lacks, see :class:`.methods.Method`."""
+        rng = np.random.default_rng(seed)
+        done = search(runs, prior, model, advance, rng)
+        found = done.findings()
+        spectral = [e for e in model.ship.effects.values() if e.search.by == "spectrum"]
+        if not spectral:
+            return found
+        advance("waves")
+        for w in runs:  # the windows of a long run need room
+            w.memory.clear()
+        peak = find_waves([w.smoothed for w in runs], done.model, rng)
+        if peak is None:
+            return found
+        waves, ranked = of_waves(spectral[0], peak, model), Ranked(spectral[0].id, 0.0, peak.share)
+
+        def with_waves(with_them: Findings) -> Findings:
+            return replace(
+                with_them,
+                effects=[waves, *with_them.effects],
+                ranking=[ranked, *with_them.ranking],
+                refit=lambda ids: (
+                    with_waves(done.findings(ids)) if waves.id in ids else done.findings(ids)
+                ),
+            )
+
+        return with_waves(found)
+
+
+def search(
+    data: Sequence[WeakWindows],
+    prior: Prior,
+    start: Model,
+    advance: Callable[[str], None],
+    rng: np.random.Generator,
+) -> Selection:
+    """All effects that a regression finds.
+
+    Args:
+        data: windows of every training run.
+        prior: of the nominal coefficients, see :mod:`.prior`.
+        start: model to start from.
+        advance: receives the name of each step.
+        rng: for the bootstrap.
+    """
+    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(data)])
+    belief = NominalPrior.of(start, prior, MEASURED)
+    t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
+    advance("every effect as a candidate")
+    ranking = rank(t, at, set())
+    lacking, command = ranking.base, commanded(data, start)
+    ranked: list[Ranked] = []
+    accepted: list[AcceptedEffect] = []
+    before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
+    while len(accepted) < MOST_EFFECTS:
+        advance(f"effect {len(accepted) + 1}: the best candidates refined")
+        weighed = reweighted(t, at, ranking)
+        if weighed is None:
+            t = t if t.sigma is not None else replace(t, sigma=ranking.table.sigma)
+            break
+        t, ranking, best = weighed
+        total = float(np.sum((lacking * t.weight) ** 2))
+        first = best.scored[0]
+        without = best.winner.without(best.starts[first.candidate].values)
+        left = best.refined[first.candidate].left
+        # As well fitted as the candidates are: what other coefficients give is not an effect's.
+        alone = refit(t, at, ranking.nuisance).estimate
+        nothing = scored_alone(t, alone)
+        ranked = ranked or in_one_order(ranking, best, nothing)
+        shows = matters(lacking, t.error(without), left, command)
+        if not (shows and beyond_chance(nothing, first, total)):
+            break
+        harms = harmful(nothing if before is None else scored_alone(t, before[1]), first)
+        if harms and before is not None:
+            break
+        before = (t, alone) if harms else None
+        accepted.append(accepted_effect(best, rng))
+        at = best.winner
+        del ranking, best  # of a long run there is no room for two
+        if len(accepted) > 1 and before is None:
+            at, accepted = searched_again(t, at, accepted, advance, rng)
+        advance(f"effect {len(accepted) + 1}: every effect as a candidate")
+        ranking = rank(t, at, {p.id for p in accepted})
+    if before is not None:
+        t, at = before
+        del accepted[-1]
+    at = refit(t, at, nuisance_of(t, at, t.error(at))).estimate
+    for k, p in enumerate(accepted):
+        at, intervals = profiled(t, at, p)
+        accepted[k] = replace(p, intervals={**p.intervals, **intervals})
+    return Selection(t, at, accepted, ranked, lacking)
+
+
+def searched_again(
+    t: TrainingSet,
+    at: Estimate,
+    accepted: Sequence[AcceptedEffect],
+    advance: Callable[[str], None],
+    rng: np.random.Generator,
+) -> tuple[Estimate, list[AcceptedEffect]]:
+    """Each effect but the last found is taken out, and its place searched again beside the others.
+
+    What came first had to stand for all that was missing: a wrong one, or a free curve where a simple
+    law does, gives way to what is better beside the others.
+    """
+    found = list(accepted)
+    count = len(found) - 1
+    due = [*range(count)]  # effects of which something beside them has changed
+    for _ in range(ROUNDS * count):
+        if not due:
+            break
+        k = due.pop(0)
+        advance(f"effect {k + 1}: its place searched again")
+        others = [p for p in found if p is not found[k]]
+        beside = at.without(found[k].names)
+        beside = refit(t, beside, nuisance_of(t, beside, t.error(beside))).estimate
+        ranking = rank(t, beside, {p.id for p in others})
+        weighed = reweighted(t, beside, ranking)
+        chosen = weighed and better(found[k].id, weighed[-1], at.start.ship)
+        if weighed is not None and chosen is not None:
+            t, _, best = weighed
+            found[k] = accepted_effect(best, rng, chosen)
+            at = best.of(chosen)
+            due = [(k + j) % count for j in range(1, count)]
+    return at, found
+
+
+def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> AcceptedEffect:
+    """A candidate of a shortlist as an effect that was found.
+
+    Args:
+        best: the shortlist.
+        rng: for the bootstrap.
+        chosen: number of the candidate in its order.
+    """
+    first = best.scored[chosen].candidate
+    shares = first_share(best.scored, REPLICATES, rng).tolist()
+    return AcceptedEffect(
+        best.ids[first],
+        tuple(best.starts[first].values),
+        best.refined[first].intervals,
+        {best.ids[s.candidate]: share for s, share in zip(best.scored, shares, strict=True)},
+    )
+
+
+def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ranked]:
+    """Every candidate in order, those of the shortlist as refined.
+
+    Args:
+        ranking: all candidates.
+        best: the shortlist.
+        nothing: the score of the nominal coefficients alone.
+    """
+    refined = [(best.ids[s.candidate], s) for s in best.scored]
+    rest = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order[len(refined) :]]
+    in_order = sorted(refined + rest, key=lambda named: named[1].score)
+    first, alone = in_order[0][1], float(nothing.blocks.sum())
+
+    def ranked(name: str, s: Scored) -> Ranked:
+        d, left = s.blocks - first.blocks, float(s.blocks.sum())
+        std = float(np.sqrt(d.size) * d.std())
+        return Ranked(
+            name, s.score, 1.0 - left / ranking.size, 1.0 - left / alone, s.score - first.score, std
+        )
+
+    return [ranked(name, s) for name, s in in_order]
+
+
+def of_waves(e: Effect, found: Waves, start: Model) -> Finding:
+    """Waves as a finding: the model stays as it is."""
+    values = {"wave_peak": found.peak - start.value("wave_peak"), "wave_force": found.force}
+    return Finding(e.id, values, {}, found.confidence, [], found.share, found.share, start)

@@ -1,0 +1,202 @@
+"""Gram matrices of all candidates, block by block.
+
+With the model error y and the regressors X of a block in units of the noise, a block holds
+[y X]^T [y X]. Sums over blocks give every regression, its folds and its bootstrap replicates without
+the data themselves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..predictors import WeakWindows
+from ..predictors.weak_form import OVERLAP
+from .candidates import Candidate
+
+RUN = 10_000  # blocks of a run are numbered from this times its number on
+FOLDS = 8  # of cross-validation over blocks
+# Stretches of a single run that are left out in turn, as long as the shortest run that can be learned
+# from; chosen.
+STRETCHES = 4
+# Ridge of the regression for the noise, relative to the regressors: they may be collinear.
+NOISE_RIDGE = 1e-6
+
+Key = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """Nuisance parameters, fitted along with every candidate.
+
+    Their prior penalty is (offset + b)^T precision (offset + b) for a change b.
+
+    Attributes:
+        columns: (K, 3, q), force of one unit of each.
+        precision: (q, q), prior precision: 1 on the diagonal for a nominal coefficient, in prior
+            standard deviations; 0 for a parameter of an effect that was found before.
+        offset: (q,), how far each already is from its prior mean.
+        unit: (q,), what one unit of each is at the size of the ship; 1 for a nominal coefficient.
+    """
+
+    columns: np.ndarray
+    precision: np.ndarray
+    offset: np.ndarray
+    unit: np.ndarray
+
+
+class Folds(NamedTuple):
+    """Of each fold the blocks held out (h,), and the Gram matrix of all others, (folds, p, p)."""
+
+    held: list[np.ndarray]
+    train: np.ndarray
+
+
+class Entry(NamedTuple):
+    """One shape of a candidate among the columns.
+
+    Attributes:
+        given: index of the column of what is given, -1 without one.
+        columns: indices of its fitted columns.
+        start: (p,), where the fitted parameters are at first.
+        precision: (p, p), their prior precision.
+        offset: (q,), offset of the nuisance parameters that belongs to what is given.
+        nonlinear: number of parameters that are given, not fitted.
+    """
+
+    given: int
+    columns: list[int]
+    start: np.ndarray
+    precision: np.ndarray
+    offset: np.ndarray
+    nonlinear: int
+
+
+NOTHING: Key = (-1, 0)  # the key of no candidate at all
+
+
+@dataclass(frozen=True, eq=False)
+class GramTable:
+    """All columns of one problem as Gram matrices, block by block.
+
+    Attributes:
+        grams: (blocks, p, p), in units of the noise; column 0 is the model error.
+        rows: windows in each block.
+        runs: number of each block's run.
+        entries: (candidate, shape) -> its columns.
+        nuisance: indices of the nuisance parameters' columns.
+        precision: (q, q), their prior precision.
+        unit: (p,), what one unit of each column's parameter is at the size of the ship.
+        sigma: (3,), standard deviation of the noise of each axis [N, N, N m].
+    """
+
+    grams: np.ndarray
+    rows: np.ndarray
+    runs: np.ndarray
+    entries: dict[Key, Entry]
+    nuisance: list[int]
+    precision: np.ndarray
+    unit: np.ndarray
+    sigma: np.ndarray
+
+    @cached_property
+    def total(self) -> np.ndarray:
+        """(p, p), over all blocks."""
+        return self.grams.sum(axis=0)
+
+    @cached_property
+    def by_block(self) -> Folds:
+        """Folds of interleaved blocks of all runs."""
+        return self._folds(np.arange(len(self.grams)) % FOLDS)
+
+    @cached_property
+    def by_run(self) -> Folds:
+        """Each run as a fold of its own."""
+        return self._folds(self.runs)
+
+    def _folds(self, number: np.ndarray) -> Folds:
+        held = [np.flatnonzero(number == n) for n in np.unique(number)]
+        return Folds(held, np.stack([self.total - self.grams[k].sum(axis=0) for k in held]))
+
+    @property
+    def per_parameter(self) -> float:
+        """Complexity penalty of one parameter: log n of the Bayesian information criterion."""
+        return float(np.log(3.0 * self.rows.sum() / OVERLAP))
+
+
+def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """RMS of what even all columns together leave of the model error, by axis, at least ``floor``."""
+
+    def left(axis: int) -> float:
+        A = columns[:, axis, :]
+        A = A[:, np.abs(A).max(axis=0) > 0.0]
+        scale = np.sqrt((A**2).mean(axis=0))
+        A = A / scale
+        gram = A.T @ A + NOISE_RIDGE * len(A) * np.eye(A.shape[1])
+        fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
+        return float(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
+
+    return np.maximum([left(axis) for axis in range(3)], floor)
+
+
+def gram_table(
+    y: np.ndarray,
+    blocks: np.ndarray,
+    candidates: Sequence[Candidate],
+    nuisance: Nuisance,
+    sigma: np.ndarray,
+) -> GramTable:
+    """Gram matrices of some candidates.
+
+    Args:
+        y: (K, 3), model error [N, N, N m].
+        blocks: (K,), number of the block of each window.
+        candidates: with their shapes.
+        nuisance: parameters that are fitted along.
+        sigma: (3,), standard deviation of the noise of each axis.
+    """
+    columns, units = [y[:, :, None]], [np.ones(1)]
+    count = 1
+    entries = {NOTHING: Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)}
+    for i, c in enumerate(candidates):
+        for j, s in enumerate(c.shapes):
+            given = -1
+            if s.offset is not None:
+                columns.append(s.offset[:, :, None])
+                units.append(np.ones(1))
+                given = count
+                count += 1
+            columns.append(s.columns)
+            units.append(s.unit)
+            size = len(s.fitted)
+            entries[i, j] = Entry(
+                given,
+                list(range(count, count + size)),
+                np.array([s.given.get(n, 0.0) for n in s.fitted]),
+                np.zeros((size, size)) if s.precision is None else s.precision,
+                nuisance.offset if s.nuisance_offset is None else s.nuisance_offset,
+                len(set(s.given) - set(s.fitted)),
+            )
+            count += size
+    columns.append(nuisance.columns)
+    units.append(nuisance.unit)
+    indices = list(range(count, count + nuisance.columns.shape[2]))
+    A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
+    names = np.unique(blocks)
+    grams = np.empty((names.size, A.shape[2], A.shape[2]))
+    for k, name in enumerate(names):
+        part = A[blocks == name].reshape(-1, A.shape[2])
+        grams[k] = part.T @ part
+    rows = np.array([(blocks == name).sum() for name in names])
+    runs, unit = names // RUN, np.concatenate(units)
+    return GramTable(grams, rows, runs, entries, indices, nuisance.precision, unit, sigma)
+
+
+def block_folds(data: Sequence[WeakWindows]) -> list[np.ndarray]:
+    """Numbers of the blocks of each run, counted through all; of a single run those of its stretches."""
+    counts = [np.unique(w.block).size for w in data]
+    if len(data) == 1:
+        return np.array_split(np.arange(counts[0]), min(STRETCHES, counts[0]))
+    return np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])

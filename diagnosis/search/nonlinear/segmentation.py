@@ -1,0 +1,391 @@
+"""When a thruster gave nothing: penalised segmentation of the model error over time.
+
+With y the model error in units of the noise and c_j what it would be less were the thruster dead during
+the cell j of time, the intervals minimise
+
+    min over b of |y - sum_j d_j c_j - Z b|^2 + (o + b)^T Q (o + b)  +  log n for each change point,
+
+d_j being 1 inside of them and 0 elsewhere, and Z, Q, o the nuisance parameters as in
+:mod:`.map_regression`. log n is the charge of the Bayesian information criterion for a parameter: of
+some n places chance finds one at which the sum falls by 2 log n, no more for an interval's two ends.
+
+With b held and windows taken as independent, dynamic programming gives the least sum (Auger and Lawrence
+1989; with a charge for each change Killick, Fearnhead and Eckley 2012). Then b is fitted, and so on; at
+the end the change points are moved one by one while the exact sum falls.
+
+Each run has intervals of its own: its cells follow those of the run before, and no interval lies in two.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, vstack
+
+from fmus.effects import Effect
+from fmus.scale import Scale
+
+from ...predictors import Model, WeakWindows
+from ...predictors.ship_model import of_run
+from ...predictors.weak_form import EVERY, OVERLAP, thrust_along
+
+# Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
+# s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
+CELL, CELLS = 0.1, 50_000
+DECIMALS = 6  # of a time [s], so that it reads as it was meant
+MOVES = (20, 5, 1)  # cells by which change points are moved, the coarse first
+ROUNDS = 8  # of programming and fitting, and of moves, at the most; three are usual
+LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one degree of freedom
+
+SETTLED = 0.95  # share of the noise by which it must still fall for another round; chosen
+FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
+# Share of the time at work of a thruster in a run in which it fails at the most: what is so most of the
+# time is the rule and no failure, such as a dead band of small commands; chosen.
+EXCEPTION = 0.5
+RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
+
+Interval = tuple[float, float]
+NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Spans = list[tuple[int, int]]  # intervals in cells, the second end not included
+
+
+class Section(NamedTuple):
+    """The cells of one run.
+
+    Attributes:
+        run: its name.
+        first: time at which the cells begin [s].
+        start, end: the first cell, and that after the last.
+        names: start and end of each interval that it may have; of one that lasts the end is empty.
+    """
+
+    run: str
+    first: float
+    start: int
+    end: int
+    names: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A model error that intervals without thrust may explain.
+
+    Attributes:
+        sections: of the runs.
+        lasting: whether an interval has no end but that of its run.
+        cell: how long each cell is [s].
+        y: (3 K,), model error.
+        columns: (3 K, m), what each cell of a dead thruster adds to it.
+        middles: (K,), cell, and part of it, in which the middle of each window lies.
+        nuisance: (3 K, q), nuisance parameters; all three in units of the noise, or of force.
+        precision, offset, unit: (q, q), (q,) and (q,), of the nuisance parameters.
+        work: (m,), share of the run's time in which the thruster is commanded, in each cell.
+        scale: of the ship.
+    """
+
+    sections: Sequence[Section]
+    lasting: bool
+    cell: float
+    y: np.ndarray
+    columns: csc_matrix
+    middles: np.ndarray
+    nuisance: np.ndarray
+    precision: np.ndarray
+    offset: np.ndarray
+    unit: np.ndarray
+    work: np.ndarray
+    scale: Scale
+
+    def passing(self, spans: Spans) -> bool:
+        """Whether in each run the thruster works for at least half of the time of its commands."""
+        dead: Counter[str] = Counter()
+        for a, b in spans:
+            dead[self.section(a).run] += self.work[a:b].sum()
+        return self.lasting or all(share <= EXCEPTION for share in dead.values())
+
+    def without_end(self, spans: Spans) -> bool:
+        """Whether there is one interval in each run at the most, and it lasts to the end of the run."""
+        runs = [self.section(a).run for a, _ in spans]
+        return len(set(runs)) == len(runs) and all(b == self.section(a).end for a, b in spans)
+
+    def section(self, cell: int) -> Section:
+        """The section that a cell lies in."""
+        return next(s for s in self.sections if cell < s.end)
+
+    @property
+    def charge(self) -> float:
+        """Of each change point."""
+        return float(np.log(self.y.size / OVERLAP))
+
+    def weighted(self, sigma: np.ndarray) -> "Problem":
+        """The same in units of the noise sigma (3,)."""
+        weight = np.tile(1.0 / sigma / np.sqrt(OVERLAP), self.y.size // 3)
+        columns = csc_matrix(diags(weight) @ self.columns)
+        nuisance = weight[:, None] * self.nuisance
+        return replace(self, y=weight * self.y, columns=columns, nuisance=nuisance)
+
+    def keys(self, spans: Spans) -> list[tuple[str, str]]:
+        """Names of the values that are start and end of each interval; of an end that is none: empty."""
+        used: Counter[str] = Counter()
+        found = []
+        for a, _ in spans:
+            s = self.section(a)
+            start, end = s.names[used[s.run]]
+            found.append((of_run(start, s.run), end and of_run(end, s.run)))
+            used[s.run] += 1
+        return found
+
+    def seconds(self, s: Section, cell: int) -> float:
+        """Time [s] in a run; where 0 would mean that an effect never begins, a cell later."""
+        time = round(s.first + self.cell * (cell - s.start), DECIMALS)
+        return max(time, self.cell) if self.lasting else time
+
+    def values(self, spans: Spans) -> dict[str, float]:
+        """Intervals as values [s] of the effect's parameters, each in its run."""
+        return {
+            key: self.seconds(self.section(span[0]), cell)
+            for span, pair in zip(spans, self.keys(spans), strict=True)
+            for cell, key in zip(span, pair, strict=True)
+            if key
+        }
+
+    def spans(self, values: Mapping[str, float]) -> Spans:
+        """The intervals among the values [s] of the effect's parameters."""
+        found = []
+        for s in self.sections:
+            for start, end in ((of_run(a, s.run), of_run(b, s.run)) for a, b in s.names):
+                if start in values:
+                    times = values[start], values.get(end, np.inf)
+                    a, b = (min((t - s.first) / self.cell, s.end - s.start) for t in times)
+                    found.append((s.start + max(round(a), 0), s.start + round(b)))
+        return found
+
+    def left(self, spans: Spans) -> np.ndarray:
+        """(3 K,), model error without what the intervals add to it."""
+        dead = np.zeros(self.work.size)
+        for a, b in spans:
+            dead[a:b] = 1.0
+        return self.y - self.columns @ dead
+
+    def fitted(self, left: np.ndarray) -> tuple[np.ndarray, float]:
+        """What the nuisance parameters leave over (3 K,), and the cost with their prior penalty."""
+        if not self.offset.size:
+            return left, float(left @ left)
+        right = self.nuisance.T @ left - self.precision @ self.offset
+        b = cho_solve(self._information, right)
+        over = left - self.nuisance @ b
+        last = self.offset + b
+        return over, float(over @ over + last @ self.precision @ last)
+
+    @cached_property
+    def _information(self) -> tuple[np.ndarray, bool]:
+        H = self.nuisance.T @ self.nuisance + self.precision
+        return cho_factor(H + RIDGE * np.diag(np.diag(H) + self.unit**-2.0))
+
+    def cost(self, spans: Spans) -> float:
+        """What is minimised; an end beyond the data of a run is no change point."""
+        points = sum(1 + (b < self.section(a).end) for a, b in spans)
+        return self.fitted(self.left(spans))[1] + self.charge * points
+
+
+def segmented(p: Problem, start: Spans | None = None) -> Spans:
+    """The intervals of least cost, from those of a start or from none."""
+    best = moved(p, start or [])
+    least = p.cost(best)
+    whole = np.asarray(p.columns.sum(axis=1)).ravel()
+    for _ in range(ROUNDS):
+        left = p.left(best)
+        # With b held where it is: the error were there no interval, and what it falls by in each window.
+        before = p.fitted(left)[0] + p.y - left
+        gain = (2.0 * before * whole - whole**2).reshape(-1, 3).sum(axis=1)
+        found = moved(p, [span for s in p.sections for span in programmed_in(p, s, gain)])
+        cost = p.cost(found)
+        if cost > least - 1e-6:
+            break
+        best, least = found, cost
+    return best
+
+
+def programmed_in(p: Problem, s: Section, gain: np.ndarray) -> Iterator[tuple[int, int]]:
+    """The intervals of one run that gain the most, by what each window (K,) gains inside of one."""
+    size = EVERY * p.scale.time / p.cell  # cells in a bin
+    inside = (p.middles >= s.start) & (p.middles < s.end)
+    place = ((p.middles[inside] - s.start) / size + 1e-6).astype(int)
+    gained = np.bincount(place, gain[inside], int((s.end - s.start) / size))
+    for a, b in programmed(gained, p.charge, len(s.names), p.lasting):
+        yield s.start + round(a * size), s.end if b == gained.size else s.start + round(b * size)
+
+
+def intervals(p: Problem) -> Spans:
+    """The intervals of least cost where the noise is not known: it is what they leave over.
+
+    Args:
+        p: in units of force.
+    """
+    spans: Spans = []
+    sigma = np.full(3, np.inf)
+    for _ in range(ROUNDS):
+        left = p.fitted(p.left(spans))[0].reshape(-1, 3)
+        smaller = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
+        if (smaller > SETTLED * sigma).all():
+            break
+        sigma = np.minimum(smaller, sigma)
+        spans = segmented(p.weighted(sigma), spans)
+    return spans
+
+
+def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False) -> Spans:
+    """Intervals of bins that gain the most, less a charge for each change, by dynamic programming.
+
+    Args:
+        gain: (B,), of each bin inside an interval.
+        charge: of each change point; the end of the data is none.
+        most: intervals, at the most.
+        lasting: whether an interval has no end but that of the data.
+    """
+    states = 1 + most * (
+        2 - lasting
+    )  # number of changes so far: the thruster is dead in those that are odd
+    dead = np.arange(states) % 2
+    total = np.full(states, np.inf)
+    total[0] = 0.0
+    changed = np.zeros((gain.size, states), bool)
+    for k, g in enumerate(gain.tolist()):
+        after = np.concatenate([[np.inf], total[:-1] + charge])
+        changed[k] = after < total
+        total = np.minimum(after, total) - g * dead
+    state, edges = int(np.argmin(total)), []
+    if dead[state]:
+        edges.append(gain.size)
+    for k in range(gain.size - 1, -1, -1):
+        if changed[k, state]:
+            edges.append(k)
+            state -= 1
+    edges = edges[::-1]
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def around(p: Problem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
+    """The intervals with an end of the k-th moved, without it, or with it and the next made one."""
+    (a, b), before, after = spans[k], spans[:k], spans[k + 1 :]
+    section = p.section(a)
+    low = max(section.start, before[-1][1] if before else 0)
+    high = min(section.end, after[0][0] if after else section.end)
+    for step in (-size, size):
+        if low <= a + step < b:
+            yield [*before, (a + step, b), *after]
+        if a < b + step <= high and not p.lasting:
+            yield [*before, (a, b + step), *after]
+    yield before + after
+    if after and after[0][1] <= section.end:
+        yield [*before, (a, after[0][1]), *after[1:]]
+
+
+def moved(p: Problem, spans: Spans) -> Spans:
+    """Intervals with change points moved one by one while the cost falls."""
+    least = p.cost(spans)
+    for size in MOVES:
+        for _ in range(ROUNDS):
+            before = least
+            for k in reversed(range(len(spans))):
+                if k < len(spans):
+                    cost, trial = min((p.cost(trial), trial) for trial in around(p, spans, k, size))
+                    if cost < least:
+                        least, spans = cost, trial
+            if least == before:
+                break
+    return spans
+
+
+def likely(p: Problem, spans: Spans) -> dict[str, Interval]:
+    """95 % intervals of all change points [s] by their names, each with the others held."""
+    least, found = p.cost(spans) + LIKELY, {}
+    for k, (span, pair) in enumerate(zip(spans, p.keys(spans), strict=True)):
+        section = p.section(span[0])
+        for end, key in enumerate(pair):
+            reached = []
+            for step in (-1, 1):
+                place = span[end]
+                for _ in range(MOVES[0]):
+                    there = [*span]
+                    there[end] = place + step
+                    trial = [*spans[:k], (there[0], there[1]), *spans[k + 1 :]]
+                    fits = section.start <= there[0] < there[1] <= section.end
+                    if not fits or p.cost(trial) > least:
+                        break
+                    place += step
+                reached.append(p.seconds(section, place + step))
+            if key:
+                found[key] = (reached[0], reached[1])
+    return found
+
+
+def problem(
+    data: Sequence[WeakWindows],
+    model: Model,
+    base: np.ndarray,
+    e: Effect,
+    nuisance: NuisanceParts | None = None,
+) -> Problem | None:
+    """The problem of an effect with intervals, in units of force; None: its thruster is never at work.
+
+    Args:
+        data: windows of every run.
+        model: without the effect.
+        base: (K, 3), its model error.
+        e: the effect.
+        nuisance: columns (K, 3, q), prior precision, offset and unit of nuisance parameters; None: none.
+    """
+    ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + w.width) for w in data]
+    scale = model.ship.scale
+    cell = max(CELL * scale.time, sum(last - first for first, last in ends) / CELLS)
+    counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
+    # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
+    turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
+    sections: list[Section] = []
+    parts, work, middles = [], [], []
+    for w, (first, last), count in zip(data, ends, counts, strict=True):
+        whole = dict(zip(e.search.intervals[0], (max(first, cell), last), strict=True))
+        named = {of_run(n, w.run.name): time for n, time in whole.items() if n}
+        dead = model.plus({n: time - model.value(n) for n, time in named.items()})
+        lost = thrust_along(w, model) - thrust_along(w, dead)
+        place = np.clip(((w.run.time - first) / cell + 1e-6).astype(int), 0, count - 1)
+        worked = np.bincount(place, np.any(lost != 0.0, axis=1), count)
+        work.append(worked / max(worked.sum(), 1.0))
+        where = csr_matrix((np.ones(place.size), (np.arange(place.size), place)), (place.size, count))
+        force = [w.held @ diags(-axis) @ where for axis in lost.T]
+        by_axis = vstack([sum(f * g for f, g in zip(force, gain, strict=True)) for gain in turned.T])
+        rows = np.arange(3 * w.middle.size).reshape(3, -1).T.ravel()  # axes of a window together
+        parts.append(by_axis.tocsr()[rows])
+        start = sections[-1].end if sections else 0
+        free = [pair for pair in e.search.intervals if not any(_set(model, n, w) for n in pair)]
+        sections.append(Section(w.run.name, first, start, start + count, free))
+        middles.append(start + np.clip((w.middle - first) / cell, 0.0, count - 1e-6))
+    columns = csc_matrix(block_diag(parts))
+    if not columns.count_nonzero():
+        return None
+    none = np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
+    Z, precision, offset, unit = nuisance or none
+    return Problem(
+        sections,
+        not e.search.intervals[0][1],
+        cell,
+        base.ravel(),
+        columns,
+        np.concatenate(middles),
+        Z.reshape(base.size, -1),
+        precision,
+        offset,
+        unit,
+        np.concatenate(work),
+        scale,
+    )
+
+
+def _set(model: Model, name: str, w: WeakWindows) -> bool:
+    """Whether a model has a value of a parameter in a run."""
+    return bool(name) and model.value(of_run(name, w.run.name)) != model.declared(name).start

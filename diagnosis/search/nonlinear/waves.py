@@ -1,0 +1,219 @@
+"""Waves, found by a peak in the spectrum of the model error.
+
+They come and go with no parameter of the ship, so nothing is fitted to them. They are looked for in what
+the best model leaves over, as a ship that is held by a controller swings, too; the windows of the weak
+form let hardly any of them through.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks, spectrogram
+
+from fmus.frames import rotate_to_body
+from fmus.vessel.vessel import State
+
+from ...execution.parallel import for_each
+from ...predictors import Model
+from ...predictors.thrust import Response, inflow, thrust
+from ...predictors.weak_form import acceleration, by_mass
+from ...runs import Motion, Run, Smoothed, without_commands
+
+# Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
+# The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
+BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
+PEAK = 4.0  # times the spectrum around it, and its own flanks
+FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes from the commands
+FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
+AROUND = 0.9  # Hz, width of the spectrum around
+SEGMENT = 25.0  # s; six periods of the slowest wave
+NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
+REPLICATES = 200  # of the bootstrap over segments
+DRAWINGS = 3  # of noise; chosen: of one, false waves stand out in a twelfth where much is unexplained
+RATE = 10.0  # Hz; half of it is far above the band
+
+
+@dataclass(frozen=True)
+class Waves:
+    """What the spectrum shows.
+
+    Attributes:
+        peak: frequency [rad/s].
+        force: standard deviation of the horizontal force around the peak [N].
+        share: of the model error's power, on the axis where they stand out most.
+        confidence: share of bootstrap replicates in which they stand out.
+    """
+
+    peak: float
+    force: float
+    share: float
+    confidence: float
+
+
+class Peak(NamedTuple):
+    """A peak above the spectrum around it: index of frequency and axis, how many times higher."""
+
+    row: int
+    axis: int
+    height: float
+
+
+def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator) -> Waves | None:
+    """The waves in some runs, if there are any.
+
+    They stand out from each of some drawings of the noise: in one a line is low by chance.
+
+    Args:
+        runs: smoothed runs.
+        model: the most likely one; what it leaves over is looked at.
+        rng: for the drawings, and for the bootstrap.
+    """
+    found: list[Waves] = []
+    while len(found) < DRAWINGS:
+        waves = _against_one_drawing(runs, model, rng)
+        if waves is None:
+            return None
+        found.append(waves)
+    return min(found, key=lambda w: w.confidence)
+
+
+def _against_one_drawing(
+    runs: Sequence[Smoothed], model: Model, rng: np.random.Generator
+) -> Waves | None:
+    each = [(smoothed, rng.standard_normal(smoothed.eta.shape)) for smoothed in runs]
+    parts = for_each(lambda one: _signals(*one, model), each)
+    left, noise = ([x for part in parts for x in part[k]] for k in (0, 1))
+    white = [part[2] for part in parts]
+    if not left or not noise:
+        return None
+    time = model.ship.scale.time
+    frequency, segments = segments_of(left, time)
+    floor = segments_of(noise, time)[1].mean(axis=-1)
+    power = segments.mean(axis=-1)
+    follows = followed(frequency, floor, np.mean(white, axis=0), model.reference_mass)
+    band = inside(frequency * time)[:, None] & (follows >= FOLLOWED)
+    around = AROUND / time
+    level, found = peak(frequency, power, floor, band, around)
+    count = segments.shape[-1]
+    least = PEAK + FEW / count
+    if found.height < least:
+        return None
+    draws = rng.integers(0, count, (REPLICATES, count))
+    heights = [
+        peak(frequency, segments[..., d].mean(axis=-1), floor, band, around)[1].height for d in draws
+    ]
+    at = float(frequency[found.row])
+    near = np.abs(frequency - at) < NEAR * at
+    extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
+    return Waves(
+        2.0 * np.pi * at,
+        float(np.sqrt(extra[:2].sum() * frequency[1])),
+        float(extra[found.axis] / power[:, found.axis].sum()),
+        float(np.mean(np.array(heights) >= least)),
+    )
+
+
+def _signals(
+    smoothed: Smoothed, drawn: np.ndarray, model: Model
+) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
+    """Of a run stretches of its model error, of what noise makes of that, and its noise (3,)."""
+    motion = without_commands(smoothed)
+    error = model_error(smoothed.track.run, motion, model)
+    white = 2.0 * smoothed.noise**2 * smoothed.track.period
+    rate = RATE / smoothed.scale.time
+    # The same run with other noise of the same strength.
+    other = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * drawn, smoothed.track.pose)
+    noise = model_error(smoothed.track.run, without_commands(smoothed, other), model) - error
+    return stretches(error, smoothed.time, rate), stretches(noise, smoothed.time, rate), white
+
+
+def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments).
+
+    Args:
+        parts: (n, 3), of each signal.
+        time: scale of the ship.
+    """
+    length = round(SEGMENT * RATE)
+    found = [spectrogram(x, RATE / time, nperseg=length, axis=0, detrend="linear") for x in parts]
+    return found[0][0], np.concatenate([power for _, _, power in found], axis=-1)
+
+
+def followed(
+    frequency: np.ndarray, noise: np.ndarray, white: np.ndarray, mass: np.ndarray
+) -> np.ndarray:
+    """Share (m, 3) of a motion that the smoother follows, as a spline of white jerk does.
+
+    Args:
+        frequency: (m,) [Hz].
+        noise: (m, 3), spectrum of the force that noise makes.
+        white: (3,), spectrum of the noise of the measurement [m2/Hz, m2/Hz, rad2/Hz].
+        mass: (3, 3), mass matrix by which accelerations are forces.
+    """
+    level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
+    whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
+    low = share < 0.25  # half of a motion is a quarter of its power
+    corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
+    return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
+
+
+def inside(frequency: np.ndarray) -> np.ndarray:
+    """At which frequencies (m,) waves are looked for."""
+    return (frequency >= BAND[0]) & (frequency <= BAND[1])
+
+
+def peak(
+    frequency: np.ndarray, power: np.ndarray, floor: np.ndarray, band: np.ndarray, around: float
+) -> tuple[np.ndarray, Peak]:
+    """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
+
+    Args:
+        frequency: (m,) [Hz].
+        power: (m, 3), spectrum.
+        floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
+        band: (m, 3), where a peak counts.
+        around: width of the spectrum around [Hz].
+    """
+    width = 2 * int(around / frequency[1] / 2.0) + 1
+    floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
+    level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
+    # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
+    above = np.zeros_like(band)
+    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
+        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
+    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
+    row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
+    return level, Peak(int(row), int(axis), float(height[row, axis]))
+
+
+def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
+    """omega (n, 3) [N, N, N m] by the acceleration of a run's motion, NaN where there is none."""
+    eta, _, eta_ddot, nu = motion
+    u_dot, v_dot = rotate_to_body(eta[:, 2], eta_ddot[:, 0], eta_ddot[:, 1])
+    u, v, r = nu.T
+    nu_dot = np.column_stack([u_dot + r * v, v_dot - r * u, eta_ddot[:, 2]])
+    between = Response(run, model).between_samples
+    met = inflow(State._make([*eta.T, *nu.T, run.time]), model)
+    driven = by_mass(model, thrust(run, model, between, np.nan_to_num(np.column_stack(met))))
+    free = acceleration(model, run.time, eta, nu)
+    return (nu_dot - free - driven) @ model.reference_mass.T
+
+
+def stretches(error: np.ndarray, time: np.ndarray, rate: float) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, at a rate [Hz]."""
+    known = np.isfinite(error).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    found = []
+    for first, end in edges.reshape(-1, 2):
+        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / rate)
+        if even.size < SEGMENT * RATE:
+            continue
+        # Means over each interval: what is quicker must not pass for something slow.
+        sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
+        at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
+        found.append(np.diff(at, axis=0) * rate)
+    return found

@@ -1,0 +1,1 @@
+"""The fit to predictions over some seconds, with a posterior and bands."""

@@ -1,0 +1,120 @@
+"""The force that nobody recorded, as noise: on each axis an Ornstein-Uhlenbeck process.
+
+Its covariance at a distance t is size^2 exp(-|t| / time). Both come from the autocovariance of the model
+error that a model leaves: a mean over windows w(t) of such a force has the covariance
+size^2 int int w(a) w(b) exp(-|l + a - b| / time) at a lag l, and the measurement's noise adds that of
+its second derivative. What it does to a prediction follows from the motion about it, x' = F x + M^-1 f.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...predictors import WeakWindows
+from ...predictors.correlation import autocovariance
+from ...predictors.shooting import Linear
+from ...predictors.weak_form import EVERY, WIDTH, kernel
+
+# s, times the scale of the ship; correlation times that are tried. A shorter one is white for windows of
+# the weak form, a longer one a bias.
+TIMES = np.geomspace(0.2, 12.0, 25)
+LAGS = 12  # windows: twice their width, from which on the covariance is hardly determined; chosen
+POINTS = 301  # of the kernel's integrals; chosen
+GAUSS = 4  # points of the integral of the noise between two instants; chosen, exact to its 8th power
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """Size (..., 3) [N, N, N m] and correlation time (3,) [s] of the unrecorded force; size 0: none."""
+
+    size: np.ndarray
+    time: np.ndarray
+
+
+NO_PUSH = Push(np.zeros(3), np.ones(3))
+
+
+def _kernels() -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of a window's mean at each lag: by TIMES (times, lags), by noise (lags,)."""
+    t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, POINTS)
+    w = kernel(2.0 * t / WIDTH)
+    step = t[1] - t[0]
+    lags = EVERY * np.arange(LAGS + 1)
+    both = np.convolve(w, w) * step / (w.sum() * step) ** 2  # of the difference of two places
+    apart = step * np.arange(-POINTS + 1, POINTS)
+    force = np.exp(-np.abs(lags[:, None] + apart) / TIMES[:, None, None]) @ both * step
+    bent = np.gradient(np.gradient(w, t), t)
+    noise = np.interp(lags, apart, np.convolve(bent, bent), right=0.0)
+    return force, noise / noise[0]
+
+
+OF_FORCE, OF_NOISE = _kernels()
+
+
+def estimate(
+    data: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray, time: np.ndarray | None = None
+) -> Push:
+    """The push that a model error shows.
+
+    Args:
+        data: windows of every run.
+        error: (K, 3), what a model leaves in them [N, N, N m].
+        std: (K, 3), its standard deviation by the measurement's noise.
+        time: (3,), correlation times among those that are tried, if they are known [s].
+    """
+    times = TIMES * data[0].scale.time
+    left = autocovariance(data, error, LAGS) - np.mean(std**2, axis=0) * OF_NOISE[:, None]
+    variance = np.maximum(OF_FORCE @ left, 0.0) / np.sum(OF_FORCE**2, axis=1)[:, None]  # (times, 3)
+    missed = np.sum((left - variance[..., None, :] * OF_FORCE[..., None]) ** 2, axis=1)
+    best = np.argmin(missed, axis=0) if time is None else np.searchsorted(times, time)
+    return Push(np.sqrt(variance[best, range(3)]), times[best])
+
+
+def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:
+    """Covariance (w, T, 3, T, 3) of predicted poses, by the initial state and a push.
+
+    Args:
+        motion: about the predictions.
+        at_start: (w, 6), variance of the initial state.
+        push: the unrecorded force, its size (3,) or that of each window (w, 3); at the start as large
+            as always.
+    """
+    windows, instants = motion.slope.shape[:2]
+    over, added = _steps(motion, push)
+    P = np.zeros((windows, 9, 9))
+    P[:, range(6), range(6)], P[:, range(6, 9), range(6, 9)] = at_start, push.size**2
+    found = np.zeros((windows, instants, 3, instants, 3))
+    for i in range(instants):
+        P = over[:, i] @ P @ over[:, i].transpose(0, 2, 1) + added[:, i]
+        later = P[:, :, :3]
+        for j in range(i, instants):
+            if j > i:
+                later = over[:, j] @ later
+            found[:, j, :, i], found[:, i, :, j] = later[:, :3], later[:, :3].transpose(0, 2, 1)
+    return found
+
+
+def _steps(motion: Linear, push: Push) -> tuple[np.ndarray, np.ndarray]:
+    """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds."""
+    A = np.zeros((*motion.slope.shape[:2], 9, 9))
+    A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass
+    A[..., 6:, 6:] = -np.diag(1.0 / push.time)
+    rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
+    added = np.zeros_like(A)
+    for x, weight in zip(*np.polynomial.legendre.leggauss(GAUSS), strict=True):
+        G = _exponential(0.5 * motion.every * (x + 1.0) * A)[..., 6:]
+        added += 0.5 * motion.every * weight * (G * rate) @ np.swapaxes(G, -1, -2)
+    return _exponential(motion.every * A), added
+
+
+def _exponential(A: np.ndarray) -> np.ndarray:
+    """exp(A) of matrices (..., n, n), by scaling and squaring of a Taylor series of sixth order."""
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(A).sum(axis=-1).max(), 1e-9)))) + 1)
+    X, one = A / 2.0**halvings, np.eye(A.shape[-1])
+    found = one + X / 6.0
+    for k in range(5, 0, -1):
+        found = one + X @ found / k
+    for _ in range(halvings):
+        found = found @ found
+    return found

@@ -1,0 +1,145 @@
+"""The force that nobody recorded: how large, how long it lasts, and pushes at a time.
+
+A push at a time is a stretch in which the force that is left is beyond what chance gives anywhere in
+the runs, were it as large there as it usually is. Its beginning, end and size are those of the constant
+force that explains most of what is left around. It is told, and never a part of a model.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from ...predictors import Model, WeakWindows, omega
+from ...predictors.uncertainty import NOISE_TOLERANCE, omega_std
+from ...predictors.weak_form import kernel_integral
+from .disturbance import Push
+
+CHANCE = 0.01  # that a run without a push tells of one; that of the remainder
+MAD = 1.4826  # standard deviations of a normal distribution in a median absolute deviation
+MOST = 5  # pushes that are told, the clearest; chosen
+# s, times the scale of the ship; what lasts longer is no push but a remainder, and what is shorter than
+# a third of a window of the weak form cannot be told from a jump of the measured pose; chosen.
+SHORTEST, LONGEST = 1.0, 10.0
+AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
+
+
+class Stretch(NamedTuple):
+    """A push at a time.
+
+    Attributes:
+        run: name.
+        axis: X, Y or N.
+        start, end: [s].
+        size: force, were it constant [N or N m].
+    """
+
+    run: str
+    axis: str
+    start: float
+    end: float
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class Unrecorded:
+    """What acts and is in no command and no effect.
+
+    Attributes:
+        push: its size and correlation time on each axis.
+        differing: values of which the two fits differ by more than their intervals -> the value by the
+            model error, and by predictions.
+        stretches: pushes at a time, the clearest first.
+    """
+
+    push: Push
+    differing: Mapping[str, tuple[float, float]]
+    stretches: Sequence[Stretch]
+
+    @property
+    def sentence(self) -> str:
+        """What is to be said of it."""
+        size = zip(NAMES, self.push.size, UNITS, self.push.time, strict=True)
+        told = [f"{x:.2g} {unit} in {name} over {t:.2g} s" for name, x, unit, t in size if x > 0.0]
+        text = "No unrecorded force shows. "
+        if told:
+            text = f"An unrecorded force is left, its size and how long it lasts: {', '.join(told)}. "
+            text += "Intervals and bands allow for it. "
+        if self.differing:
+            text += (
+                "It is no chance: the fit to the model error and the fit to predictions differ by more "
+                f"than their intervals in {', '.join(self.differing)}. "
+            )
+        return (text + self.pushes).strip()
+
+    @property
+    def pushes(self) -> str:
+        """The pushes at a time; empty where there are none."""
+        each = [
+            f"{s.run} {s.start:.1f} to {s.end:.1f} s, {s.size:+.2g} {UNITS[AXES.index(s.axis)]} in "
+            f"{NAMES[AXES.index(s.axis)]}"
+            for s in self.stretches
+        ]
+        return f"Something pushed the ship at times: {'; '.join(each)}." if each else ""
+
+
+def unrecorded(
+    runs: Sequence[WeakWindows],
+    model: Model,
+    push: Push,
+    differing: Mapping[str, tuple[float, float]],
+) -> Unrecorded:
+    """What acts unrecorded.
+
+    Args:
+        runs: that were fitted to.
+        model: the fitted one.
+        push: that it leaves.
+        differing: see :class:`Unrecorded`.
+    """
+    left = [omega(w, model) for w in runs]
+    noise = [NOISE_TOLERANCE * omega_std(w, model) for w in runs]
+    # As far as the noise of the measurement allows, the same in all runs.
+    usual = MAD * np.median(np.abs(np.concatenate(left)), axis=0)
+    beyond = -float(ndtri(0.5 * CHANCE / max(3 * sum(w.middle.size for w in runs), 1)))
+    found = []
+    for w, error, std in zip(runs, left, noise, strict=True):
+        for k in range(3):
+            found += _pushes(w, k, error[:, k], np.maximum(std[:, k], usual[k]), beyond)
+    clearest = sorted(found, key=lambda f: -f[0])[:MOST]
+    return Unrecorded(push, differing, [stretch for _, stretch in clearest])
+
+
+def _pushes(
+    w: WeakWindows, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
+) -> Iterator[tuple[float, Stretch]]:
+    """Pushes of a run on an axis, each with how many standard deviations are left at its clearest."""
+    z, time = error / std, w.scale.time
+    rows = np.flatnonzero(np.abs(z) > beyond)
+    for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > w.width) + 1):
+        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST * time:
+            near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + w.width
+            start, end, size = box(w, near, error[near])
+            if end - start >= SHORTEST * time:
+                yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
+
+
+def box(w: WeakWindows, near: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
+    """Start, end [s] and size of the constant force whose means over windows are next to an error.
+
+    Args:
+        w: windows of a run.
+        near: (K,), which of them.
+        error: (k,), in these [N or N m].
+    """
+    middle, half = w.middle[near], 0.5 * w.width
+    times = np.arange(middle[0] - half, middle[-1] + half, 0.5 * w.every)
+    passed = kernel_integral(np.clip((times[:, None] - middle) / half, -1.0, 1.0))
+    first, last = np.triu_indices(times.size, 1)
+    means = passed[last] - passed[first]
+    power = np.einsum("ij,ij->i", means, means)
+    along = means @ error
+    best = int(np.argmax(along**2 / np.maximum(power, 1e-9)))
+    return float(times[first[best]]), float(times[last[best]]), float(along[best] / power[best])

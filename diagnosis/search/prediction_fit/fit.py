@@ -1,0 +1,283 @@
+"""Fit to predictions: Gauss-Newton steps on windows of the ship's length, of half and of twice that.
+
+The fit minimises
+
+    k sum_w r_w^T W_w r_w + theta^T P theta,
+
+r_w the departure of the prediction from the measured pose at the instants of a window, theta all fitted
+parameters about their prior means, P their prior precision. The inverse of W is the covariance that the
+initial state and the measurement's noise give, plus on its diagonal the mean square of what the model
+misses in that run, position and heading apart. The three lengths share the weight.
+
+W takes the instants of a window as independent beyond the initial state; what really correlates them
+is the unrecorded force, :mod:`.push`. With V the covariance that it gives, H = J^T W J and
+G = J^T W V W J, the information in the data is that of a likelihood to the power k = tr(S H) / tr(S G),
+S the covariance at hand, and the posterior has the covariance
+
+    (k H + P)^-1 (k^2 G + P) (k H + P)^-1
+
+(F. Pauli, W. Racugno and L. Ventura, Bayesian composite marginal likelihoods, Statistica Sinica 21,
+2011). Scores of the three lengths are taken as fully correlated, as they come from the same data.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from ...execution.parallel import for_each
+from ...predictors import Model, WeakWindows
+from ...predictors.shooting import UNKNOWN, Around, Shooting
+from ...predictors.uncertainty import omega_std
+from ..candidates import SMALL, model_error
+from ..map_regression import ridge
+from ..prior import NominalPrior
+from ..refinement import HALVINGS, SMALLEST_SCALE, Estimate
+from .disturbance import NO_PUSH, Push, covariance, estimate
+
+LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
+STEPS = 6  # of Gauss-Newton, at the most
+ENOUGH = 0.1  # of cost, which is twice a log likelihood, that a step may still gain
+ROUNDING = 1e-10  # of the largest variance in a window
+POWERS = 5  # iterations of k, which changes by less than 1 % after three
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A model that is fitted to predictions.
+
+    Attributes:
+        estimate: the model.
+        names: of all fitted parameters.
+        covariance: (q, q), of them, SI.
+        push: the unrecorded force.
+    """
+
+    estimate: Estimate
+    names: Sequence[str]
+    covariance: np.ndarray
+    push: Push
+
+
+def shootings(runs: Sequence[WeakWindows], lengths: Sequence[float] = LENGTHS) -> list[Shooting]:
+    """The windows of some lengths, those of runs with one kind of commands together."""
+    found = []
+    for signals in sorted({w.run.signals for w in runs}):
+        these = [w for w in runs if w.run.signals == signals]
+        smoothed = [w.smoothed for w in these]
+        found += [Shooting(smoothed, share * these[0].horizon) for share in lengths]
+    return [s for s in found if s.run.size]
+
+
+def push_of(runs: Sequence[WeakWindows], error: np.ndarray, std: np.ndarray) -> tuple[Push, list[Push]]:
+    """The push of all runs, and of each with the same correlation times, see :func:`.push.estimate`."""
+    edges = np.cumsum([w.middle.size for w in runs])[:-1]
+    parts = zip(runs, np.split(error, edges), np.split(std, edges), strict=True)
+    whole = estimate(runs, error, std)
+    return whole, [estimate([w], e, s, whole.time) for w, e, s in parts]
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What the windows say about the parameters at an estimate, in the parameters' own units.
+
+    Attributes:
+        H, G: (q, q), see the module.
+        g: (q,), J^T W r.
+        weights: of each length the factor (w, 3T, 3T) of W.
+        push: the unrecorded force.
+    """
+
+    H: np.ndarray
+    G: np.ndarray
+    g: np.ndarray
+    weights: Sequence[np.ndarray]
+    push: Push
+
+    def power(self, P: np.ndarray) -> float:
+        """k, for a prior precision P (q, q)."""
+        k = 1.0
+        for _ in range(POWERS):
+            S = np.linalg.inv(regular(k * self.H + P))
+            k = float(np.sum(S * self.H) / np.sum(S * self.G))
+        return k
+
+
+def regular(H: np.ndarray) -> np.ndarray:
+    """A matrix with a slight ridge: collinear parameters share what they explain."""
+    return H + ridge(H, np.ones(len(H)))
+
+
+class PredictionFit:
+    """The problem: runs, windows, prior.
+
+    Args:
+        runs, windows: to learn from.
+        at: where to begin.
+        prior: of the nominal coefficients.
+
+    Attributes:
+        assumed: the unrecorded force that counts where windows are weighed.
+    """
+
+    assumed = NO_PUSH
+
+    def __init__(
+        self,
+        runs: Sequence[WeakWindows],
+        windows: Sequence[Shooting],
+        at: Estimate,
+        prior: NominalPrior,
+    ) -> None:
+        self.runs, self.prior, self.windows = runs, prior, windows
+        self._place = {id(w.smoothed): k for k, w in enumerate(runs)}
+        self.std = np.concatenate([omega_std(w, at.start) for w in runs])
+        names, believed = at.fitted, [*prior.std.values()]
+        self._kept = np.array([True] * len(names) + [s > 0.0 for s in believed])
+        units = [at.start.unit(n) for n in names]
+        self._own = np.array([*units, *[1.0] * len(believed)])
+        self.unit = np.array([*units, *believed])[self._kept]
+        scale = {
+            n: max(abs(at.values[n]), SMALLEST_SCALE * u) for n, u in zip(names, units, strict=True)
+        }
+        self.names = [n for n, kept in zip([*names, *prior.std], self._kept, strict=True) if kept]
+        self._steps = {
+            n: SMALL * s for n, s in (scale | {n: s for n, s in prior.std.items() if s}).items()
+        }
+        # Of an effect that adds to a nominal coefficient, such as a lag, the name stands twice.
+        self._columns = [[*self._steps].index(n) for n in self.names]
+        P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
+        self.precision = P[np.ix_(self._kept, self._kept)]
+
+    def theta(self, at: Estimate) -> np.ndarray:
+        """(q,), fitted parameters about their prior means, in units of the ship's size; coefficients in
+        prior standard deviations.
+        """
+        return (np.array([*[at.values[n] for n in at.fitted], *at.offset]) / self._own)[self._kept]
+
+    def moved(self, at: Estimate, step: np.ndarray) -> Estimate:
+        """The estimate after a step (q,)."""
+        whole = np.zeros(self._kept.size)
+        whole[self._kept] = step
+        whole *= self._own
+        names = at.fitted
+        return at.plus(dict(zip(names, whole.tolist(), strict=False)), whole[len(names) :])
+
+    def whitening(self, s: Shooting, around: Around) -> np.ndarray:
+        """The factor (w, 3T, 3T) that whitens the residuals of windows; zero where a model runs away."""
+        r = around.residuals
+        fine = np.isfinite(r.sum(axis=(1, 2)) + around.slopes.sum(axis=(1, 2, 3)))
+        seen = fine[:, None] & (s.noise[..., 2] < UNKNOWN)
+        V = covariance(around.motion[fine], s.at_start[fine], self.assumed)
+        missed = self.missed(s, np.where(seen[..., None], r, 0.0) ** 2, seen)
+        found = np.zeros((len(r), r[0].size, r[0].size))
+        whole = _square(V, s.noise[fine] + missed[fine, None])
+        # Of a ship that turns far within a window rounding alone would make it indefinite.
+        diagonal = np.einsum("wii->wi", whole)
+        diagonal += ROUNDING * diagonal.max(axis=1, keepdims=True)
+        found[fine] = np.linalg.inv(np.linalg.cholesky(whole))
+        return found
+
+    def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """(w, 3): mean square of what the model misses in the run of each window, both places alike.
+
+        Args:
+            s: windows.
+            squares: (w, T, 3), of the residuals, 0 where not seen.
+            seen: (w, T), which instants count.
+        """
+        missed = np.zeros((len(s.runs), 3))
+        np.add.at(missed, s.run, squares.sum(axis=1))
+        missed /= np.maximum(np.bincount(s.run, seen.sum(axis=1), len(s.runs)), 1.0)[:, None]
+        missed[:, :2] = missed[:, :2].mean(axis=1, keepdims=True)
+        return missed[s.run]
+
+    def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
+        """Sum of squares of the whitened residuals of a model in the windows of one length."""
+        return float(np.sum(whitened(weights, self.windows[k].residuals(model)) ** 2))
+
+    def cost(self, at: Estimate, weights: Sequence[np.ndarray], power: float) -> float:
+        """Twice the negative logarithm of the posterior, but for a constant."""
+        theta, model = self.theta(at), at.model(self.prior)
+        squares = [self.squares(k, W, model) for k, W in enumerate(weights)]
+        total = float(theta @ self.precision @ theta) + power * float(np.mean(squares))
+        return total if np.isfinite(total) else np.inf
+
+    def information(self, at: Estimate) -> Information:
+        """What the windows say, by the slopes at an estimate and the push that it leaves in each run."""
+        push, pushes = push_of(self.runs, model_error(self.runs, at.model(self.prior)), self.std)
+        model, q = at.model(self.prior), self.unit.size
+
+        def of_windows(s: Shooting) -> tuple[np.ndarray, ...]:
+            around = s.around(model, self._steps)
+            W = self.whitening(s, around)
+            A = whitened(W, around.slopes[..., self._columns] * self.unit)
+            flat = A.reshape(-1, q)
+            fine = running(W)
+            sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
+            V = covariance(around.motion[fine], s.at_start[fine], Push(sizes, push.time))
+            back = W[fine].transpose(0, 2, 1) @ A[fine]
+            pushed = (_square(V, s.noise[fine]) @ back).reshape(-1, q)
+            g = flat.T @ whitened(W, around.residuals[..., None]).ravel()
+            return flat.T @ flat, back.reshape(-1, q).T @ pushed, g, W
+
+        H, G, g, weights = zip(*for_each(of_windows, self.windows), strict=True)
+        return Information(np.mean(H, axis=0), np.mean(G, axis=0), np.mean(g, axis=0), weights, push)
+
+
+def _square(V: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Covariance (w, 3T, 3T): one (w, T, 3, T, 3), and independent variances (w, T, 3) on top."""
+    size = own[0].size if len(own) else 0
+    flat = V.reshape(len(V), size, size)
+    flat[:, range(size), range(size)] += own.reshape(len(V), size)
+    return flat
+
+
+def running(W: np.ndarray) -> np.ndarray:
+    """(w,), windows in which the model does not run away, by their factors (w, 3T, 3T)."""
+    return np.asarray(W.any(axis=(1, 2)))
+
+
+def whitened(W: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """W (w, 3T, 3T) times residuals (w, T, 3) or slopes (w, T, 3, q); zero where W is."""
+    fine = running(W)
+    flat = x.reshape(len(x), W.shape[1], -1)
+    found = np.zeros(flat.shape)
+    found[fine] = W[fine] @ flat[fine]
+    return found
+
+
+def fit_predictions(
+    runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
+) -> Fitted:
+    """The most likely model by its predictions, and how sure it is.
+
+    Args:
+        runs: to learn from.
+        windows: of these, see :func:`shootings`; at least one.
+        at: where to begin: a model with all effects that were accepted.
+        prior: of the nominal coefficients.
+    """
+    return fit_to(PredictionFit(runs, windows, at, prior), at)
+
+
+def fit_to(problem: PredictionFit, at: Estimate) -> Fitted:
+    """The most likely model of a problem, from where to begin, and how sure it is."""
+    P, known = problem.precision, problem.information(at)
+    for _ in range(STEPS):
+        k = known.power(P)
+        right = k * known.g - P @ problem.theta(at)
+        step = np.linalg.solve(regular(k * known.H + P), right)
+        if right @ step < ENOUGH:
+            break
+        before = problem.cost(at, known.weights, k)
+        tried = (problem.moved(at, share * step) for share in HALVINGS)
+        further = next((t for t in tried if problem.cost(t, known.weights, k) < before), None)
+        if further is None:
+            break
+        at, known = further, problem.information(further)
+    k = known.power(P)
+    S = np.linalg.inv(regular(k * known.H + P))
+    covariance = S @ (k * k * known.G + P) @ S * np.outer(problem.unit, problem.unit)
+    return Fitted(at, problem.names, covariance, known.push)

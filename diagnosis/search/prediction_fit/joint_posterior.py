@@ -1,0 +1,83 @@
+"""What is known of all fitted values together: mean and covariance, by the names of ``model.ssv``."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from ..prior import NominalPrior
+from .fit import Fitted
+
+TOGETHER = 0.97  # of a correlation, from which on two values are known only together; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """A normal distribution of parameters of a model.
+
+    Attributes:
+        names: ``vessel.NAME``, ``thrusters.NAME`` or ``measurement.NAME``.
+        units: of each.
+        mean: (q,), total values, SI.
+        covariance: (q, q).
+    """
+
+    names: Sequence[str]
+    units: Sequence[str]
+    mean: np.ndarray
+    covariance: np.ndarray
+
+    @classmethod
+    def of(cls, fitted: Fitted, prior: NominalPrior) -> "Posterior":
+        """The posterior of a fit to predictions."""
+        model, names = fitted.estimate.model(prior), [*dict.fromkeys(fitted.names)]
+        # A value that an effect and a nominal coefficient are of is their sum.
+        parts = np.array([[float(n == of) for of in fitted.names] for n in names]).reshape(
+            len(names), -1
+        )
+        return cls(
+            [f"{model.owner(n)}.{n}" for n in names],
+            [model.declared(n).unit for n in names],
+            np.array([model.value(n) for n in names]),
+            parts @ fitted.covariance @ parts.T,
+        )
+
+    @classmethod
+    def nothing(cls) -> "Posterior":
+        """That of no value at all."""
+        return cls([], [], np.zeros(0), np.zeros((0, 0)))
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Parameter, without its part of the ship -> standard deviation."""
+        std = np.sqrt(np.diag(self.covariance)).tolist()
+        return {n.partition(".")[2]: s for n, s in zip(self.names, std, strict=True)}
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """(q, q), 1 on the diagonal; 0 beside a value that is known exactly."""
+        std = np.sqrt(np.diag(self.covariance))
+        scale = np.divide(1.0, std, out=np.zeros_like(std), where=std > 0.0)
+        found = self.covariance * scale * scale[:, None]
+        np.fill_diagonal(found, 1.0)
+        return found
+
+    @property
+    def together(self) -> list[list[str]]:
+        """Groups of values that are known only together: chains of correlations above TOGETHER."""
+        count, group = connected_components(np.abs(self.correlation) > TOGETHER, directed=False)
+        groups = [[n for n, g in zip(self.names, group, strict=True) if g == k] for k in range(count)]
+        return [members for members in groups if len(members) > 1]
+
+    def write(self, path: Path) -> None:
+        """Write ``posterior.json``."""
+        content = {
+            "names": list(self.names),
+            "units": list(self.units),
+            "mean": self.mean.tolist(),
+            "covariance": self.covariance.tolist(),
+        }
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,100 @@
+"""What was found, fitted to predictions: the same effects, with values, intervals and a posterior."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...predictors import WeakWindows
+from ...predictors.uncertainty import omega_std
+from ..candidates import model_error
+from ..conclusion import interval, laplace_std, suspected
+from ..findings import Findings
+from ..gram import RUN
+from ..prior import NominalPrior
+from ..refinement import Estimate, TrainingSet, nuisance_of, refit
+from .disturbance import estimate
+from .disturbance_summary import Unrecorded, unrecorded
+from .fit import fit_predictions, shootings
+from .joint_posterior import Posterior
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """The end of a fit.
+
+    Attributes:
+        findings: with the values of the fit.
+        posterior: of all fitted values; of none where nothing was fitted.
+        unrecorded: the force that nobody recorded.
+    """
+
+    findings: Findings
+    posterior: Posterior
+    unrecorded: Unrecorded
+
+    def about(self, found: Findings) -> "Outcome":
+        """Other findings with the covariance of this fit, by the same parameters."""
+        values = [found.model.value(n.partition(".")[2]) for n in self.posterior.names]
+        return replace(self, findings=found, posterior=replace(self.posterior, mean=np.array(values)))
+
+
+def to_predictions(
+    found: Findings, runs: Sequence[WeakWindows], prior: NominalPrior, fits: bool
+) -> Outcome:
+    """Fit what was found to predictions.
+
+    Args:
+        found: the findings by the model error.
+        runs: that they were found on.
+        prior: of the nominal coefficients.
+        fits: whether anything was learned that can be fitted.
+    """
+    begin, searched, windows = found.estimate, found.searched, shootings(runs) if fits else []
+    known = begin is None or not (begin.fitted or any(prior.std.values()))
+    if known or begin is None or searched is None or not windows:
+        std = np.concatenate([omega_std(w, found.model) for w in runs])
+        push = estimate(runs, model_error(runs, found.model), std)
+        return Outcome(found, Posterior.nothing(), unrecorded(runs, found.model, push, {}))
+    begin = replace(begin, offset=prior.rescaled(begin.offset, searched))
+    weak, weak_std = fit_model_error(begin, found.sigma, runs, prior)
+    fitted = fit_predictions(runs, windows, weak, prior)
+    posterior, at = Posterior.of(fitted, prior), fitted.estimate
+    model, std = at.model(prior), posterior.std
+    effects = []
+    for f in found.effects:
+        values = {n: at.values.get(n, v) for n, v in f.values.items()}
+        own = {n: interval(v, std[n]) for n, v in values.items() if n in std}
+        if any(values.values()):  # predictions may take an effect back to nothing
+            effects.append(replace(f, values=values, ci95=dict(f.ci95) | own))
+    if effects:
+        effects[-1] = replace(effects[-1], model=model)
+    share = np.array([std.get(n, 0.0) / s if s else 0.0 for n, s in prior.std.items()])
+    first = weak.model(prior)
+    differ = {
+        n: (first.value(n), model.value(n))
+        for n, s in std.items()
+        if abs(first.value(n) - model.value(n)) > interval(0.0, s + weak_std[n])[1]
+    }
+    learned = replace(
+        found,
+        effects=effects,
+        model=model,
+        suspects=suspected(prior, at.offset, share),
+        moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
+        estimate=at,
+    )
+    return Outcome(learned, posterior, unrecorded(runs, model, fitted.push, differ))
+
+
+def fit_model_error(
+    at: Estimate, sigma: np.ndarray, runs: Sequence[WeakWindows], prior: NominalPrior
+) -> tuple[Estimate, dict[str, float]]:
+    """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
+    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(runs)])
+    t = TrainingSet(runs, blocks, sigma, prior)
+    nuisance = nuisance_of(t, at, t.error(at))
+    last = refit(t, at, nuisance).estimate
+    unit = np.array([*[1.0] * len(at.fitted), *prior.std.values()])
+    std = laplace_std(t, nuisance) * unit
+    return last, dict(zip([*at.fitted, *prior.std], std.tolist(), strict=True))

@@ -1,0 +1,305 @@
+"""Gauss-Newton refinement: effects and nuisance parameters moved together to their most likely values.
+
+With the model error r(theta) in units of the noise, the cost is
+
+    |r(theta)|^2 + theta^T P theta,
+
+P the prior precision of all parameters about their prior means. A step solves
+(J^T J + P) delta = J^T r - P theta, halved while the cost does not fall. The slopes J by the nuisance
+parameters hardly change on the way and are taken once; those of a new effect anew at each step.
+Times within a run have no slope: they are found by segmentation, anew at each fit of all else.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from fmus.effects import Effect
+from fmus.ship import Ship
+
+from ..predictors import Model, WeakWindows
+from ..predictors.ship_model import parameter_and_run
+from ..predictors.weak_form import OVERLAP
+from .candidates import SMALL, Shape, model_error
+from .gram import Nuisance
+from .map_regression import ridge
+from .nonlinear.segmentation import likely, problem, segmented
+from .prior import NominalPrior
+
+STEPS = 5  # of Gauss-Newton, at the most
+ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
+# Of a parameter, in its unit at the size of the ship: the step of its finite difference is scaled by it.
+SMALLEST_SCALE = 1e-2
+HALVINGS = (1.0, 0.5, 0.25)
+NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSet:
+    """What a model is fitted to.
+
+    Attributes:
+        data: windows of every run.
+        blocks: (K,), number of the block of each window.
+        sigma: (3,), noise of each axis [N, N, N m]; None as long as it is not known.
+        prior: of the nominal coefficients.
+    """
+
+    data: Sequence[WeakWindows]
+    blocks: np.ndarray
+    sigma: np.ndarray | None
+    prior: NominalPrior
+
+    @property
+    def weight(self) -> np.ndarray:
+        """(3,), what an error counts on each axis."""
+        return 1.0 / np.asarray(self.sigma) / np.sqrt(OVERLAP)
+
+    def error(self, at: "Estimate") -> np.ndarray:
+        """(K, 3), model error of an estimate [N, N, N m]."""
+        return model_error(self.data, at.model(self.prior))
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A model on the way to the most likely one.
+
+    Attributes:
+        start: the model that the user gave.
+        offset: nominal coefficients, each in prior standard deviations from its prior mean.
+        values: parameters of the effects that were found, as additions.
+        precision: prior precision of those of them that are fitted.
+        held: values that stay as they are, as their effect is not smooth in them.
+    """
+
+    start: Model
+    offset: np.ndarray
+    values: Mapping[str, float] = field(default_factory=dict)
+    precision: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    held: frozenset[str] = frozenset()
+
+    @classmethod
+    def at(cls, start: Model, prior: NominalPrior) -> "Estimate":
+        """The start."""
+        return cls(start, np.zeros(prior.size))
+
+    def model(self, prior: NominalPrior) -> Model:
+        """The model with all of it.
+
+        A time constant stays within its range; a force may change sign on the way to where it belongs.
+        """
+        found, changes = self.start.plus(self.values), prior.changes(self.offset)
+        times = {n: c for n, c in changes.items() if found.declared(n).unit == "s"}
+        return found.plus(changes | {n: bounded(found, n, c) for n, c in times.items()})
+
+    @property
+    def fitted(self) -> list[str]:
+        """Those values that are fitted by slopes."""
+        ship = self.start.ship
+        return [n for n in self.values if n not in self.held and timed(ship, n) is None]
+
+    def without(self, names: Collection[str]) -> "Estimate":
+        """The estimate without the values of some effects."""
+        kept = [k for k, n in enumerate(self.fitted) if n not in names]
+        values = {n: v for n, v in self.values.items() if n not in names}
+        return replace(self, values=values, precision=self.precision[kept][:, kept])
+
+    def holding(self, names: Collection[str]) -> "Estimate":
+        """The estimate with further values that stay as they are."""
+        kept = [k for k, n in enumerate(self.fitted) if n not in names]
+        return replace(self, precision=self.precision[kept][:, kept], held=self.held | set(names))
+
+    def plus(self, values: Mapping[str, float], offset: np.ndarray) -> "Estimate":
+        """The estimate with additions, effects' parameters within their range."""
+        names = (*self.values, *values)
+        together = {n: self.values.get(n, 0.0) + values.get(n, 0.0) for n in names}
+        within = {n: bounded(self.start, n, v) for n, v in together.items()}
+        return replace(self, values=within, offset=self.offset + offset)
+
+
+def timed(ship: Ship, name: str) -> Effect | None:
+    """The effect of a ship that a value is a time within a run of; None: it is none."""
+    return ship.effects.timed.get(parameter_and_run(name)[0])
+
+
+def bounded(start: Model, name: str, addition: float) -> float:
+    """An addition to a parameter of a model, with which it stays within its range."""
+    limits, present = start.declared(name).range, start.value(name)
+    low = -np.inf if limits.min is None else limits.min
+    high = np.inf if limits.max is None else limits.max
+    return min(max(addition, low - present), high - present)
+
+
+def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[str]:
+    """Parameters of an effect with a value at a limit of their range, which the data did not choose.
+
+    A limit of zero is where an effect begins. The nodes of a free curve are not values of their own.
+    """
+    if start.ship.effects[effect].search.smooth:
+        return []
+
+    def at(name: str) -> bool:
+        limits, value = start.declared(name).range, start.value(name) + additions[name]
+        return any(end and abs(value - end) <= NEAR_LIMIT * abs(end) for end in (limits.min, limits.max))
+
+    return [name for name in additions if at(name)]
+
+
+def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:
+    """Force (K, 3) that the model gains by one unit of a parameter."""
+    small = SMALL * max(abs(scale), SMALLEST_SCALE * model.unit(name))
+    return (left - model_error(t.data, model.plus({name: small}))) / small
+
+
+def nuisance_of(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
+    """What is fitted nuisance with every candidate: effects found before, and nominal coefficients.
+
+    Args:
+        t: what is fitted to.
+        at: the model so far.
+        base: its model error (K, 3).
+    """
+    model = at.model(t.prior)
+    fitted = at.fitted
+    columns = [slope(t, model, base, n, at.values[n]) for n in fitted]
+    for n, std in t.prior.std.items():
+        none = np.zeros_like(base)
+        columns.append(std * slope(t, model, base, n, t.prior.mean[n]) if std else none)
+    precision = np.asarray(block_diag(at.precision, np.eye(t.prior.size)))
+    offset = np.array([*[at.values[n] for n in fitted], *at.offset])
+    unit = np.array([*[model.unit(n) for n in fitted], *[1.0] * t.prior.size])
+    return Nuisance(np.stack(columns, axis=2), precision, offset, unit)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A candidate's parameters to start from.
+
+    Attributes:
+        values: parameter -> value.
+        fitted: those that are fitted by slopes.
+        precision: prior precision of these.
+    """
+
+    values: Mapping[str, float]
+    fitted: Sequence[str]
+    precision: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A candidate at its most likely values.
+
+    Attributes:
+        estimate: the model with it.
+        left: (K, 3), its model error.
+        columns: (K, 3, p), slopes by the parameters of the candidate that were fitted.
+        cost: sum of squares and prior penalty.
+        intervals: 95 % interval of each change point [s].
+    """
+
+    estimate: Estimate
+    left: np.ndarray
+    columns: np.ndarray
+    cost: float
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def own(self, at: Estimate) -> dict[str, float]:
+        """The candidate's own values, beside those of a model that it was not in."""
+        return {n: v for n, v in self.estimate.values.items() if n not in at.values}
+
+
+def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
+    """A candidate, the effects found before and the nominal coefficients at their most likely values.
+
+    Args:
+        t: what is fitted to.
+        at: the model so far.
+        nuisance: nuisance parameters, from :func:`nuisance`.
+        start: of the new effect.
+    """
+    e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
+    if e is None:
+        return _gauss_newton(t, at, nuisance, start)
+    return _with_intervals(t, at, nuisance, start, e)
+
+
+def refit(t: TrainingSet, at: Estimate, nuisance: Nuisance) -> Refined:
+    """The effects found and the nominal coefficients at their most likely values, without a new one."""
+    return _gauss_newton(t, at, nuisance, Start({}, (), np.zeros((0, 0))))
+
+
+def _gauss_newton(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
+    fitted = [*start.fitted, *at.fitted]
+    precision = np.asarray(block_diag(start.precision, nuisance.precision))
+    unit = np.array([*[at.start.unit(n) for n in start.fitted], *nuisance.unit])
+    weight = t.weight
+
+    def evaluate(estimate: Estimate) -> Refined:
+        left, theta = t.error(estimate), parameters(estimate)
+        cost = float(((left * weight) ** 2).sum() + theta @ precision @ theta)
+        return Refined(estimate, left, np.zeros((*left.shape, 0)), cost)
+
+    def with_slopes(r: Refined) -> Refined:
+        model = r.estimate.model(t.prior)
+        columns = [slope(t, model, r.left, n, r.estimate.values[n]) for n in start.fitted]
+        return replace(r, columns=np.stack(columns, axis=2)) if columns else r
+
+    def parameters(estimate: Estimate) -> np.ndarray:
+        return np.array([*[estimate.values[n] for n in fitted], *estimate.offset])
+
+    best = with_slopes(evaluate(at.plus(start.values, np.zeros(t.prior.size))))
+    for _ in range(STEPS):
+        columns = np.concatenate([best.columns, nuisance.columns], axis=2)
+        A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
+        H = A.T @ A + precision
+        H += ridge(H, unit)
+        right = A.T @ (best.left * weight).reshape(-1) - precision @ parameters(best.estimate)
+        delta = np.linalg.solve(H, right)
+        further = best
+        for share in HALVINGS:
+            step = dict(zip(fitted, (share * delta).tolist(), strict=False))
+            further = evaluate(best.estimate.plus(step, share * delta[len(fitted) :]))
+            if further.cost < best.cost:
+                break
+        gained = best.cost - further.cost
+        if gained < ENOUGH:
+            return replace(further, columns=best.columns) if gained > 0.0 else best
+        best = with_slopes(further)
+    return best
+
+
+def _with_intervals(
+    t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start, e: Effect
+) -> Refined:
+    """The same with the intervals of an effect found anew at each fit of all else, until they stay."""
+    found = _gauss_newton(t, at, nuisance, start)
+    present, p = dict(start.values), None
+    for _ in range(STEPS):
+        estimate = found.estimate
+        without = {n: v for n, v in estimate.values.items() if n not in present}
+        model = replace(estimate, values=without).model(t.prior)
+        theta = np.array([*[estimate.values[n] for n in at.fitted], *estimate.offset])
+        parts = nuisance.columns, nuisance.precision, theta, nuisance.unit
+        whole = problem(t.data, model, model_error(t.data, model), e, parts)
+        if whole is None:
+            break
+        p = whole.weighted(np.asarray(t.sigma))
+        spans = p.spans(present)
+        better = segmented(p, spans)
+        if not better or not p.passing(better) or p.cost(better) > p.cost(spans) - ENOUGH:
+            break
+        present = p.values(better)
+        found = _gauss_newton(t, at, nuisance, replace(start, values=present))
+    return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
+
+
+def as_shape(r: Refined, base: np.ndarray, at: Estimate, start: Start) -> Shape:
+    """A refined candidate as a shape, seen from the model ``at`` with the error ``base``."""
+    given = r.own(at)
+    fitted = [r.estimate.values[n] for n in at.fitted]
+    offset = np.array([*fitted, *r.estimate.offset])
+    unit = np.array([at.start.unit(n) for n in start.fitted])
+    return Shape(given, list(start.fitted), base - r.left, r.columns, unit, offset, start.precision)

@@ -1,0 +1,208 @@
+"""One step of the forward selection: all effects of the ship as candidates, the best of them refined.
+
+All candidates are scored by a regression that is linear in their parameters; the best of them are then
+refined and scored again, with the axes weighted by what even the best leaves over.
+"""
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from ..execution.parallel import for_each
+from ..predictors.correlation import independent
+from .candidates import Candidate, candidates, model_error
+from .gram import GramTable, Nuisance, gram_table, noise
+from .map_regression import Scored, regression, ridge, score
+from .nonlinear.segmentation import FLOOR
+from .refinement import Estimate, Refined, Start, TrainingSet, as_shape, nuisance_of, refine, timed
+
+LENGTH = 8  # of the shortlist
+REWEIGHTINGS = 4  # at the most
+CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
+# Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
+# own: as much as its score must fall to be accepted.
+NEW = 10.0
+TIE = 2.0  # paired standard errors within which two candidates are alike
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """All candidates beside a model, linear in their parameters.
+
+    Attributes:
+        base: (K, 3), the model's error.
+        nuisance: parameters that are fitted along.
+        table: all candidates.
+        candidates: in the table's order.
+        order: the candidates scored, best first.
+    """
+
+    base: np.ndarray
+    nuisance: Nuisance
+    table: GramTable
+    candidates: Sequence[Candidate]
+    order: Sequence[Scored]
+
+    @property
+    def size(self) -> float:
+        """Sum of squares of the model error, in units of the noise."""
+        return float(self.table.total[0, 0])
+
+
+def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
+    """Score every effect that is not known yet."""
+    model = at.model(t.prior)
+    base = model_error(t.data, model)
+    found = candidates(t.data, model, base, known)
+    nuisance = nuisance_of(t, at, base)
+    linear = [s.columns for c in found for s in c.shapes[:1]]
+    floor = FLOOR * model.ship.scale.forces
+    sigma = noise(base, np.concatenate([*linear, nuisance.columns], axis=2), floor)
+    return weighted(t, sigma, base, nuisance, found)
+
+
+def weighted(
+    t: TrainingSet,
+    sigma: np.ndarray,
+    base: np.ndarray,
+    nuisance: Nuisance,
+    found: Sequence[Candidate],
+) -> Ranking:
+    """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
+    table = gram_table(base, t.blocks, found, nuisance, sigma)
+    free = len(nuisance.offset) - t.prior.size
+    size = float(table.total[0, 0])
+    new = [k for k in range(len(found)) if novelty(table, k, free) * size >= NEW]
+    order = in_order([score(table, k, len(found[k].shapes)) for k in new])
+    return Ranking(base, nuisance, table, found, order)
+
+
+def scored_alone(t: TrainingSet, at: Estimate) -> Scored:
+    """The score of a model without any candidate."""
+    base = t.error(at)
+    nuisance = nuisance_of(t, at, base)
+    return score(gram_table(base, t.blocks, [], nuisance, np.asarray(t.sigma)), -1, 1)
+
+
+def novelty(t: GramTable, candidate: int, free: int) -> float:
+    """Share of a linear candidate's force that what was found cannot give, set freely; else 1.
+
+    Times the sum of squares of the model error, in units of the noise, it is the signal that a
+    candidate as large as that error has of its own.
+
+    Args:
+        t: the table it stands in.
+        candidate: its number.
+        free: how many of the nuisance parameters, the first, are of effects that were found.
+    """
+    entry = t.entries[candidate, 0]
+    mine = entry.columns
+    if free == 0 or entry.given >= 0 or not mine:
+        return 1.0
+    found = t.nuisance[:free]
+    own, gram, across = t.total[mine][:, mine], t.total[found][:, found], t.total[found][:, mine]
+    gram = gram + ridge(gram, t.unit[found])
+    left = np.diag(own - across.T @ np.linalg.solve(gram, across))
+    return float(np.max(left / np.maximum(np.diag(own), 1e-12 * t.unit[mine] ** -2.0)))
+
+
+def in_order(scored: Sequence[Scored]) -> list[Scored]:
+    """The best first; of two that are the same on any data the one that was declared first."""
+    return sorted(scored, key=lambda s: (round(s.score, 2), s.candidate))
+
+
+@dataclass(frozen=True, eq=False)
+class Shortlist:
+    """The best candidates of a ranking, refined.
+
+    Attributes:
+        ids: of their effects.
+        starts, refined: what is fitted of them, and where they came to.
+        table: all of them.
+        scored: best first; their candidates are indices of the above.
+    """
+
+    ids: Sequence[str]
+    starts: Sequence[Start]
+    refined: Sequence[Refined]
+    table: GramTable
+    scored: Sequence[Scored]
+
+    @property
+    def winner(self) -> Estimate:
+        """The model with the best of them."""
+        return self.of(0)
+
+    def of(self, chosen: int) -> Estimate:
+        """The model with the candidate of a place in the order."""
+        best = self.scored[chosen].candidate
+        estimate = self.refined[best].estimate
+        precision = block_diag(estimate.precision, self.starts[best].precision)
+        return replace(estimate, precision=np.asarray(precision))
+
+
+def shortlist(t: TrainingSet, at: Estimate, ranking: Ranking) -> Shortlist:
+    """Refine the best candidates and score them again."""
+    best = sorted(ranking.order[:LENGTH], key=lambda s: s.candidate)
+    effects = [ranking.candidates[s.candidate].effect for s in best]
+    starts = [start(at, ranking, s) for s in best]
+    refined = for_each(lambda s: refine(t, at, ranking.nuisance, s), starts, [at.start])
+    starts = [replace(s, values=r.own(at)) for r, s in zip(refined, starts, strict=True)]
+    shapes = [as_shape(r, ranking.base, at, s) for r, s in zip(refined, starts, strict=True)]
+    found = [Candidate(e, [s]) for e, s in zip(effects, shapes, strict=True)]
+    table = gram_table(ranking.base, t.blocks, found, ranking.nuisance, ranking.table.sigma)
+    scored = in_order([score(table, k, 1) for k in range(len(best))])
+    return Shortlist([e.id for e in effects], starts, refined, table, scored)
+
+
+def reweighted(
+    t: TrainingSet, at: Estimate, ranking: Ranking
+) -> tuple[TrainingSet, Ranking, Shortlist] | None:
+    """A shortlist in which an error counts by what even the best candidate leaves over.
+
+    Where no candidate explains the data down to the noise, what is left is no noise, and to weigh it as
+    such would move the nominal coefficients to wherever it becomes a little less. It also lasts: where
+    it is correlated over more windows than overlap, fewer count as independent, by the same factor on
+    all axes (the geometric mean of theirs): that an axis lacks something that lasts is no reason to
+    believe the others more. On no axis does it count more than the error before, which a wrong winner
+    may have made larger. None: weighed so, no candidate has a signal, and nothing can be told.
+
+    Args:
+        t, at, ranking: all candidates beside a model.
+    """
+    least = ranking.table.sigma
+    t = replace(t, sigma=least)
+    most = np.sqrt(np.mean(ranking.base**2, axis=0))
+    if not ranking.order:
+        return None
+    found = shortlist(t, at, ranking)
+    for _ in range(REWEIGHTINGS):
+        left = found.refined[found.scored[0].candidate].left
+        spoiled = np.sqrt(np.mean(left**2, axis=0))
+        lasting = np.exp(np.mean(np.log(independent(t.data, left))))
+        sigma = np.maximum(least, np.minimum(spoiled, most)) * np.sqrt(lasting)
+        change = sigma / ranking.table.sigma
+        if (change < CHANGED).all() and (change > 1.0 / CHANGED).all():
+            break
+        t = replace(t, sigma=sigma)
+        ranking = weighted(t, sigma, ranking.base, ranking.nuisance, ranking.candidates)
+        if not ranking.order:
+            return None
+        found = shortlist(t, at, ranking)
+    return t, ranking, found
+
+
+def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
+    """A candidate's parameters by the linear fit; those without any data stay out."""
+    shape = ranking.candidates[best.candidate].shapes[best.shape]
+    mine = regression(ranking.table, best.candidate, best.shape)
+    beta = dict(zip(mine.use.tolist(), mine.fitted(ranking.table.total).beta, strict=False))
+    columns = ranking.table.entries[best.candidate, best.shape].columns
+    found = {n: float(beta[k]) for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
+    values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
+    fitted = [n for n in values if timed(at.start.ship, n) is None]
+    size = len(fitted)
+    precision = np.zeros((size, size)) if shape.precision is None else shape.precision
+    return Start(values, fitted, precision)

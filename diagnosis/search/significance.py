@@ -1,0 +1,117 @@
+"""What a candidate must show to be accepted: more than chance, no harm to runs that it has not seen."""
+
+import numpy as np
+
+from fmus.ship import Ship
+
+from ..predictors.uncertainty import SHARE_OF_COMMAND
+from .map_regression import Scored
+from .shortlist import NEW, TIE, Shortlist
+
+# Of acceptance: fall of the score, which is twice a log likelihood ratio. Chance does not give 10 among
+# some fifty candidates (2 log 50 = 7.8), and what is less than 0.3 % of the error changes no prediction.
+LEAST_FALL, LEAST_SHARE = NEW, 0.003
+LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explained; chosen
+# Share of some axis' first sum of squares that must go with an effect: less shows in no prediction.
+LEAST_OF_AXIS = 0.02
+
+
+def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
+    """Whether a candidate explains more than chance does, by cross-validation over blocks.
+
+    Args:
+        nothing: the score without it.
+        best: its own.
+        total: sum of squares of the first model error, in units of the noise.
+    """
+    fall = nothing.score - best.score
+    explains = float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
+    return explains and fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
+
+
+def harmful(nothing: Scored, best: Scored) -> bool:
+    """Whether a candidate makes runs worse that it was not fitted to.
+
+    What the prior charges for nominal coefficients that moved is counted on both sides.
+    """
+    return worse(best.runs, nothing.runs, best.prior - nothing.prior)
+
+
+def worse(its: np.ndarray, others: np.ndarray, charge: float = 0.0) -> bool:
+    """Whether a loss by blocks (blocks,) exceeds another by more than two paired standard errors.
+
+    Args:
+        its, others: losses; infinite where a model runs away.
+        charge: added to the difference.
+    """
+    known = np.isfinite(others)
+    if not np.isfinite(its[known]).all():
+        return True
+    d = (its - others)[known]
+    if not d.size:
+        return charge > 0.0
+    return float(d.sum()) + charge > TIE * float(np.sqrt(d.size) * d.std())
+
+
+def lower_throughout(its: np.ndarray, others: np.ndarray) -> bool:
+    """Whether a loss by blocks (blocks,) is below another, in most blocks or by its mean.
+
+    One block with most of the loss makes a standard error as large as the mean; ranks do not mind
+    (Wilcoxon's signed-rank test, at the level of two standard errors).
+    """
+    if worse(others, its):
+        return True
+    d = others - its
+    if not np.isfinite(d).all() or not np.any(d) or d.sum() < 0.0:
+        return False
+    from scipy.stats import norm, wilcoxon  # half a second of import, and seldom asked for
+
+    _, p = wilcoxon(d, alternative="greater")
+    return bool(p < norm.sf(TIE))
+
+
+def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: np.ndarray) -> bool:
+    """Whether an effect takes away a force that shows, on some axis.
+
+    Args:
+        first: (K, 3), the first model error.
+        without, left: (K, 3), the model error without the effect and with it, all else the same.
+        command: (K, 3), the commanded force.
+    """
+    fall = np.sum(without**2 - left**2, axis=0)
+    of_error = LEAST_OF_AXIS * np.sum(first**2, axis=0)
+    of_command = SHARE_OF_COMMAND**2 * np.sum(command**2, axis=0)
+    return bool(np.any(fall >= np.maximum(of_error, of_command)))
+
+
+def better(present: str, best: Shortlist, ship: Ship) -> int | None:
+    """Number of the candidate of a shortlist that takes an effect's place; None: none does.
+
+    A simple law goes before a free curve that is no better than two paired standard errors; else a
+    candidate must be better than the present effect by as much as an effect must bring.
+
+    Args:
+        present: id of the effect that has the place.
+        best: candidates for the place, the present one mostly among them.
+        ship: whose effects they are.
+    """
+    scored = best.scored
+    ids = [best.ids[s.candidate] for s in scored]
+    smooth = [ship.effects[i].search.smooth for i in ids]
+    chosen = 0
+    if smooth[0]:
+        simple = [k for k in range(1, len(ids)) if not smooth[k] and not lower(scored[0], scored[k])]
+        chosen = min(simple, default=0)
+    if ids[chosen] == present:
+        return None
+    if present in ids:
+        at = ids.index(present)
+        simpler = smooth[at] and not smooth[chosen]
+        if not simpler and scored[at].score < scored[chosen].score + LEAST_FALL:
+            return None
+    return chosen
+
+
+def lower(its: Scored, others: Scored) -> bool:
+    """Whether a score is below another by more than two paired standard errors."""
+    return worse(others.blocks, its.blocks, others.penalty - its.penalty)

@@ -1,0 +1,1 @@
+"""Evidence in, a verdict out: what is kept, how sure it is, what it is called."""

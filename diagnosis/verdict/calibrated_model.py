@@ -1,0 +1,205 @@
+"""A calibrated model where no cause is believed: all coefficients at once, by predictions and priors.
+
+Predictions may use what is not sure enough to be told. Beside the nominal coefficients, each with the
+prior of where its value is from, those that simple models leave out are fitted (lift of the hull by
+sway and yaw, drag in turns, resistance that is not quadratic), and the axis of the heading; a
+current that all runs are in besides, where runs left out show it beyond chance. The windows
+are weighed by the covariance of initial state, noise and unrecorded force of the usual run, and in each
+run a constant sway force and a constant yaw moment of that size act besides, integrated out: the angle
+of an actuator that nobody recorded is no coefficient. So a run counts as what it is, hardly more than
+one sample of what lasts, and many of what changes with its motion.
+
+No effect follows from it. It is kept if runs left out are predicted better than by what was found.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ..predictors import Model, WeakWindows
+from ..predictors.shooting import Shooting
+from ..search.candidates import SMALL, model_error
+from ..search.findings import Findings
+from ..search.prediction_fit.disturbance import Push
+from ..search.prediction_fit.disturbance_summary import unrecorded
+from ..search.prediction_fit.fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
+from ..search.prediction_fit.joint_posterior import Posterior
+from ..search.prediction_fit.refit import Outcome
+from ..search.prior import NominalPrior
+from ..search.refinement import Estimate
+from .decision import something_left
+from .pruning import Unseen
+from .validation_data import gain, harm
+
+FEWEST = 4  # runs, from which on constants of each are told from coefficients; chosen
+# Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
+# of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
+# (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms; half
+# a unit of X_uuu is three tenths of the resistance of both at their speed.
+LIFT, RESISTANCE = 3.0, 0.5
+LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
+LEFT_OUT |= dict.fromkeys(("X_u", "X_uuu"), RESISTANCE)
+HEADING, AXIS = "heading_offset", 0.035  # rad, of a heading's axis: two degrees; chosen
+# Prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
+# for a ship of 34 m; chosen.
+CURRENT, STREAM = "current", 0.05
+CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
+FLOOR = 0.05  # of the mean square that is missed: what is not linear about a prediction; chosen
+LENGTH = (1.0,)  # of the windows: those in which predictions are shown
+
+
+class Calibration(PredictionFit):
+    """The fit: coefficients of all runs, with constants of each run integrated out.
+
+    Attributes:
+        of_runs: (runs, q, q) and (runs, q), what each run says, as H and g of the last information.
+        constant: of each group of windows, by run its rows, slopes of the constants and covariance.
+    """
+
+    def information(self, at: Estimate) -> Information:
+        model, q = at.model(self.prior), self.unit.size
+        whole, pushes = push_of(self.runs, model_error(self.runs, model), self.std)
+        self.assumed = Push(np.median([p.size for p in pushes], axis=0), whole.time)
+        steps = self._steps | {n: SMALL * model.unit(n) for n in CONSTANTS}
+        unit = np.concatenate([self.unit, self.assumed.size[1:]])
+        H, g = np.zeros((len(self.runs), q, q)), np.zeros((len(self.runs), q))
+        weights, self.constant = [], []
+        for s in self.windows:
+            around = s.around(model, steps)
+            W = self.whitening(s, around)
+            A, r = whitened(W, around.slopes * unit), whitened(W, around.residuals)
+            constant = []
+            for k, run in enumerate(s.runs):
+                rows = s.run == k
+                both, left = A[rows].reshape(-1, unit.size), r[rows].ravel()
+                J, U = both[:, :q], both[:, q:]
+                K = np.linalg.inv(U.T @ U + np.eye(len(CONSTANTS)))
+                J_U = J.T @ U @ K
+                place = self._place[id(run)]
+                H[place] += J.T @ J - J_U @ U.T @ J
+                g[place] += J.T @ left - J_U @ (U.T @ left)
+                constant.append((rows, U, K))
+            weights.append(W)
+            self.constant.append(constant)
+        self.of_runs = H, g
+        whole_H = H.sum(axis=0)
+        return Information(whole_H, whole_H, g.sum(axis=0), weights, self.assumed)
+
+    def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        pooled = squares.sum(axis=(0, 1)) / max(seen.sum(), 1)
+        pooled[:2] = pooled[:2].mean()
+        return np.broadcast_to(FLOOR * pooled, (len(squares), 3))
+
+    def squares(self, k: int, weights: np.ndarray, model: Model) -> float:
+        r, total = whitened(weights, self.windows[k].residuals(model)), 0.0
+        for rows, U, K in self.constant[k]:
+            left = r[rows].ravel()
+            along = U.T @ left
+            total += float(left @ left - along @ K @ along)
+        return total
+
+    def without_each_run(self, at: Estimate) -> list[Model]:
+        """The model fitted without each run, by one step about the fit to all, which ended last."""
+        P, (H, g) = self.precision, self.of_runs
+        whole_H, whole_g, prior = H.sum(axis=0), g.sum(axis=0), P @ self.theta(at)
+        return [
+            self.moved(at, np.linalg.solve(whole_H - h + P, whole_g - v - prior)).model(self.prior)
+            for h, v in zip(H, g, strict=True)
+        ]
+
+
+def calibrated(
+    found: Findings,
+    train: Sequence[WeakWindows],
+    held_out: Sequence[WeakWindows],
+    start: Model,
+    prior: NominalPrior,
+) -> Outcome | None:
+    """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
+
+    Each training run is predicted without it, held-out runs only veto.
+
+    Args:
+        found: what was found, of which nothing is believed.
+        train, held_out: runs.
+        start: the model at first.
+        prior: of the nominal coefficients.
+    """
+    fits = len(train) >= FEWEST and any(prior.std.values())
+    if not fits or not something_left(train, start, start):
+        return None
+    windows = shootings(train, LENGTH)
+    if not windows:
+        return None
+    of = partial(_fitted, found, train, windows, prior)
+    best = of(begin(start, prior))
+    unseen = Unseen(train, [], start, found.sigma)
+    other, first = unseen.losses(found if found.effects else start, start)
+    flowing = of(begin(start, prior, {CURRENT: STREAM}, best.findings.estimate))
+    still, now = unseen.losses(best.findings, flowing.findings)
+    if harm(still, now) and gain(still, now) > 0.0:
+        best = flowing
+    else:
+        now = still
+    if harm(now, first) or gain(other, now) <= 0.0:
+        return None
+    model = best.findings.model
+    if held_out and harm(*Unseen(train, held_out, start, found.sigma).losses(model, start)):
+        return None
+    return best
+
+
+def _fitted(
+    found: Findings,
+    train: Sequence[WeakWindows],
+    windows: Sequence[Shooting],
+    prior: NominalPrior,
+    at: Estimate,
+) -> Outcome:
+    """All coefficients of an estimate, fitted."""
+    problem = Calibration(train, windows, at, prior)
+    fitted = fit_to(problem, at)
+    at = fitted.estimate
+    model = at.model(prior)
+    learned = replace(
+        found,
+        effects=[],
+        model=model,
+        suspects=[],
+        refitted=model,
+        moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
+        fold_models=problem.without_each_run(at),
+        refit=None,
+        estimate=at,
+    )
+    return Outcome(learned, Posterior.of(fitted, prior), unrecorded(train, model, fitted.push, {}))
+
+
+def begin(
+    start: Model,
+    prior: NominalPrior,
+    further: Mapping[str, float] | None = None,
+    near: Estimate | None = None,
+) -> Estimate:
+    """The first model with coefficients that it leaves out, zero as yet, and their prior precision.
+
+    Args:
+        start: the first model.
+        prior: of the nominal coefficients.
+        further: effects beside those of LEFT_OUT, and their prior standard deviations.
+        near: where to begin; None: at the first model.
+    """
+    effects = start.ship.effects
+    std = {
+        n: size * start.unit(n)
+        for i, size in (LEFT_OUT | dict(further or {})).items()
+        if i in effects and i not in prior.mean
+        for n in effects[i].coefficients
+    } | ({HEADING: AXIS} if HEADING in effects else {})
+    precision = np.diag([s**-2.0 for s in std.values()])
+    values = dict.fromkeys(std, 0.0)
+    if near is None:
+        return Estimate(start, np.zeros(prior.size), values, precision)
+    return Estimate(start, near.offset, {**values, **near.values}, precision)
