@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from .command_motion import Commands
 from .penalised import Fit, Problem
-from .spline import POINTS
+from .spline import roughness
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 COARSE = 0.2  # s, between the delays that are tried first
@@ -74,19 +74,16 @@ class Regression:
 
     def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
         """r(x) of signals (n, k) in a channel, in units of the noise."""
-        system = self.fit.systems[channel]
-        return np.vstack(system.residual(x, system.solve(x))) / self.problem.sigma[channel]
+        system, y = self.fit.systems[channel], self.problem.data(channel, x)
+        return system.residual(y, system.solve(y))
 
     @property
     def block(self) -> np.ndarray:
         """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
-        grid, run = self.problem.grid, self.commands.track.run
-        stretches = zip(grid.start, grid.intervals, strict=True)
-        middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
-        time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
-        return np.unique(
-            np.floor(np.concatenate(time) / (LATENESS_BLOCK * self.time_scale)), return_inverse=True
-        )[1]
+        spline, time = self.problem.spline, self.commands.track.run.time
+        of_penalty = roughness(spline.grid, spline.stiffness[0])[1]
+        rows = np.concatenate([time[self.problem.rows] - time[0], of_penalty])
+        return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
 
 
 def size_of(a: np.ndarray) -> np.ndarray:
