@@ -20,12 +20,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, get_lapack_funcs
-from scipy.sparse import csr_array, vstack
+from scipy.linalg import LinAlgError, cholesky_banded, get_lapack_funcs
+from scipy.sparse import csr_array
 
 from .spline import Basis, Knots, roughness
 
 NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
+PBTRS: Any = get_lapack_funcs("pbtrs", dtype=float)  # solves by a banded Cholesky factor
 GBTRF: Any = get_lapack_funcs("gbtrf", dtype=complex)  # LU factors of a banded matrix
 POSE, JERK = range(2)  # groups of a smoothing spline
 
@@ -35,6 +36,7 @@ class Equations(NamedTuple):
 
     Attributes:
         matrix: M, (n, size).
+        turned: its transpose.
         root: (n,), square root of the weight of each equation among those of its group.
         group: (n,), number of that.
         normals: (groups, width, size), lower bands of N_g.
@@ -42,6 +44,7 @@ class Equations(NamedTuple):
     """
 
     matrix: csr_array
+    turned: Any
     root: np.ndarray
     group: np.ndarray
     normals: np.ndarray
@@ -67,13 +70,13 @@ class System:
 
     def inverse(self, right: np.ndarray) -> np.ndarray:
         """A^-1 times columns (size, k)."""
-        return cho_solve_banded((self.factor, True), right)
+        return PBTRS(self.factor, right, lower=1)[0]
 
     def solve(self, y: np.ndarray) -> np.ndarray:
         """Unknowns (size, k) for data (n, k), by corrected seminormal equations."""
         if not np.isfinite(y).all():
             raise LinAlgError("the motion is not finite")
-        turned = self.equations.matrix.T
+        turned = self.equations.turned
         c = self.inverse(turned @ (self.root**2 * y))
         return c + self.inverse(turned @ (self.root * self.residual(y, c)))
 
@@ -133,18 +136,16 @@ class Spline:
     rates: Rates | None = None
 
     @cached_property
-    def penalties(self) -> list[Basis]:
-        """R of each channel; see :func:`.spline.roughness`."""
-        return [roughness(self.grid, weights)[0] for weights in self.stiffness]
+    def parts(self) -> list[tuple[csr_array, Any, np.ndarray]]:
+        """Of each channel M, with the rows of the penalty last, its transpose, and N of the penalty."""
+        return [self._part(weights) for weights in self.stiffness]
 
-    @cached_property
-    def parts(self) -> list[tuple[csr_array, np.ndarray]]:
-        """Of each channel M, with the rows of the penalty last, and their N."""
-        above = [self.b.matrix, *([self.rates.b.matrix] if self.rates else [])]
-        return [
-            (csr_array(vstack([*above, r.matrix])), r.gram(np.ones(len(r.values))))
-            for r in self.penalties
-        ]
+    def _part(self, weights: np.ndarray) -> tuple[csr_array, Any, np.ndarray]:
+        rough = roughness(self.grid, weights)[0]
+        rows = [self.b, *([self.rates.b] if self.rates else []), rough]
+        first, values = (np.concatenate([getattr(b, of) for b in rows]) for of in ("first", "values"))
+        matrix = Basis(first, values, self.grid.size).matrix
+        return matrix, matrix.T, rough.gram(np.ones(len(rough.values)))
 
 
 class Problem(NamedTuple):
@@ -182,7 +183,7 @@ class Problem(NamedTuple):
         of_pose = b.gram(weights)
         of_rates = rates.b.gram(np.ones(len(rates.z))) if rates else np.zeros_like(of_pose)
         found = []
-        for k, (matrix, penalty) in enumerate(self.spline.parts):
+        for k, (matrix, turned, penalty) in enumerate(self.spline.parts):
             share = float(self.sigma[k] / rates.sigma[k]) if rates else 0.0
             root = np.ones(matrix.shape[0])
             root[: weights.size] = np.sqrt(weights)
@@ -190,7 +191,7 @@ class Problem(NamedTuple):
             root[weights.size : many] = share
             group = np.where(np.arange(root.size) < many, POSE, JERK)
             normals = np.array([of_pose + share**2 * of_rates, penalty])
-            found.append(Equations(matrix, root, group, normals, np.array([many, grid.rank])))
+            found.append(Equations(matrix, turned, root, group, normals, np.array([many, grid.rank])))
         return found
 
     def precision(self, channel: int, smoothness: float) -> np.ndarray:
