@@ -11,7 +11,7 @@ from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
-from .clock_path import DRIFT, HEADING, TURN, PathProblem, Solution, integral_of
+from .clock_path import DRIFT, HEADING, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
 from .evidence import Evidence, evidence
 from .gaps import Gap, gaps
@@ -54,7 +54,7 @@ class Motion(NamedTuple):
     """
 
     problem: PathProblem
-    solution: Solution
+    solution: Path
     wanders: bool
     kept: list[Column]
     either: bool = False
@@ -161,7 +161,7 @@ def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
     return [c for c in every if (c.channel, c.kind) != (named, "scale")]
 
 
-def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
+def _sure(every: Sequence[Column], solution: Path) -> list[Column]:
     std = np.sqrt(np.diag(solution.covariance))
     return [
         c
@@ -278,7 +278,7 @@ def _blocks(found: Motion) -> _Blocks:
     weights /= weights.sum(axis=1)[:, None]
     first = np.array([edges[np.flatnonzero(w)[0]] for w in weights])
     last = np.array([edges[np.flatnonzero(w)[-1] + 1] for w in weights])
-    return _Blocks(weights[:, :-1] @ clock, found.solution.system.mean_clock(weights), first, last)
+    return _Blocks(weights[:, :-1] @ clock, found.solution.mean_clock(weights), first, last)
 
 
 def _uneven(found: Motion) -> bool:
