@@ -43,13 +43,14 @@ def with_commands(
     Returns:
         What is left by the response, its smoothness (3,), and the response.
     """
-    weights = alone.weights
+    weights, run = alone.weights, commands.track.run
+    time = run.time[p.rows] - run.time[0]
     near = likeliest(p, weights, alone.even)
     least = deviance(p, weights, near) - PARAMETERS
-    delay, sure = likeliest_delay(Regression(p, fit, commands))
+    delay, sure = likeliest_delay(Regression(p, fit, commands, time))
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
-        response = commands.response(Regression(p, fit, commands).gains(delay), delay)
+        response = commands.response(Regression(p, fit, commands, time).gains(delay), delay)
         rest = p._replace(z=p.z - response.eta[p.rows])
         near = likeliest(rest, weights, near)
         cost = deviance(rest, weights, near)

@@ -35,7 +35,7 @@ GROWTH = 1.9
 COARSE = 1.0  # decades, of the search for the valley and of the first step in it (chosen)
 BEYOND = 1.5  # times the distance that this tells: the root then lies between (chosen)
 # Decades, of the secant method's last step: it converges with order 1.6, and stands at rounding then.
-LAST_STEP = 1e-6
+LAST_STEP = 1e-5
 
 
 def likeliest(

@@ -174,6 +174,12 @@ def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
+def middles(grid: Knots) -> np.ndarray:
+    """(intervals,): times [s] in the middle of all intervals."""
+    row = successive(0 * grid.intervals, grid.intervals)
+    return np.repeat(grid.start, grid.intervals) + (row + 0.5) * grid.spacing
+
+
 def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
     """(intervals, channels): third derivative in the middle of each interval."""
     middle = 0.5 ** np.arange(WIDTH - 3) @ PIECES[3] / grid.spacing**3
