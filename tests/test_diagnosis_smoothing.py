@@ -172,8 +172,7 @@ def test_smoothness_has_the_largest_likelihood():
     np.testing.assert_allclose(again, best, rtol=1e-7)
     found = criteria(p, np.ones(1000))
     values = [
-        sum(f.cost(np.log10(s) + off) for f, s in zip(found, best, strict=True))
-        for off in (-0.1, 0.1)
+        sum(f.cost(np.log10(s) + off) for f, s in zip(found, best, strict=True)) for off in (-0.1, 0.1)
     ]
     assert min(values) > deviance(p, np.ones(1000), best) + 1e-3
     for f, s in zip(found, best, strict=True):

@@ -34,12 +34,16 @@ MOST_NODES, MOST_SAMPLES = 20_000, 8
 # Prior standard deviation of c about 1 at each node: of a clock that may be off, none of which runs at
 # half or double rate, and of one that may not.
 ANCHOR, EVEN = 0.5, 1e-6
-HOLD = 1e-6  # 1/m, 1/rad; inverse of the prior standard deviation of a pose that nothing measures (chosen)
+HOLD = (
+    1e-6  # 1/m, 1/rad; inverse of the prior standard deviation of a pose that nothing measures (chosen)
+)
 SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
 BEGIN = 0.1  # of the walks in a second, times the noise or the rate; first guess
 LEAST = 1e-3  # of the noise, and of the walks over the whole run; less makes no difference to a path (chosen)
 SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
-STILL = 1e-6  # relative change of all deviations in a sweep that ends them; chosen: no digit told changes
+STILL = (
+    1e-6  # relative change of all deviations in a sweep that ends them; chosen: no digit told changes
+)
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 
@@ -95,7 +99,9 @@ class PathProblem:
         self.parts: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
         right, groups, lengths = [], [], []
 
-        def add(group: int, of: list[tuple[np.ndarray, np.ndarray]], y: np.ndarray, h: np.ndarray) -> int:
+        def add(
+            group: int, of: list[tuple[np.ndarray, np.ndarray]], y: np.ndarray, h: np.ndarray
+        ) -> int:
             begin = sum(each.size for each in right)
             entries.extend((begin + np.arange(y.size), u, np.broadcast_to(f, y.shape)) for u, f in of)
             right.append(y)

@@ -150,7 +150,9 @@ class Commands:
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
-        eta, eta_dot, eta_ddot = (_channels(self.sampled(each, self.track.run.time)) for each in (x, x_dot, x_ddot))
+        eta, eta_dot, eta_ddot = (
+            _channels(self.sampled(each, self.track.run.time)) for each in (x, x_dot, x_ddot)
+        )
         return CommandResponse(eta, eta_dot, eta_ddot, delay)
 
 

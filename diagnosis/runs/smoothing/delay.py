@@ -101,9 +101,7 @@ class Regression:
         weights = systems[0].equations.root[: part.size] ** 2
         counts = np.bincount(part, weights)
         there = counts > 0.0
-        time, *z = (
-            np.bincount(part, weights * x)[there] / counts[there] for x in (self.time, *p.z.T)
-        )
+        time, *z = (np.bincount(part, weights * x)[there] / counts[there] for x in (self.time, *p.z.T))
         at, to = (middles(each) for each in (grid, coarse))
         stiffness = np.array([np.interp(to, at, each) for each in spline.stiffness])
         thin = p._replace(

@@ -20,13 +20,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky_banded, get_lapack_funcs
+from scipy.linalg import LinAlgError, get_lapack_funcs
 from scipy.sparse import csr_array
 
 from .spline import Basis, Knots, roughness
 
 NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
-PBTRS: Any = get_lapack_funcs("pbtrs", dtype=float)  # solves by a banded Cholesky factor
+# Cholesky factors of a banded matrix, and the solution by them.
+PBTRF, PBTRS = (get_lapack_funcs(name, dtype=float) for name in ("pbtrf", "pbtrs"))
 GBTRF: Any = get_lapack_funcs("gbtrf", dtype=complex)  # LU factors of a banded matrix
 POSE, JERK = range(2)  # groups of a smoothing spline
 
@@ -66,19 +67,24 @@ class System:
         self.equations, self.precision = equations, precision
         self.root = (equations.root * np.sqrt(precision)[equations.group])[:, None]
         self.normal = sum(p * n for p, n in zip(precision, equations.normals, strict=True))
-        self.factor = cholesky_banded(self.normal, lower=True)
+        self.factor, failed = PBTRF(self.normal, lower=1)
+        if failed or not np.isfinite(self.factor[0]).all():
+            raise LinAlgError("what was measured does not determine it")
 
     def inverse(self, right: np.ndarray) -> np.ndarray:
         """A^-1 times columns (size, k)."""
         return PBTRS(self.factor, right, lower=1)[0]
 
-    def solve(self, y: np.ndarray) -> np.ndarray:
-        """Unknowns (size, k) for data (n, k), by corrected seminormal equations."""
+    def estimate(self, y: np.ndarray) -> np.ndarray:
+        """Unknowns (size, k) for data (n, k), by the normal equations."""
         if not np.isfinite(y).all():
             raise LinAlgError("the motion is not finite")
-        turned = self.equations.turned
-        c = self.inverse(turned @ (self.root**2 * y))
-        return c + self.inverse(turned @ (self.root * self.residual(y, c)))
+        return self.inverse(self.equations.turned @ (self.root**2 * y))
+
+    def solve(self, y: np.ndarray) -> np.ndarray:
+        """The same, corrected once: to rounding."""
+        c = self.estimate(y)
+        return c + self.inverse(self.equations.turned @ (self.root * self.residual(y, c)))
 
     def residual(self, y: np.ndarray, c: np.ndarray) -> np.ndarray:
         """(n, k), y - M c in standard deviations: the sum of its squares is what c minimises."""

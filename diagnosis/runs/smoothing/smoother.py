@@ -230,9 +230,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     spikes[dense] = weights == 0.0
     known = zip(bases, response[:3], strict=True)
     motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
-    eta_std, eta_dot_std, eta_ddot_std = (
-        spread(np.sqrt(b.variance(inverse)), inside) for b in bases
-    )
+    eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(inverse)), inside) for b in bases)
     return Smoothed(
         track,
         spikes,

@@ -47,7 +47,9 @@ def _products(pieces: np.ndarray) -> np.ndarray:
 
 
 PARABOLAS = _products(_pieces(DEGREE - 3))  # of the third derivative
-DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])  # third difference of coefficients: those of the third derivative
+DIFFERENCE = np.array(
+    [-1.0, 3.0, -3.0, 1.0]
+)  # third difference of coefficients: those of the third derivative
 
 
 class Knots(NamedTuple):
