@@ -5,11 +5,9 @@ from collections.abc import Callable
 from fmus.scale import Scale
 
 from ..files.reading import Run
-from .accelerations import accelerations
+from .further_channels import accelerations, receivers, through_water
 from .motion import motion
-from .receivers import receivers
 from .sensor_finding import Examined
-from .through_water import through_water
 from .unit_faults import sway, units
 from .wraps import wraps
 
@@ -26,7 +24,7 @@ CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
 
 
 def examine(run: Run, scale: Scale) -> Examined:
-    """Hold channels that say the same twice against each other.
+    """Cross-check channels that are redundant.
 
     Args:
         run: as it was read.
