@@ -11,7 +11,7 @@ from support.measured import DATA, NOISE, base, changed, needs_data, sail, smoot
 from diagnosis import InputError, Run, clean, read, smooth
 from diagnosis.runs.smoothing.likelihood import criteria, deviance, likeliest
 from diagnosis.runs.smoothing.penalised import JERK as PENALTY
-from diagnosis.runs.smoothing.penalised import Problem, Spline, System
+from diagnosis.runs.smoothing.penalised import Problem, Rates, Spline, System
 from diagnosis.runs.smoothing.spline import basis, inverse_band, knots, roughness, third
 
 pytestmark = pytest.mark.numerical
@@ -165,7 +165,7 @@ def test_smoothness_has_the_largest_likelihood():
     grid = knots(np.array([0.0]), np.array([20.0]), 0.05)
     time = 0.02 * np.arange(1000)
     z = 1e3 + np.sin(time)[:, None] + 1e-3 * np.random.default_rng(0).standard_normal((1000, 3))
-    spline = Spline(grid, basis(grid, time), np.ones((3, 400)))
+    spline = Spline(grid, basis(grid, time), np.ones((3, 400)), Rates.none(grid))
     p = Problem(np.arange(1000), z, np.full(3, 1e-3), 160, spline)
     best = likeliest(p, np.ones(1000))
     again = likeliest(p, np.ones(1000), 30.0 * best)

@@ -1,7 +1,5 @@
 """All checks of a run's channels, each on what the ones before have repaired."""
 
-from collections.abc import Callable
-
 from fmus.scale import Scale
 
 from ..files.reading import Run
@@ -10,17 +8,6 @@ from .motion import motion
 from .sensor_finding import Examined
 from .unit_faults import sway, units
 from .wraps import wraps
-
-# Each receives a run and the ship's scale; in the order in which one needs what others repair.
-CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
-    wraps,
-    units,
-    sway,
-    receivers,
-    motion,
-    accelerations,
-    through_water,
-)
 
 
 def examine(run: Run, scale: Scale) -> Examined:
@@ -34,6 +21,7 @@ def examine(run: Run, scale: Scale) -> Examined:
         The run as far as its own channels repair it, and what they say of each other.
     """
     found = Examined(run)
-    for check in CHECKS:
+    # In the order in which one needs what others repair.
+    for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
         found = found.plus(check(found.run, scale))
     return found

@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError
 from scipy.special import stdtrit
 
 from .command_motion import Commands
-from .penalised import JERK, POSE, Fit, Problem, Spline, solve
+from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
 from .spline import basis, knots, middles, roughness
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -105,7 +105,8 @@ class Regression:
         at, to = (middles(each) for each in (grid, coarse))
         stiffness = np.array([np.interp(to, at, each) for each in spline.stiffness])
         thin = p._replace(
-            rows=p.rows[:0], z=np.column_stack(z), spline=Spline(coarse, basis(coarse, time), stiffness)
+            z=np.column_stack(z),
+            spline=Spline(coarse, basis(coarse, time), stiffness, Rates.none(coarse)),
         )
         return Regression(thin, solve(thin, smoothness, counts[there]), self.commands, time)
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from .likelihood import adapt, likeliest
 from .penalised import Problem, solve
-from .spline import inverse_band
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
 # Standard deviations from which on the loss of Huber (1964) is linear. Chosen: 95 % of normal noise
@@ -87,7 +86,7 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
     stretch = np.searchsorted(p.spline.grid.first, b.first, side="right") - 1
     for _ in range(REWEIGHTINGS):
         fit = solve(p, smoothness, weights)
-        spread = b.variance(inverse_band(fit.factors)) / p.sigma**2
+        spread = b.variance(fit.covariance) / p.sigma**2
         off = np.abs(p.z - b(fit.coefficients)) / p.sigma
         leverage = np.minimum(weights[:, None] * spread, 0.999)
         expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, get_lapack_funcs
 from scipy.sparse import csr_array
 
-from .spline import Basis, Knots, roughness
+from .spline import Basis, Knots, basis, inverse_band, roughness
 
 NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
 # Cholesky factors of a banded matrix, and the solution by them.
@@ -124,6 +124,11 @@ class Rates(NamedTuple):
     b: Basis
     sigma: np.ndarray
 
+    @classmethod
+    def none(cls, grid: Knots) -> "Rates":
+        """No measured derivatives."""
+        return cls(np.zeros((0, 3)), basis(grid, np.zeros(0), 1), np.full(3, np.inf))
+
 
 @dataclass(frozen=True, eq=False)
 class Spline:
@@ -133,25 +138,24 @@ class Spline:
         grid: their knots.
         b: basis at the measurements.
         stiffness: (3, intervals), weight of each interval in the penalty of each channel.
-        rates: measured derivatives, which count as further measurements; None: there are none.
+        rates: measured derivatives, which count as further measurements.
     """
 
     grid: Knots
     b: Basis
     stiffness: np.ndarray
-    rates: Rates | None = None
+    rates: Rates
 
     @cached_property
     def parts(self) -> list[tuple[csr_array, Any, np.ndarray]]:
         """Of each channel M, with the rows of the penalty last, its transpose, and N of the penalty."""
-        return [self._part(weights) for weights in self.stiffness]
-
-    def _part(self, weights: np.ndarray) -> tuple[csr_array, Any, np.ndarray]:
-        rough = roughness(self.grid, weights)[0]
-        rows = [self.b, *([self.rates.b] if self.rates else []), rough]
-        first, values = (np.concatenate([getattr(b, of) for b in rows]) for of in ("first", "values"))
-        matrix = Basis(first, values, self.grid.size).matrix
-        return matrix, matrix.T, rough.gram(np.ones(len(rough.values)))
+        found = []
+        for weights in self.stiffness:
+            rows = self.b, self.rates.b, roughness(self.grid, weights)[0]
+            first = np.concatenate([b.first for b in rows])
+            matrix = Basis(first, np.vstack([b.values for b in rows]), self.grid.size).matrix
+            found.append((matrix, matrix.T, rows[-1].gram(np.ones(rows[-1].first.size))))
+        return found
 
 
 class Problem(NamedTuple):
@@ -177,27 +181,24 @@ class Problem(NamedTuple):
 
     def data(self, channel: int, z: np.ndarray) -> np.ndarray:
         """y for measurements z (n, k) of a channel."""
-        y = np.zeros((self.spline.parts[channel][0].shape[0], z.shape[1]))
-        y[: len(z)] = z
-        if self.spline.rates:
-            y[len(z) : len(z) + len(self.spline.rates.z)] = self.spline.rates.z[:, [channel]]
+        y, many = np.zeros((self.spline.parts[channel][0].shape[0], z.shape[1])), len(z)
+        y[:many] = z
+        y[many : many + len(self.spline.rates.z)] = self.spline.rates.z[:, [channel]]
         return y
 
     def equations(self, weights: np.ndarray) -> list[Equations]:
         """Those of each channel, in standard deviations of the pose, for weights (n,) of the samples."""
-        b, grid, rates = self.spline.b, self.spline.grid, self.spline.rates
-        of_pose = b.gram(weights)
-        of_rates = rates.b.gram(np.ones(len(rates.z))) if rates else np.zeros_like(of_pose)
-        found = []
+        rates, of_pose = self.spline.rates, self.spline.b.gram(weights)
+        of_rates, found = rates.b.gram(np.ones(len(rates.z))), []
         for k, (matrix, turned, penalty) in enumerate(self.spline.parts):
-            share = float(self.sigma[k] / rates.sigma[k]) if rates else 0.0
-            root = np.ones(matrix.shape[0])
-            root[: weights.size] = np.sqrt(weights)
-            many = weights.size + (len(rates.z) if rates else 0)
-            root[weights.size : many] = share
+            share = float(self.sigma[k] / rates.sigma[k])
+            roots = np.sqrt(weights), np.full(len(rates.z), share)
+            many = weights.size + len(rates.z)
+            root = np.concatenate([*roots, np.ones(matrix.shape[0] - many)])
             group = np.where(np.arange(root.size) < many, POSE, JERK)
             normals = np.array([of_pose + share**2 * of_rates, penalty])
-            found.append(Equations(matrix, turned, root, group, normals, np.array([many, grid.rank])))
+            counts = np.array([many, self.spline.grid.rank])
+            found.append(Equations(matrix, turned, root, group, normals, counts))
         return found
 
     def precision(self, channel: int, smoothness: float) -> np.ndarray:
@@ -217,9 +218,9 @@ class Fit(NamedTuple):
     systems: list[System]
 
     @property
-    def factors(self) -> np.ndarray:
-        """(3, 6, size), lower bands of the Cholesky factors of A."""
-        return np.array([system.factor for system in self.systems])
+    def covariance(self) -> np.ndarray:
+        """(6, size, 3), lower bands of that of the coefficients."""
+        return inverse_band(np.array([system.factor for system in self.systems]))
 
 
 def solve(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Fit:

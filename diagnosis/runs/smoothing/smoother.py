@@ -25,8 +25,8 @@ from .delay import NOTICED
 from .likelihood import adapt
 from .measured_rates import ALONE, Agreeing, measured_rates
 from .outliers import Inliers, TooFewError, robust
-from .penalised import Problem, Spline, solve
-from .spline import Knots, basis, inverse_band, knots
+from .penalised import Problem, Rates, Spline, solve
+from .spline import Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
@@ -187,7 +187,7 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
     average = max(1, round(AVERAGE * scale.time / grid.spacing))
-    spline = Spline(grid, basis(grid, time[dense]), stiffness)
+    spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
     return Problem(dense, z, sigma, average, spline), origin
 
 
@@ -224,13 +224,13 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         beside = beside._replace(z=beside.z - response.eta_dot[at])
         p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
     fit = solve(p, smoothness, weights)
-    inverse = inverse_band(fit.factors)
+    covariance = fit.covariance
     spikes = track.valid.copy()
     spikes[rows] = False
     spikes[dense] = weights == 0.0
     known = zip(bases, response[:3], strict=True)
     motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
-    eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(inverse)), inside) for b in bases)
+    eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(covariance)), inside) for b in bases)
     return Smoothed(
         track,
         spikes,
