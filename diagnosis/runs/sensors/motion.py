@@ -16,7 +16,7 @@ from ..files.reading import Run
 from .clock_path import DRIFT, HEADING, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
 from .evidence import SURE, Evidence, evidence, straight
-from .gaps import Gap, gaps
+from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
@@ -65,8 +65,7 @@ def motion(run: Run, scale: Scale) -> Examined:
         found = _estimated(e, columns(e, scale), jumps)
     except LinAlgError:
         return Examined(run, notes=("the channels beside the pose do not determine a motion",))
-    findings = [jump.finding for jump in jumps]
-    findings += _clock(found) + _constants(found, e)
+    findings = [*jumps, *_clock(found), *_constants(found, e)]
     late = [f for f in findings if f.kind == "delay"]
     if late:  # its column is a tangent: all else is estimated once it is gone
         first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
@@ -92,7 +91,9 @@ def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iter
             yield replace(f, value=f.value + more, ci95=(low, high))
 
 
-def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFinding]) -> Correction:
+def _correction(
+    found: Motion, jumps: Sequence[SensorFinding], fixes: Sequence[SensorFinding]
+) -> Correction:
     """What findings say of the run."""
     values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
     rates = [f.value for f in fixes if f.kind == "clock_rate"]
@@ -106,7 +107,7 @@ def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFindi
     return Correction(values, problem.edges, true, jumps)
 
 
-def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Motion:
+def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFinding]) -> Motion:
     """The likeliest clock and the constants that are sure."""
     cut = [(jump.start, jump.end) for jump in jumps]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
