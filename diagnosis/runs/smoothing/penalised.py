@@ -148,10 +148,11 @@ class Spline:
         """Of each channel M, with the rows of the penalty last, its transpose, and N of the penalty."""
         found = []
         for weights in self.stiffness:
-            rows = self.b, self.rates.b, roughness(self.grid, weights)[0]
+            rough, normal = roughness(self.grid, weights)
+            rows = self.b, self.rates.b, rough
             first = np.concatenate([b.first for b in rows])
             matrix = Basis(first, np.vstack([b.values for b in rows]), self.grid.size).matrix
-            found.append((matrix, matrix.T, rows[-1].gram(np.ones(rows[-1].first.size))))
+            found.append((matrix, matrix.T, normal))
         return found
 
 
