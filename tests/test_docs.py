@@ -79,7 +79,7 @@ def modules_with_constants():
     yield diagnosis.verdict.calibrated_model
     parts = (diagnosis.runs, diagnosis.predictors, diagnosis.assessment, diagnosis.search)
     for part in parts:
-        for found in pkgutil.iter_modules(part.__path__, f"{part.__name__}."):
+        for found in pkgutil.walk_packages(part.__path__, f"{part.__name__}."):
             if not found.name.endswith(".peers"):
                 yield importlib.import_module(found.name)
 
