@@ -22,6 +22,7 @@ from .report.result_keys import DiagnosisContent
 from .report.terminal import summary
 from .runs import Run, read_frame, ship_of_logs
 from .search import DEFAULT, Method, Prior, shares
+from .verdict.pruning_criteria import USUAL as PAIRED
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -211,12 +212,14 @@ def diagnose(
     seed: int = 0,
     by: str | Method = DEFAULT,
     ship: str | Path | None = None,
+    validate: Sequence[WeakWindows] | Source | Sequence[Source] = (),
+    pruning: str = PAIRED,
 ) -> ShownDiagnosis:
     """Learn what a model lacks.
 
     Args:
         runs: to learn from: from :func:`load`, or what that takes.
-        held_out: runs to test on only; likewise.
+        held_out: test runs, likewise: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
         model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
@@ -225,14 +228,16 @@ def diagnose(
         seed: of everything random.
         by: method of identification, or the name of one.
         ship: whose nominal model is the initial one, as :func:`load` has it.
+        validate: validation runs, likewise: they decide what is kept; without any, training data left
+            out in turn do.
+        pruning: criterion by which effects are rejected: "paired", "bic", or a file.
 
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    given, others = _listed(runs), _listed(held_out)
-    of = _model_of(model if isinstance(model, Model) else None, ship, [*given, *others])
+    parts = [_listed(runs), _listed(validate), _listed(held_out)]
+    of = _model_of(model if isinstance(model, Model) else None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
-    train = given if _are_loaded(given) else load(given, model=of)
-    test = others if not others or _are_loaded(others) else load(others, model=of)
-    found = session.diagnose(train, test, prior, model or of, advance, seed, by)
+    train, decide, test = (p if not p or _are_loaded(p) else load(p, model=of) for p in parts)
+    found = session.diagnose(train, test, prior, model or of, advance, seed, by, decide, pruning)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

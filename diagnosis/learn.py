@@ -27,6 +27,8 @@ from .commands.command_line import (
 from .execution.progress import Advance
 from .execution.result_folder import together
 from .search.methods import DEFAULT, METHODS, method
+from .verdict.pruning_criteria import CRITERIA, criterion
+from .verdict.pruning_criteria import USUAL as PAIRED
 
 DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "diagnosis.json",
@@ -61,17 +63,25 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
             raise InputError("--fit is for a model of this project, not for an FMU")
         shares(craft, options.prior)
         by = method(options.method)
-        paths = [*options.train, *options.test]
+        criterion(options.pruning)
+        paths = [*options.train, *options.validate, *options.test]
         runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
         from . import session
         from .predictors import write_wrapper
         from .search.prediction_fit.output_fit import fitted
 
-        train = len(options.train)
+        train, decide = len(options.train), len(options.train) + len(options.validate)
         model = fitted(runs[:train], model, options.prior, options.fit)
         with proposing():
             diagnosis = session.diagnose(
-                runs[:train], runs[train:], options.prior, fmu or model, advance, by=by
+                runs[:train],
+                runs[decide:],
+                options.prior,
+                fmu or model,
+                advance,
+                by=by,
+                validate=runs[train:decide],
+                pruning=options.pruning,
             )
         refused, use, notes = "", diagnosis.comparison.use, []
         if use is not None:
@@ -111,6 +121,7 @@ def _parser() -> argparse.ArgumentParser:
         "learn",
         "Learn from measured runs which physical effect a model lacks, and how sure that is.",
         "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
+        "           %(prog)s run1.csv run2.csv --validate run3.csv --test run4.csv\n"
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
@@ -124,15 +135,19 @@ def _parser() -> argparse.ArgumentParser:
         metavar="TRAIN",
         help="measured run to learn from, or folder of a log",
     )
-    made.add_argument(
-        "--test",
-        type=Path,
-        nargs="+",
-        action="extend",
-        metavar="RUN",
-        default=[],
-        help="runs of which nothing is learned, to see the error fall",
-    )
+    for option, what in (
+        ("--validate", "decide what is kept and how sure it is (training data left out in turn)"),
+        ("--test", "are predicted and decide nothing, to see the error fall"),
+    ):
+        made.add_argument(
+            option,
+            type=Path,
+            nargs="+",
+            action="extend",
+            metavar="RUN",
+            default=[],
+            help=f"runs that {what}",
+        )
     made.add_argument(
         "--prior",
         type=prior,
@@ -153,6 +168,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         default=DEFAULT,
         help=f"of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
+    )
+    made.add_argument(
+        "--pruning",
+        metavar="NAME",
+        default=PAIRED,
+        help=f"criterion by which effects are rejected: {', '.join(CRITERIA)}, or a FILE.py of your own "
+        f"({PAIRED})",
     )
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -14,8 +14,7 @@ from fmus.ship import ship
 from fmus.ships.naming import DEFAULT as USUAL
 
 from .assessment.regions import ErrorRegions, find_regions
-from .assessment.remainder import Remainder
-from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
+from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import for_each
 from .execution.progress import Advance, silent
 from .predictors import (
@@ -26,26 +25,20 @@ from .predictors import (
     as_model,
     by_fmu,
     evaluate_fmu,
-    omega,
+    omega_std,
     told_apart,
     use_of,
 )
-from .predictors.bands import Bands
-from .predictors.evaluation import Evaluation, evaluate_run
-from .predictors.uncertainty import omega_std
+from .predictors.evaluation import DataUse, Evaluation, evaluate_run
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
-from .search.findings import Finding, Findings
-from .search.prediction_fit.disturbance_summary import Unrecorded
-from .search.prediction_fit.joint_posterior import Posterior
 from .search.prediction_fit.predicted_bands import prediction_bands
-from .search.prediction_fit.refit import to_predictions
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
-from .verdict.calibrated_model import calibrated
-from .verdict.decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
-from .verdict.pruning import NOTHING, Unseen, Withdrawn, unique_shares, withdraw
-from .verdict.validation_data import harm
+from .verdict.judgement import Verdict, judge
+from .verdict.pruning_criteria import USUAL as PAIRED
+from .verdict.pruning_criteria import criterion
+from .verdict.validation_data import ValidationData
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
@@ -80,56 +73,24 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """What a model lacks, as learned from some runs.
+class Diagnosis(Verdict):
+    """A verdict, and what it rests on.
 
     Attributes:
-        learned: the findings, and the model with them.
-        withdrawn: effects that were accepted and taken back.
-        remainder: what the learned model leaves; where nothing was learned, the first one.
-        refitted: whether the learned model has other nominal coefficients and no effect.
-        dropped: effects that were accepted, where the learned model has other coefficients instead.
-        shares: for each finding the share of the error's sum of squares that it explains.
-        unique: for each the share that nothing else explains; None where that cannot be told.
-        comparison: errors before and after, on the training runs and then on those held out.
+        comparison: errors before and after, on training, validation and test runs, in this order.
         start: the initial model.
         stability: of the learned model.
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
-        posterior: of all fitted values; of none where nothing was learned.
-        unrecorded: what acts on the ship and is in no command and no effect.
     """
 
-    learned: Findings
-    withdrawn: Sequence[Withdrawn]
-    remainder: Remainder
-    refitted: bool
-    dropped: Sequence[Finding]
-    shares: Sequence[float]
-    unique: Sequence[float | None]
     comparison: Comparison
     start: Model
     stability: Stability
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
-    posterior: Posterior
-    unrecorded: Unrecorded
-
-    @property
-    def verdict(self) -> Verdict:
-        return verdict(self.learned, self.refitted, self.remainder)
-
-    @property
-    def calibrated(self) -> bool:
-        """Whether the learned model has other coefficients, and these are no explanation."""
-        return self.refitted and self.verdict == "unexplained"
-
-    @property
-    def believed(self) -> list[bool]:
-        """Of each effect of the learned model whether it is a finding, or a possibility."""
-        return [believed(f) for f in self.learned.effects]
 
     @property
     def sound(self) -> bool:
@@ -214,26 +175,100 @@ def diagnose(
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
+    validate: Sequence[WeakWindows] = (),
+    pruning: str = PAIRED,
 ) -> Diagnosis:
     """Learn what a model lacks.
 
     Args:
         train: runs to learn from, see :func:`diagnosis.gather`.
-        held_out: runs to test on only.
+        held_out: test runs: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
         model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            beside which the effects of that ship are tried.
+            to which the effects of that ship are added.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
+        validate: validation runs: they decide what is kept; without any, training data left out in turn.
+        pruning: criterion of pruning, see :mod:`diagnosis.verdict.pruning_criteria`.
 
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
     fmu = Fmu(model) if isinstance(model, (str, Path)) else model if isinstance(model, Fmu) else None
-    start = model if isinstance(model, Model) else nominal([*train, *held_out])
+    every = told_apart([*train, *validate, *held_out])
+    start = model if isinstance(model, Model) else nominal(every)
     prior_shares(start.ship, prior)  # before any work
+    harms = criterion(pruning)
+    chosen = method(by) if isinstance(by, str) else by
+    _refuse_short(train)
+    train, validate = every[: len(train)], every[len(train) : len(every) - len(held_out)]
+    use = None
+    if fmu is not None:
+        advance(f"what {fmu.name} does in measured states")
+        use = use_of(fmu, [w.run for w in every])
+        start = as_model(every, use, start)
+    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
+    region = OperatingRegion.of(nu, start.ship.scale)
+
+    found = chosen.fit(train, start, prior, advance, seed)
+    data = ValidationData(train, validate, start, found.sigma)
+    known = NominalPrior.of(start, prior)
+    verdict = judge(found, data, known, harms, region, use is None, advance)
+    comparison = _predicted(verdict, every, len(train), len(validate), start, use, advance)
+    advance("stability")
+    stability = check_stability(verdict.learned.model, start, advance, region)
+
+    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
+    parts = {f.name: getattr(verdict, f.name) for f in fields(verdict)}
+    return Diagnosis(
+        **parts,
+        comparison=comparison,
+        start=start,
+        stability=stability,
+        speeds=(u, v, r),
+        prior=prior,
+        seed=seed,
+    )
+
+
+def _predicted(
+    verdict: Verdict,
+    runs: Sequence[WeakWindows],
+    train: int,
+    validate: int,
+    start: Model,
+    use: Use | None,
+    advance: Advance,
+) -> Comparison:
+    """Errors of the initial and of the learned model, with bands about the predictions of the latter."""
+    learned = verdict.learned.model
+    decide = train + validate
+    final = learned if verdict.changed else None
+    comparison = evaluate(runs[:decide], start, final, runs[decide:], advance)
+    evaluations = comparison.evaluations
+    if use is not None:
+        evaluations = by_fmu(evaluations, use)
+    push = verdict.unrecorded.push
+
+    def banded(k: int, e: Evaluation) -> Evaluation:
+        bands = prediction_bands(e.smoothed, e.windows, learned, verdict.posterior, push)
+        return replace(e, bands=bands, use=_use(k, train, decide))
+
+    return replace(comparison, evaluations=[banded(k, e) for k, e in enumerate(evaluations)], use=use)
+
+
+def _use(k: int, train: int, decide: int) -> DataUse:
+    return "train" if k < train else "validate" if k < decide else "test"
+
+
+def _refuse_short(train: Sequence[WeakWindows]) -> None:
+    """Refuse training runs that are too short for folds.
+
+    Raises:
+        InputError: they are.
+    """
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
         block = BLOCK * train[0].scale.time
@@ -241,91 +276,3 @@ def diagnose(
             f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
             f"at least {MIN_BLOCKS * block:.3g} s are needed"
         )
-    runs = told_apart([*train, *held_out])
-    train, held_out = runs[: len(train)], runs[len(train) :]
-    use = None
-    if fmu is not None:
-        advance(f"what {fmu.name} does in measured states")
-        use = use_of(fmu, [w.run for w in runs])
-        start = as_model(runs, use, start)
-    chosen = method(by) if isinstance(by, str) else by
-    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
-    region = OperatingRegion.of(nu, start.ship.scale)
-    found = chosen.fit(train, start, prior, advance, seed)
-    advance("what unseen data say")
-    unseen = Unseen(train, held_out, start, found.sigma)
-    kept, withdrawn = withdraw(found, unseen, start, lambda a, b: drives_on(a, b, region))
-    kept = replace(kept, effects=[limited(f, start) for f in kept.effects])
-    belief = NominalPrior.of(start, prior)
-    learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start, belief)
-    advance("fit to predictions")
-    something = bool(learned.effects) or refitted
-    fit = to_predictions(learned, train, belief, something)
-    if held_out and harm(*unseen.losses(fit.findings.model, start)):
-        # The fit by the model error was held against these runs already.
-        fit = fit.about(learned)
-    left = {f.id for f in fit.findings.effects}
-    withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
-    refitted = refitted or (something and not left)
-    if use is None and not any(believed(f) for f in fit.findings.effects):
-        advance("calibration")
-        alone = calibrated(fit.findings, train, held_out, start, belief)
-        if alone is not None:
-            dropped, refitted, something, fit = [*dropped, *fit.findings.effects], True, True, alone
-    learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
-    final = learned.model if something else None
-    comparison = evaluate(train, start, final, held_out, advance)
-    if use is not None:
-        comparison = replace(comparison, evaluations=by_fmu(comparison.evaluations, use), use=use)
-
-    def bands(e: Evaluation) -> Bands | None:
-        return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)
-
-    every = comparison.evaluations
-    banded = [replace(e, bands=b) for e, b in zip(every, map(bands, every), strict=True)]
-    comparison = replace(comparison, evaluations=banded)
-    advance("what is left")
-    # What fails at times of its own in a run held out says nothing of what was learned of others.
-    judged = comparison.evaluations[: len(train) if learned.model.runs else None]
-    std = comparison.omega_std[: len(judged)]
-    remainder = remainder_of(judged, std, comparison.after.regions, learned)
-    learned = doubted(learned, remainder, start)
-    advance("stability")
-    stability = check_stability(learned.model, start, advance, region)
-    shares = _shares(learned, start, held_out)
-    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
-    return Diagnosis(
-        learned,
-        withdrawn,
-        remainder,
-        refitted,
-        dropped,
-        shares,
-        unique_shares(learned, start, comparison.evaluations),
-        comparison,
-        start,
-        stability,
-        (u, v, r),
-        prior,
-        seed,
-        fit.posterior,
-        fit.unrecorded,
-    )
-
-
-def _shares(learned: Findings, start: Model, held_out: Sequence[WeakWindows]) -> list[float]:
-    """Share of the initial sum of squares that each finding explains; axes weighted by noise.
-
-    Of runs held out; of times within a run, which no other run has, by cross-validation.
-    """
-    shares = [f.share for f in learned.effects]
-    if held_out:
-        models = [start, *(f.model for f in learned.effects)]
-        sums = np.array(
-            [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
-        )
-        unseen = (-np.diff(sums) / sums[0]).tolist()
-        shares = [
-            f.share if f.of_runs else share for f, share in zip(learned.effects, unseen, strict=True)
-        ]
-    return [min(1.0, max(0.0, share)) for share in shares]

@@ -11,6 +11,8 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import diagnosis.verdict.calibrated_model
+import diagnosis.verdict.decision
 import pytest
 from support.command import command
 
@@ -19,8 +21,6 @@ import diagnosis.assessment
 import diagnosis.predictors
 import diagnosis.runs
 import diagnosis.search
-import diagnosis.verdict.calibrated_model
-import diagnosis.verdict.decision
 import fmus
 from fmus.build.finding import load
 

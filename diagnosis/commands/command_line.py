@@ -21,9 +21,9 @@ from ..execution.result_folder import default_folder, keep_inputs, sha256
 from ..search import Prior
 
 # Options that name files which decide a result.
-INPUTS = ("train", "test", "runs", "run", "model", "map", "effects", "criteria")
+INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
 MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
-RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
+RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
 def prior(text: str) -> Prior:

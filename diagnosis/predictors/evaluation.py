@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from .bands import Bands
 from .ship_model import Model
 from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows, free_runs
+
+DataUse = Literal["train", "validate", "test"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,7 @@ class Evaluation:
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
         foreign: how an FMU predicts the run from a time on, in place of the model; None: it is no FMU.
+        use: what the run was used for: to learn from, to decide, or only to be predicted.
     """
 
     model: Model
@@ -70,6 +74,7 @@ class Evaluation:
     bands: Bands | None = None
     learned: Model | None = None
     foreign: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None
+    use: DataUse = "train"
 
     @property
     def smoothed(self) -> Smoothed:

@@ -109,6 +109,30 @@ class Windows:
             raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
         return kept
 
+    def within(self, first: float, last: float) -> "Windows":
+        """The windows that start from one time to another [s].
+
+        Raises:
+            InputError: there is none.
+        """
+        chosen = (self.start >= first) & (self.start <= last)
+        if not chosen.any():
+            raise InputError(f"no window starts from {first:.3g} to {last:.3g} s")
+        kept = copy(self)
+        samples = chosen[self.sample_window]
+        kept.run, kept.start = self.run[chosen], self.start[chosen]
+        kept.sample_window = (np.cumsum(chosen) - 1)[self.sample_window[samples]]
+        kept.measured, kept.since = self.measured[samples], self.since[samples]
+        kept._groups = []
+        for starts, windows in self._groups:
+            edges = np.cumsum([rows.size for _, rows in starts.runs])[:-1]
+            parts = zip(starts.runs, np.split(chosen[windows], edges), strict=True)
+            runs = tuple((smoothed, rows[part]) for (smoothed, rows), part in parts if part.any())
+            if runs:
+                place = (np.cumsum(chosen) - 1)[windows[chosen[windows]]]
+                kept._groups.append((replace(starts, runs=runs), place))
+        return kept
+
     def finer(self, parts: int) -> "Windows":
         """The same windows, predicted with steps that are divided into so many."""
         kept = copy(self)

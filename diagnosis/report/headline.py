@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..verdict.decision import FOUND
+from ..verdict.confidence import FOUND
 from .finding_text import listed
 from .result_keys import DiagnosisContent, EffectResult, PossibilityResult, SuspectResult
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..predictors import Model
 from ..predictors.uncertainty import omega_std
 from .candidates import model_error
-from .confidence import Evidence, confidence, credible, evidence
+from .effect_evidence import Evidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, ridge, score
@@ -85,13 +85,13 @@ class Selection:
                     p.id,
                     values,
                     own | dict(p.intervals),
-                    confidence(seen),
+                    np.nan,
                     alike,
                     sum(shares[: k + 1]),
                     shares[k],
                     nested[k],
                     seen,
-                    confidence(together),
+                    set_evidence=together,
                 )
             )
         t = self.t
