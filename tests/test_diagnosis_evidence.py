@@ -15,13 +15,14 @@ from diagnosis.predictors.bands import POINTS, Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
 from diagnosis.search.conclusion import interval, laplace_std, suspected
-from diagnosis.search.confidence import Evidence, confidence, evidence, variation
+from diagnosis.search.effect_evidence import Evidence, evidence, variation
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import Nuisance
 from diagnosis.search.nonlinear.multistart import Landscape, linear_ones, same
 from diagnosis.search.prior import NominalPrior
-from diagnosis.verdict import decision
-from diagnosis.verdict.decision import concluded
+from diagnosis.verdict import coefficients
+from diagnosis.verdict.coefficients import concluded
+from diagnosis.verdict.confidence import probability
 from fmus.declare import Range, Variable
 from fmus.scale import Scale
 
@@ -34,10 +35,10 @@ def drawn(*shape, seed=0):
 
 
 def test_confidence_is_even_odds_where_a_third_is_left_or_the_size_varies_by_as_much():
-    assert confidence(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
+    assert probability(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
     third = 4.6 / 14.0
     for left, varies in ((third, 0.0), (0.0, third), (0.5 * third, 0.5 * third)):
-        assert confidence(Evidence(0.8, left, varies)) == pytest.approx(0.4)
+        assert probability(Evidence(0.8, left, varies)) == pytest.approx(0.4)
 
 
 def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_an_axis():
@@ -237,18 +238,15 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
     effects = [Finding("X_u", {}, {}, 0.3, [], 0.5, 0.5, together=case["together"])]
     found = replace(alone, effects=effects if case["effects"] else [], refit=(lambda ids: alone) if case["refit"] else None)  # fmt: skip
     names = {id(found): "found", id(START): "first"}
-    monkeypatch.setattr(decision, "without", lambda f, ids, start: alone)
-    monkeypatch.setattr(decision, "harm", lambda now, each: each in case["harms"])
-    monkeypatch.setattr(
-        decision,
-        "something_left",
-        lambda runs, start, m: case["left_at_first" if m is START else "left_with"],
-    )
-    unseen = SimpleNamespace(
+    monkeypatch.setattr(coefficients, "without", lambda f, ids, start: alone)
+    monkeypatch.setattr(coefficients, "harm", lambda now, each: each in case["harms"])
+    data = SimpleNamespace(
+        start=START,
         judges=lambda f: case["judges"],
+        remains=lambda m: case["left_at_first" if m is START else "left_with"],
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
-    c = concluded(found, [], unseen, START, NominalPrior.of(START))
+    c = concluded(found, data, NominalPrior.of(START))
     assert c.refitted == refitted
     if refitted:
         assert c.learned.model is OTHER

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..predictors import Model
 from ..search.findings import Finding, Findings
-from ..search.prediction_fit.calibration import Calibrator
+from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import Outcome
 from ..search.prior import NominalPrior
 from .confidence import confidence_of

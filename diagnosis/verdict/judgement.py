@@ -133,7 +133,7 @@ def judge(
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
-    learned = sure(fit.findings, remainder, start)
+    learned = with_confidence(fit.findings, remainder, start)
     return Verdict(
         learned,
         withdrawn,
@@ -147,7 +147,7 @@ def judge(
     )
 
 
-def sure(found: Findings, remainder: Remainder, start: Model) -> Findings:
+def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Findings:
     """The findings with their confidence: the one place where it is set.
 
     A significant residual on the axes of an effect makes it even odds at the most; waves that are found
