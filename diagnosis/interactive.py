@@ -238,9 +238,8 @@ def diagnose(
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
     of = _model_of(model if isinstance(model, Model) else None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
-    train, *others = (
-        p if _are_loaded(p) else load(p, model=of) if p or p is parts[0] else p for p in parts
+    train, decide, test = (
+        p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    decide, test = others
     found = session.diagnose(train, test, prior, model or of, advance, seed, by, decide, pruning)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -35,7 +35,7 @@ from .search import DEFAULT, Method, Prior, method
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
-from .verdict.judgement import Verdict, judge
+from .verdict.judging import Verdict, judge
 from .verdict.pruning_criteria import USUAL as PAIRED
 from .verdict.pruning_criteria import criterion
 from .verdict.validation_data import ValidationData

@@ -28,7 +28,7 @@ from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import lower_throughout, worse
 from diagnosis.verdict.confidence import confidence_of, probability
-from diagnosis.verdict.judgement import verdict_name, with_confidence
+from diagnosis.verdict.judging import verdict_name, with_confidence
 from diagnosis.verdict.paired_errors import harm
 from diagnosis.verdict.pruning import prune, without
 from diagnosis.verdict.validation_data import Fold, Losses, ValidationData
