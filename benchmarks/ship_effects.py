@@ -92,7 +92,13 @@ def parameters(
     return packer(component.params)(list({**values, **given}.values()))
 
 
-def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) -> pd.DataFrame:
+def sail(
+    ship: Ship,
+    cause: Cause,
+    rng: np.random.Generator,
+    wrong: int | None,
+    orders: Iterator[tuple[float, ...]] | None = None,
+) -> pd.DataFrame:
     """A run of the real ship, as a sensor of its size measures it.
 
     Args:
@@ -100,6 +106,7 @@ def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) 
         cause: what is hidden.
         rng: of commands and noise.
         wrong: seed of what is wrong with the coefficients; None: nothing is.
+        orders: a command for each step (those of :func:`commands`).
     """
     off = None if wrong is None else np.random.default_rng(wrong)
     b = ship.vessel.prepared(parameters(ship.vessel, {"x_0": 0.0, "y_0": 0.0, **cause.vessel}, off))
@@ -107,7 +114,7 @@ def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) 
     layout, scale = ship.layout, ship.scale
     h = STEP * scale.time
     s, past = ship.vessel.init(Force(), b.params), at_rest(drive.effects)
-    orders = commands(ship, rng)
+    orders = orders or commands(ship, rng)
     rows = []
     for k in range(round(SECONDS / STEP)):
         now = next(orders)
