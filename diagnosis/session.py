@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import LinAlgError
+from typing_extensions import deprecated
 
 from cosim import InputError
-from fmus.ship import ship
-from fmus.ships.naming import DEFAULT as USUAL
 
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.remainder import Remainder
@@ -19,19 +18,19 @@ from .assessment.stability import OperatingRegion, Stability, check_stability, d
 from .execution.parallel import for_each
 from .execution.progress import Advance, silent
 from .predictors import (
-    Fmu,
+    Bands,
+    DescribedShip,
+    Evaluation,
     Model,
-    Use,
+    ModelSource,
+    Predictor,
     WeakWindows,
-    as_model,
-    by_fmu,
-    evaluate_fmu,
+    evaluate_run,
+    nominal,
     omega,
+    open_model,
     told_apart,
-    use_of,
 )
-from .predictors.bands import Bands
-from .predictors.evaluation import Evaluation, evaluate_run
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
@@ -58,12 +57,17 @@ class Comparison:
     Attributes:
         evaluations: one for each run.
         omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
-        use: how an FMU predicts the runs; None: it is no FMU.
+        predictor: what predicts the runs; of two models the initial one.
     """
 
     evaluations: Sequence[Evaluation]
     omega_std: Sequence[np.ndarray]
-    use: Use | None = None
+    predictor: Predictor
+
+    @property
+    @deprecated("Use predictor.")
+    def use(self) -> Predictor | None:
+        return None if self.predictor.parametric else self.predictor
 
     @cached_property
     def before(self) -> ErrorRegions:
@@ -133,8 +137,11 @@ class Diagnosis:
 
     @property
     def sound(self) -> bool:
-        """Whether the learned model has a mass and stays bounded in closed loop; not asked of an FMU."""
-        return self.comparison.use is not None or bool(self.stability.safe)
+        """Whether the learned model has a mass and stays bounded in closed loop.
+
+        Of a predictor that is not a model of this project that is not judged.
+        """
+        return not self.comparison.predictor.parametric or bool(self.stability.safe)
 
 
 @contextmanager
@@ -150,23 +157,10 @@ def well_posed() -> Iterator[None]:
         raise InputError(f"these runs do not determine what is asked of them: {error}") from None
 
 
-def nominal(runs: Sequence[WeakWindows]) -> Model:
-    """The nominal model of the ship that runs are of.
-
-    Raises:
-        InputError: they are of several ships.
-    """
-    ships = dict.fromkeys(w.run.ship for w in runs)
-    if len(ships) > 1:
-        names = (USUAL if one is None else one.name for one in ships)
-        raise InputError(f"the runs are of several ships: {', '.join(names)}")
-    return Model(ship=ship(description=next(iter(ships), None)))
-
-
 @well_posed()
 def evaluate(
     runs: Sequence[WeakWindows],
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     after: Model | None = None,
     held_out: Sequence[WeakWindows] = (),
     advance: Advance = silent,
@@ -175,8 +169,8 @@ def evaluate(
 
     Args:
         runs: see :func:`diagnosis.gather`.
-        model: the nominal one of the runs' ship by default; an FMU, or the path of one, whose variables
-            are known by their names.
+        model: the nominal one of the runs' ship by default; an FMU, a Python function, or the path of
+            what ``--model`` takes.
         after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
         advance: receives the name of each step when it begins.
@@ -185,24 +179,37 @@ def evaluate(
         InputError: the runs are so ill-conditioned that nothing can be computed of them; the FMU is not
             what it is taken for, or fails.
     """
+    every = told_apart([*runs, *held_out])
+    predictor = _source(model, every).on(every, advance)
+    return _compared(predictor, every[: len(runs)], after, every[len(runs) :], advance)
+
+
+def _source(model: Model | ModelSource | str | Path | None, runs: Sequence[WeakWindows]) -> ModelSource:
+    """The model of some runs as a source of predictions; the nominal one by default."""
+    if isinstance(model, (str, Path)):
+        return open_model(model)
+    return DescribedShip(model or nominal(runs)) if model is None or isinstance(model, Model) else model
+
+
+def _compared(
+    predictor: Predictor,
+    runs: Sequence[WeakWindows],
+    after: Model | None,
+    held_out: Sequence[WeakWindows],
+    advance: Advance,
+) -> Comparison:
+    """The errors of a predictor, and of it with additions, on runs and on those held out."""
     every = [*runs, *held_out]
     advance(f"predicting {', '.join(w.run.name for w in every)}")
-    if isinstance(model, (str, Path)):
-        model = Fmu(model)
-    if isinstance(model, Fmu):
-        every = told_apart(every)
-        use = use_of(model, [w.run for w in every])
-        beside = as_model(every, use, nominal(every))
-        predicted = [evaluate_fmu(w, use, beside) for w in every]
-        return Comparison(predicted, [omega_std(w, beside) for w in every], use)
-    before = model or nominal(every)
-    known = [before, after, *every, *(w.smoothed for w in every)]
 
     def of_run(k: int) -> Evaluation:
-        return evaluate_run(every[k], before, after, k >= len(runs))
+        return evaluate_run(every[k], predictor, after, k >= len(runs))
 
-    evaluations = for_each(of_run, range(len(every)), known)
-    return Comparison(evaluations, [omega_std(w, before) for w in every])
+    model = predictor.model
+    known = [predictor, model, after, *every, *(w.smoothed for w in every)]
+    each = range(len(every))
+    evaluations = for_each(of_run, each, known) if predictor.forks else [of_run(k) for k in each]
+    return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 
 @well_posed()
@@ -210,7 +217,7 @@ def diagnose(
     train: Sequence[WeakWindows],
     held_out: Sequence[WeakWindows] = (),
     prior: Prior = None,
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
@@ -222,8 +229,8 @@ def diagnose(
         held_out: runs to test on only.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            beside which the effects of that ship are tried.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
+            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -231,9 +238,8 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    fmu = Fmu(model) if isinstance(model, (str, Path)) else model if isinstance(model, Fmu) else None
-    start = model if isinstance(model, Model) else nominal([*train, *held_out])
-    prior_shares(start.ship, prior)  # before any work
+    source = _source(model, [*train, *held_out])
+    prior_shares((source.start or nominal([*train, *held_out])).ship, prior)  # before any work
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
         block = BLOCK * train[0].scale.time
@@ -243,11 +249,8 @@ def diagnose(
         )
     runs = told_apart([*train, *held_out])
     train, held_out = runs[: len(train)], runs[len(train) :]
-    use = None
-    if fmu is not None:
-        advance(f"what {fmu.name} does in measured states")
-        use = use_of(fmu, [w.run for w in runs])
-        start = as_model(runs, use, start)
+    predictor = source.on(runs, advance)
+    start = predictor.model
     chosen = method(by) if isinstance(by, str) else by
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
     region = OperatingRegion.of(nu, start.ship.scale)
@@ -267,16 +270,15 @@ def diagnose(
     left = {f.id for f in fit.findings.effects}
     withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
     refitted = refitted or (something and not left)
-    if use is None and not any(believed(f) for f in fit.findings.effects):
+    if predictor.parametric and not any(believed(f) for f in fit.findings.effects):
         advance("calibration")
         alone = calibrated(fit.findings, train, held_out, start, belief)
         if alone is not None:
             dropped, refitted, something, fit = [*dropped, *fit.findings.effects], True, True, alone
     learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
     final = learned.model if something else None
-    comparison = evaluate(train, start, final, held_out, advance)
-    if use is not None:
-        comparison = replace(comparison, evaluations=by_fmu(comparison.evaluations, use), use=use)
+    comparison = _compared(predictor.in_windows(), train, final, held_out, advance)
+    comparison = replace(comparison, predictor=predictor)
 
     def bands(e: Evaluation) -> Bands | None:
         return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)
