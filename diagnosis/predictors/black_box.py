@@ -22,7 +22,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -34,7 +33,7 @@ from fmus.ops import wrap
 from ..runs import Run, Smoothed
 from .described_ship import DescribedShip, windows_of
 from .prediction import Starts, at_rest
-from .predictor import Description
+from .predictor import Description, Predictor
 from .ship_model import GivenForce, Model
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
 from .windows import Windows, free_runs, step_of
@@ -65,8 +64,7 @@ class BlackBox(ABC):
         inputs: the forces and commands that it takes.
     """
 
-    parametric: ClassVar[bool] = False
-    forks: ClassVar[bool] = False
+    parametric, forks = False, False
 
     def __init__(self, name: str, runs: Sequence[WeakWindows], ship: Model) -> None:
         self.name, self.runs, self.ship = name, runs, ship
@@ -120,8 +118,13 @@ class BlackBox(ABC):
             return 0.0
         return RUN_IN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
 
-    @cached_property
+    @property
     def model(self) -> Model:
+        return self._along_runs
+
+    @cached_property
+    def _along_runs(self) -> Model:
+        """A model that moves as the black box does along its runs."""
         body = Model({**self.ship.vessel, **self._inertia()}, self.ship.thrusters, ship=self.ship.ship)
         given = {w.run.name: self._beyond_along(w, body) for w in self.runs}
         return Model(body.vessel, body.thrusters, ship=body.ship, given=given)
@@ -166,7 +169,7 @@ class BlackBox(ABC):
         pose = pose[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
-    def in_windows(self) -> "BlackBox | DescribedShip":
+    def in_windows(self) -> Predictor:
         return DescribedShip(self.model) if self.whole else self
 
     def write(

@@ -1,9 +1,7 @@
 """A described ship as a predictor: the functions of its vessel and thrusters, by its parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -14,20 +12,19 @@ from fmus.ships.naming import DEFAULT
 from ..execution.progress import Advance, silent
 from ..runs import Smoothed
 from .parameter_set import read_model, write_model
-from .predictor import MODEL, Description, refuse_map
+from .predictor import MODEL, Description, Predictor, refuse_map
 from .ship_model import Model
 from .weak_form import WeakWindows
 from .windows import Windows, free_runs
 
 
-@dataclass(frozen=True, eq=False)
 class DescribedShip:
     """A model of this project, see :class:`.predictor.Predictor` and :class:`.predictor.ModelSource`."""
 
-    model: Model
-    parametric: ClassVar[bool] = True
-    whole: ClassVar[bool] = False
-    forks: ClassVar[bool] = True
+    parametric, whole, forks = True, False, True
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
 
     @property
     def name(self) -> str:
@@ -55,7 +52,7 @@ class DescribedShip:
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         return free_runs(smoothed, [self.model, learned or self.model], begin)
 
-    def in_windows(self) -> "DescribedShip":
+    def in_windows(self) -> Predictor:
         return self
 
     def description(self) -> Description | None:

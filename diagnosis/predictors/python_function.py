@@ -17,7 +17,7 @@ import hashlib
 import runpy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -72,18 +72,18 @@ class FunctionPredictor(BlackBox):
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         """By the classical Runge-Kutta method, the command constant within a step."""
         begin = np.hstack([smoothed.eta[rows], smoothed.nu[rows]]).T
-        state = vessel.State(*begin, smoothed.time[rows])
+        state = vessel.State._make([*begin, smoothed.time[rows]])
         found = [begin]
         with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
             for _ in range(steps):
-                commands = commands_at(smoothed.track.run, state.t + 0.5 * h)
+                commands: Any = commands_at(smoothed.track.run, state.t + 0.5 * h)
                 state = vessel.integrate(state, commands, self, h, _law)
                 found.append(np.stack(state[:6]))
         return np.stack(found)
 
     def accelerations(self, signals: Signals) -> np.ndarray:
         none = np.zeros(next(iter(signals.values())).shape)
-        state = vessel.State(*(signals[name] for name in MOTION), none)
+        state = vessel.State._make([*(signals[name] for name in MOTION), none])
         return np.column_stack(self.answer(state, signals))
 
     def answer(self, state: vessel.State, commands: Signals) -> list[np.ndarray]:
@@ -136,4 +136,4 @@ def open_function(
         raise InputError(f"'{path}' fails when imported: {error!r}") from error
     if not callable(function):
         raise InputError(f"'{path}' has no function {NAME}(state, commands)")
-    return PythonFunction(function, ship, path)
+    return PythonFunction(cast(Acceleration, function), ship, path)

@@ -152,12 +152,12 @@ class FmuPredictor(BlackBox):
         return self.map.run_in
 
     @cached_property
-    def model(self) -> Model:
+    def _along_runs(self) -> Model:
         inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
         time = self.runs[0].scale.time
         h = min(self.fmu.step or STEP * time, LONGEST * time)
         with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
-            return super().model
+            return super()._along_runs
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         run, columns = smoothed.track.run, self.map.told("outputs")
