@@ -12,6 +12,9 @@ from .interactive import diagnose as diagnose
 from .interactive import load as load
 from .predictors import Fmu as Fmu
 from .predictors import Model as Model
+from .predictors import ModelSource as ModelSource
+from .predictors import Predictor as Predictor
+from .predictors import PythonFunction as PythonFunction
 from .predictors import WeakWindows as WeakWindows
 from .predictors import omega as omega
 from .predictors import read_model as read_model

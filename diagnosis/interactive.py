@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
-from .commands.initial_model import initial_model
 from .execution.progress import Advance, silent
 from .gathering import gather
-from .predictors import Fmu, Model, WeakWindows, ship_with, write_model
+from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
 from .report.content import diagnosis_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
@@ -92,7 +91,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
         return model
     loaded = [w for w in runs if isinstance(w, WeakWindows)]
     if loaded and name is None:
-        return session.nominal(loaded)
+        return nominal(loaded)
     if name is None:
         files = [run.folder if isinstance(run, Result) else run for run in runs]
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
@@ -178,7 +177,7 @@ class ShownDiagnosis(session.Diagnosis):
 
 def compare(
     runs: Sequence[WeakWindows] | Source | Sequence[Source],
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     map: str | Path | None = None,  # noqa: A002 - as the option of the command
     advance: Advance = silent,
     ship: str | Path | None = None,
@@ -187,7 +186,8 @@ def compare(
 
     Args:
         runs: from :func:`load`, or what that takes.
-        model: the nominal one of the runs' ship by default; or the path of a parameter set or an FMU.
+        model: the nominal one of the runs' ship by default; an FMU, a Python function, or the path of
+            what ``--model`` takes.
         map: file that tells which of an FMU's variables are which signals; else its names and units do.
         advance: receives the name of each step when it begins.
         ship: whose nominal model that is, as :func:`load` has it.
@@ -198,7 +198,8 @@ def compare(
     given = _listed(runs)
     of = _model_of(model if isinstance(model, Model) else None, ship, given)
     if isinstance(model, (str, Path)):
-        of, model = initial_model(model, map, of.ship)
+        model = open_model(model, map, of.ship)
+        of = model.start or of
     loaded = given if _are_loaded(given) else load(given, model=of)
     return session.evaluate(loaded, model or of, advance=advance)
 
@@ -207,7 +208,7 @@ def diagnose(
     runs: Sequence[WeakWindows] | Source | Sequence[Source],
     held_out: Sequence[WeakWindows] | Source | Sequence[Source] = (),
     prior: Prior = None,
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
@@ -222,8 +223,8 @@ def diagnose(
         held_out: test runs, likewise: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            beside which the effects of that ship are tried.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
+            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -237,6 +238,9 @@ def diagnose(
     """
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
     of = _model_of(model if isinstance(model, Model) else None, ship, [r for p in parts for r in p])
+    if isinstance(model, (str, Path)):
+        model = open_model(model, ship=of.ship)
+        of = model.start or of
     shares(of.ship, prior)  # before any work
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts

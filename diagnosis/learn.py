@@ -13,7 +13,6 @@ from cosim import InputError
 from cosim.command import FAILED, run_command
 
 from .commands.command_line import (
-    MAP,
     Done,
     command_of,
     import_later_parts,
@@ -38,7 +37,6 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.csv",
     "coefficients.tex",
 )
-FOUND = "found.fmu"  # of an FMU with what was found
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
 
 
@@ -49,56 +47,53 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .commands.initial_model import initial_model, proposing, write_map
+    from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
-    from .predictors import ship_with, write_model
+    from .predictors import WRITTEN, DescribedShip, ship_with
     from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
     from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
-    with together(options.out, (*FILES, FOUND, MAP)) as new:
+    possible = [*dict.fromkeys((*FILES, *WRITTEN))]
+    with together(options.out, possible) as new:
         craft = ship_with(options.effects, options.ship)
-        model, fmu = initial_model(options.model, options.map, craft)
-        if fmu is not None and options.fit:
-            raise InputError("--fit is for a model of this project, not for an FMU")
+        model = initial_model(options.model, options.map, craft)
+        start = model.start
+        if options.fit and not model.parametric:
+            raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
         shares(craft, options.prior)
         by = method(options.method)
         criterion(options.pruning)
         paths = [*options.train, *options.validate, *options.test]
-        runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
+        runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
-        from .predictors import write_wrapper
         from .search.prediction_fit.output_fit import fitted
 
         train, decide = len(options.train), len(options.train) + len(options.validate)
-        model = fitted(runs[:train], model, options.prior, options.fit)
+        if options.fit and start is not None:
+            model = DescribedShip(fitted(runs[:train], start, options.prior, options.fit))
         with proposing():
             diagnosis = session.diagnose(
                 runs[:train],
                 runs[decide:],
                 options.prior,
-                fmu or model,
+                model,
                 advance,
                 by=by,
                 validate=runs[train:decide],
                 pruning=options.pruning,
             )
-        refused, use, notes = "", diagnosis.comparison.use, []
-        if use is not None:
-            told, map_of_it = write_wrapper(
-                new / FOUND, use, diagnosis.start, diagnosis.learned.model, runs
-            )
-            notes = [told]
-            write_map(new / MAP, (map_of_it or use.given).content())
-        elif not (diagnosis.sound or options.allow_unstable):
+        refused, notes, predictor = "", [], diagnosis.comparison.predictor
+        if not (diagnosis.sound or options.allow_unstable):
             refused = UNSOUND
         else:
             try:
-                write_model(new / MODEL, diagnosis.learned.model)
-                diagnosis.posterior.write(new / POSTERIOR)
+                notes = predictor.write(new, diagnosis.learned.model, runs)
+                if predictor.parametric:
+                    diagnosis.posterior.write(new / POSTERIOR)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        files = [name for name in (*FILES, FOUND, MAP) if (new / name).exists() or name in LATER]
+        files = [name for name in possible if (new / name).exists() or name in LATER]
         content = diagnosis_content(diagnosis, options.model, files)
         (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
         write_coefficients(content, new / CSV, new / TEX)

@@ -8,36 +8,34 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import LinAlgError
+from typing_extensions import deprecated
 
 from cosim import InputError
-from fmus.ship import ship
-from fmus.ships.naming import DEFAULT as USUAL
 
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import for_each
 from .execution.progress import Advance, silent
 from .predictors import (
-    Fmu,
+    DescribedShip,
+    Evaluation,
     Model,
-    Use,
+    ModelSource,
+    Predictor,
     WeakWindows,
-    as_model,
-    by_fmu,
-    evaluate_fmu,
-    omega_std,
+    evaluate_run,
+    nominal,
+    open_model,
     told_apart,
-    use_of,
 )
-from .predictors.evaluation import DataUse, Evaluation, evaluate_run
+from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import Verdict, judge
-from .verdict.pruning_criteria import USUAL as PAIRED
-from .verdict.pruning_criteria import criterion
+from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
@@ -51,12 +49,17 @@ class Comparison:
     Attributes:
         evaluations: one for each run.
         omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
-        use: how an FMU predicts the runs; None: it is no FMU.
+        predictor: what predicts the runs; of two models the initial one.
     """
 
     evaluations: Sequence[Evaluation]
     omega_std: Sequence[np.ndarray]
-    use: Use | None = None
+    predictor: Predictor
+
+    @property
+    @deprecated("Use predictor.")
+    def use(self) -> Predictor | None:
+        return None if self.predictor.parametric else self.predictor
 
     @cached_property
     def before(self) -> ErrorRegions:
@@ -94,8 +97,11 @@ class Diagnosis(Verdict):
 
     @property
     def sound(self) -> bool:
-        """Whether the learned model has a mass and stays bounded in closed loop; not asked of an FMU."""
-        return self.comparison.use is not None or bool(self.stability.safe)
+        """Whether the learned model has a mass and stays bounded in closed loop.
+
+        Of a predictor that is not a model of this project that is not judged.
+        """
+        return not self.comparison.predictor.parametric or bool(self.stability.safe)
 
 
 @contextmanager
@@ -111,23 +117,10 @@ def well_posed() -> Iterator[None]:
         raise InputError(f"these runs do not determine what is asked of them: {error}") from None
 
 
-def nominal(runs: Sequence[WeakWindows]) -> Model:
-    """The nominal model of the ship that runs are of.
-
-    Raises:
-        InputError: they are of several ships.
-    """
-    ships = dict.fromkeys(w.run.ship for w in runs)
-    if len(ships) > 1:
-        names = (USUAL if one is None else one.name for one in ships)
-        raise InputError(f"the runs are of several ships: {', '.join(names)}")
-    return Model(ship=ship(description=next(iter(ships), None)))
-
-
 @well_posed()
 def evaluate(
     runs: Sequence[WeakWindows],
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     after: Model | None = None,
     held_out: Sequence[WeakWindows] = (),
     advance: Advance = silent,
@@ -136,8 +129,8 @@ def evaluate(
 
     Args:
         runs: see :func:`diagnosis.gather`.
-        model: the nominal one of the runs' ship by default; an FMU, or the path of one, whose variables
-            are known by their names.
+        model: the nominal one of the runs' ship by default; an FMU, a Python function, or the path of
+            what ``--model`` takes.
         after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
         advance: receives the name of each step when it begins.
@@ -146,24 +139,37 @@ def evaluate(
         InputError: the runs are so ill-conditioned that nothing can be computed of them; the FMU is not
             what it is taken for, or fails.
     """
+    every = told_apart([*runs, *held_out])
+    predictor = _source(model, every).on(every, advance)
+    return _compared(predictor, every[: len(runs)], after, every[len(runs) :], advance)
+
+
+def _source(model: Model | ModelSource | str | Path | None, runs: Sequence[WeakWindows]) -> ModelSource:
+    """The model of some runs as a source of predictions; the nominal one by default."""
+    if isinstance(model, (str, Path)):
+        return open_model(model)
+    return DescribedShip(model or nominal(runs)) if model is None or isinstance(model, Model) else model
+
+
+def _compared(
+    predictor: Predictor,
+    runs: Sequence[WeakWindows],
+    after: Model | None,
+    held_out: Sequence[WeakWindows],
+    advance: Advance,
+) -> Comparison:
+    """The errors of a predictor, and of it with additions, on runs and on those held out."""
     every = [*runs, *held_out]
     advance(f"predicting {', '.join(w.run.name for w in every)}")
-    if isinstance(model, (str, Path)):
-        model = Fmu(model)
-    if isinstance(model, Fmu):
-        every = told_apart(every)
-        use = use_of(model, [w.run for w in every])
-        beside = as_model(every, use, nominal(every))
-        predicted = [evaluate_fmu(w, use, beside) for w in every]
-        return Comparison(predicted, [omega_std(w, beside) for w in every], use)
-    before = model or nominal(every)
-    known = [before, after, *every, *(w.smoothed for w in every)]
 
     def of_run(k: int) -> Evaluation:
-        return evaluate_run(every[k], before, after, k >= len(runs))
+        return evaluate_run(every[k], predictor, after, k >= len(runs))
 
-    evaluations = for_each(of_run, range(len(every)), known)
-    return Comparison(evaluations, [omega_std(w, before) for w in every])
+    model = predictor.model
+    known = [predictor, model, after, *every, *(w.smoothed for w in every)]
+    each = range(len(every))
+    evaluations = for_each(of_run, each, known) if predictor.forks else [of_run(k) for k in each]
+    return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 
 @well_posed()
@@ -171,12 +177,12 @@ def diagnose(
     train: Sequence[WeakWindows],
     held_out: Sequence[WeakWindows] = (),
     prior: Prior = None,
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
     validate: Sequence[WeakWindows] = (),
-    pruning: str = PAIRED,
+    pruning: str = USUAL,
 ) -> Diagnosis:
     """Learn what a model lacks.
 
@@ -185,8 +191,8 @@ def diagnose(
         held_out: test runs: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            to which the effects of that ship are added.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
+            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
@@ -196,34 +202,28 @@ def diagnose(
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    fmu = Fmu(model) if isinstance(model, (str, Path)) else model if isinstance(model, Fmu) else None
-    every = told_apart([*train, *validate, *held_out])
-    start = model if isinstance(model, Model) else nominal(every)
-    prior_shares(start.ship, prior)  # before any work
-    harms = criterion(pruning)
-    chosen = method(by) if isinstance(by, str) else by
+    runs = told_apart([*train, *validate, *held_out])
+    source = _source(model, runs)
+    prior_shares((source.start or nominal(runs)).ship, prior)  # before any work
+    harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
     _refuse_short(train)
-    train, validate = every[: len(train)], every[len(train) : len(every) - len(held_out)]
-    use = None
-    if fmu is not None:
-        advance(f"what {fmu.name} does in measured states")
-        use = use_of(fmu, [w.run for w in every])
-        start = as_model(every, use, start)
+    train, validate = runs[: len(train)], runs[len(train) : len(runs) - len(held_out)]
+
+    predictor = source.on(runs, advance)
+    start = predictor.model
     nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
     region = OperatingRegion.of(nu, start.ship.scale)
-
     found = chosen.fit(train, start, prior, advance, seed)
     data = ValidationData(train, validate, start, found.sigma)
     known = NominalPrior.of(start, prior)
-    verdict = judge(found, data, known, harms, region, use is None, advance)
-    comparison = _predicted(verdict, every, len(train), len(validate), start, use, advance)
+    verdict = judge(found, data, known, harms, region, predictor.parametric, advance)
+    comparison = _predicted(verdict, predictor, runs, data, advance)
     advance("stability")
     stability = check_stability(verdict.learned.model, start, advance, region)
 
     u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
-    parts = {f.name: getattr(verdict, f.name) for f in fields(verdict)}
     return Diagnosis(
-        **parts,
+        **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
         comparison=comparison,
         start=start,
         stability=stability,
@@ -231,36 +231,6 @@ def diagnose(
         prior=prior,
         seed=seed,
     )
-
-
-def _predicted(
-    verdict: Verdict,
-    runs: Sequence[WeakWindows],
-    train: int,
-    validate: int,
-    start: Model,
-    use: Use | None,
-    advance: Advance,
-) -> Comparison:
-    """Errors of the initial and of the learned model, with bands about the predictions of the latter."""
-    learned = verdict.learned.model
-    decide = train + validate
-    final = learned if verdict.changed else None
-    comparison = evaluate(runs[:decide], start, final, runs[decide:], advance)
-    evaluations = comparison.evaluations
-    if use is not None:
-        evaluations = by_fmu(evaluations, use)
-    push = verdict.unrecorded.push
-
-    def banded(k: int, e: Evaluation) -> Evaluation:
-        bands = prediction_bands(e.smoothed, e.windows, learned, verdict.posterior, push)
-        return replace(e, bands=bands, use=_use(k, train, decide))
-
-    return replace(comparison, evaluations=[banded(k, e) for k, e in enumerate(evaluations)], use=use)
-
-
-def _use(k: int, train: int, decide: int) -> DataUse:
-    return "train" if k < train else "validate" if k < decide else "test"
 
 
 def _refuse_short(train: Sequence[WeakWindows]) -> None:
@@ -276,3 +246,24 @@ def _refuse_short(train: Sequence[WeakWindows]) -> None:
             f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
             f"at least {MIN_BLOCKS * block:.3g} s are needed"
         )
+
+
+def _predicted(
+    verdict: Verdict,
+    predictor: Predictor,
+    runs: Sequence[WeakWindows],
+    data: ValidationData,
+    advance: Advance,
+) -> Comparison:
+    """Errors of the initial and of the learned model, with bands about the predictions of the latter."""
+    learned, decide = verdict.learned.model, len(data.runs)
+    final = learned if verdict.changed else None
+    found = _compared(predictor.in_windows(), runs[:decide], final, runs[decide:], advance)
+    uses = ["train"] * len(data.train) + ["validate"] * len(data.validate) + ["test"] * len(runs)
+    evaluations = []
+    for e, use in zip(found.evaluations, uses, strict=False):
+        bands = prediction_bands(
+            e.smoothed, e.windows, learned, verdict.posterior, verdict.unrecorded.push
+        )
+        evaluations.append(replace(e, bands=bands, use=use))
+    return replace(found, evaluations=evaluations, predictor=predictor)

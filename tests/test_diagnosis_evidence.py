@@ -11,7 +11,7 @@ from diagnosis.assessment import remainder_text
 from diagnosis.assessment.recurrence import Recurrence
 from diagnosis.assessment.remainder import AxisRemainder
 from diagnosis.predictors import Model
-from diagnosis.predictors.bands import POINTS, Bands, quantile
+from diagnosis.predictors.evaluation import POINTS, Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
 from diagnosis.search.conclusion import interval, laplace_std, suspected

@@ -22,7 +22,6 @@ from ..search import Prior
 
 # Options that name files which decide a result.
 INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
-MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
 RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
@@ -67,8 +66,8 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--model",
         type=Path,
         metavar="FILE",
-        help="model to begin with: a parameter set .ssv, an .fmu, or a system, .ssp or scenario .json "
-        "(the nominal one)",
+        help="model to begin with: a parameter set .ssv, an .fmu, a system, .ssp or scenario .json, or "
+        "a Python function .py (the nominal one)",
     )
     made.add_argument(
         "--effects",

@@ -5,7 +5,7 @@ smoothed state, with the thrusters' history from the commands before, and is com
 sample that is no spike. Longer predictions say nothing: the nominal hull is unstable.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -66,6 +66,7 @@ class Windows:
         length: of the windows [s]; by default that of the ship.
 
     Attributes:
+        runs: the runs.
         length: of the windows [s].
         run, start: (w,), number of each window's run, and when it starts [s].
         sample_window: (samples,), the window of each sample that is used.
@@ -77,6 +78,7 @@ class Windows:
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float | None = None) -> None:
+        self.runs = tuple(runs)
         self.length = length or HORIZON * runs[0].scale.time
         parts = [usable_windows(smoothed, self.length) for smoothed in runs]
         counts = [p.first_rows.size for p in parts]
@@ -157,17 +159,26 @@ class Windows:
         model = model or Model()
         shapes = [np.shape(v)[:1] for v in (*model.vessel.values(), *model.thrusters.values())]
         models = np.broadcast_shapes(*shapes)
-        found = np.empty((*(models or (1,)), *self.measured.shape))
+        found = self.residuals_by(lambda starts: predict(starts, model), *(models or (1,)))
+        return found if models else found[0]
+
+    def residuals_by(self, poses: Callable[[Starts], np.ndarray], models: int = 1) -> np.ndarray:
+        """Residuals (p, samples, 3) of p models.
+
+        Args:
+            poses: gives the predicted pose (steps + 1, 3, p, w) at each step of windows.
+            models: p.
+        """
+        found = np.empty((models, *self.measured.shape))
         for starts, windows in self._groups:
             place = np.full(self.run.size, -1)
             place[windows] = np.arange(windows.size)
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
-            steps = predict(starts, model)
-            pose = between_steps(steps, column, self.since[mine] / starts.h)
+            pose = between_steps(poses(starts), column, self.since[mine] / starts.h)
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
-        return found if models else found[0]
+        return found
 
     def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
         """Residuals (samples, 3) of some models, many predicted at once."""
@@ -216,6 +227,12 @@ class RunWindows(NamedTuple):
         row = round(float(np.median(np.diff(self.time))), 9)
         parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
         return row / parts, self.smoothed.track.run.signals
+
+
+def step_of(smoothed: Smoothed) -> float:
+    """Step of predictions [s], which divides the sample period."""
+    none = np.zeros(0, int)
+    return RunWindows(smoothed, none, none, none).step_and_commands[0]
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:

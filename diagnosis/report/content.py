@@ -165,19 +165,9 @@ def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
 
 
 def fmu_result(comparison: Comparison) -> result_keys.FmuResult | None:
-    """How an FMU predicts the runs; None: it is no FMU."""
-    use = comparison.use
-    if use is None:
-        return None
-    runs = [e.smoothed for e in comparison.evaluations]
-    return result_keys.FmuResult(
-        name=use.fmu.name,
-        sha256=use.fmu.sha256,
-        map=use.given.content(),
-        whole_runs=use.whole,
-        run_in={e.name: use.run_in(e.smoothed) for e in comparison.evaluations},
-        sentences=list(use.told(runs)),
-    )
+    """How a predictor that is not a model of this project predicts the runs; None: it is one."""
+    described = comparison.predictor.description()
+    return None if described is None else result_keys.FmuResult(**vars(described))
 
 
 def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
@@ -219,7 +209,7 @@ def _errors(e: Evaluation) -> result_keys.RunErrors:
                 rms_before=rms(e.weak_windows, e.model, name),
                 rms_after=rms(e.weak_windows, e.learned or e.model, name),
             )
-            for name in (named(e.weak_windows, e.model) if e.foreign is None else ())
+            for name in (named(e.weak_windows, e.model) if e.predicted_by.parametric else ())
         },
         coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
         trial=trial_errors(e),

@@ -174,12 +174,13 @@ class WhereResult(Part):
 
 
 class FmuResult(Part):
-    """How an FMU was held against the runs: by which map, and from what start.
+    """How an FMU, or another predictor that is not a model of this project, predicts the runs.
 
-    run_in: the first part [s] of each run that does not count; whole_runs: no window has a start of its
-    own.
+    kind: ``FMU``, ``Python function``; map: which of its variables is which signal; run_in: the first
+    part [s] of each run that does not count; whole_runs: no window has a start of its own.
     """
 
+    kind: str = "FMU"
     name: str
     sha256: str
     map: dict[str, Any]

@@ -28,7 +28,7 @@ def show_comparison(r: ComparisonContent, out: str) -> Iterator[RenderableType]:
 
 def _where(r: ComparisonContent | DiagnosisContent) -> Iterator[RenderableType]:
     if r.fmu is not None:
-        yield from _lines("How the FMU predicts", r.fmu.sentences)
+        yield from _lines(f"How the {r.fmu.kind} predicts", r.fmu.sentences)
     yield from _lines("Where the model fails", r.where.sentences)
 
 

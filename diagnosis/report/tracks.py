@@ -9,8 +9,7 @@ from cosim.results import hulls
 from fmus.ops import wrap
 from fmus.ship import Ship
 
-from ..predictors.bands import LEVELS
-from ..predictors.evaluation import Evaluation, PredictionError
+from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
 from .panels import ABOVE, BELOW, LEFT, RIGHT, breaks, legend, panels_of, plain_numbers, polygons
 from .profiles import heading, window_mean
 from .svg import AFTER, BEFORE, INK, THIRD, WIDTH
