@@ -11,8 +11,7 @@ from cosim import InputError
 from fmus.ships.naming import DEFAULT as USUAL
 
 from ..execution.result_folder import sha256, together
-from ..report.content import fmu_result, sensor_results, versions
-from ..report.result_keys import FmuResult
+from ..report.content import Content, fmu_result, sensor_results, versions
 from ..session import Comparison
 from .budget import Learned, read_learned, sources_of
 from .criterion import Criterion, ReadCriteria, now, read_criteria
@@ -216,7 +215,7 @@ def _budget(j: Judgement, c: Criterion) -> BudgetResult | None:
 
 
 def _not_covered(
-    comparison: Comparison, judgements: Sequence[Judgement], fmu: FmuResult | None
+    comparison: Comparison, judgements: Sequence[Judgement], fmu: Content | None
 ) -> Iterator[str]:
     """What nobody may conclude from the record."""
     yield "Speeds, drift angles, yaw rates and commands outside the validity range."

@@ -53,12 +53,14 @@ class Evaluation:
         model: the initial model.
         weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
-        held_out: whether nothing was learned from it.
+        held_out: whether nothing was learned from it, and nothing decided by it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
         foreign: how an FMU predicts the run from a time on, in place of the model; None: it is no FMU.
+        use: what the data were used for, ``train``, ``validate`` or ``test``; by default the last if the
+            run is held out, else the first.
     """
 
     model: Model
@@ -70,6 +72,11 @@ class Evaluation:
     bands: Bands | None = None
     learned: Model | None = None
     foreign: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None
+    use: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.use:
+            object.__setattr__(self, "use", "test" if self.held_out else "train")
 
     @property
     def smoothed(self) -> Smoothed:

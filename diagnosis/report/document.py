@@ -1,20 +1,14 @@
 """A document of sections with text, tables and figures as one HTML page, in the style of the report."""
 
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import cosim
 
 from . import formatting
-from .page import environment
-from .svg import inline, style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .page import Drawing, drawing, environment
 
 TEMPLATE = "document.html"
 
@@ -30,10 +24,16 @@ class Table(NamedTuple):
     words: bool = False
 
 
-class Plot(NamedTuple):
-    """A figure drawn within the page's style, and its caption."""
+class Figure(Protocol):
+    """A :class:`.chart.Chart`, or what else can be an SVG element of a page."""
 
-    figure: "Figure"
+    def svg(self, key: str, label: str) -> str: ...
+
+
+class Plot(NamedTuple):
+    """A figure and its caption."""
+
+    figure: Figure
     caption: str
 
 
@@ -77,14 +77,12 @@ def write_document(path: Path, document: Document) -> None:
         path: of the file.
         document: its content.
     """
-    from markupsafe import Markup
-
-    with style():
-        drawn = {
-            (k, j): Markup(inline(plot.figure, f"plot-{k}-{j}", plot.caption))
-            for k, section in enumerate(document.sections)
-            for j, plot in enumerate(section.plots)
-        }
+    drawn: dict[int, list[Drawing]] = {
+        k: [
+            drawing(p.figure, f"plot-{k}-{j}", p.caption, p.caption) for j, p in enumerate(section.plots)
+        ]
+        for k, section in enumerate(document.sections)
+    }
     text = (
         environment().get_template(TEMPLATE).render(title=document.title, document=document, drawn=drawn)
     )
@@ -94,21 +92,7 @@ def write_document(path: Path, document: Document) -> None:
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write the content of a JSON file; a number that is not finite is null."""
-    text = json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def finite(value: Any) -> Any:
-    """Arrays as lists, numbers that are not finite as None."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    path.write_text(formatting.as_json(content) + "\n", encoding="utf-8")
 
 
 def numbers(values: Sequence[float], digits: int = 3) -> list[str]:
