@@ -44,7 +44,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .commands.initial_model import initial_model, proposing, write_map
     from .gathering import gather  # only now: it takes a while to import
     from .predictors import ship_with
-    from .report import ReportData, content, show_comparison, write_report
+    from .report import ReportData, file_content, show_comparison, write_report
     from .report.document import write_json
 
     if options.criteria is None and (options.sign or options.learned):
@@ -60,7 +60,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         advance("where it fails")
         files = FILES if fmu is None else (*FILES, MAP)
         report = ReportData.of(comparison, options.model, files)
-        write_json(new / "comparison.json", content(report))
+        write_json(new / "comparison.json", file_content(report))
         if comparison.use is not None:
             write_map(new / MAP, comparison.use.given.content())
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}

@@ -15,7 +15,7 @@ from .commands.initial_model import initial_model
 from .execution.progress import Advance, silent
 from .gathering import gather
 from .predictors import Fmu, Model, WeakWindows, ship_with, write_model
-from .report.content import Content, content
+from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
 from .report.report_data import ReportData
@@ -120,7 +120,7 @@ class ShownDiagnosis(session.Diagnosis):
     @cached_property
     def content(self) -> Content:
         """What ``diagnosis.json`` of the command holds; its keys are attributes as well."""
-        return content(self._report)
+        return file_content(self._report)
 
     @property
     def model(self) -> Model:

@@ -50,7 +50,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from .commands.initial_model import initial_model, proposing, write_map
     from .gathering import gather  # only now: it takes a while to import
     from .predictors import ship_with, write_model
-    from .report import ReportData, content, show_diagnosis, write_coefficients, write_report
+    from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
     from .report.document import write_json
     from .search import shares
 
@@ -91,7 +91,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
                 refused = str(error)
         files = [name for name in (*FILES, FOUND, MAP) if (new / name).exists() or name in LATER]
         report = ReportData.of(diagnosis, options.model, files)
-        write_json(new / DIAGNOSIS, content(report))
+        write_json(new / DIAGNOSIS, file_content(report))
         write_coefficients(diagnosis, new / CSV, new / TEX)
         origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
         write_report(new / REPORT, report, advance, origin)

@@ -1,6 +1,6 @@
 from .content import comparison_content as comparison_content
-from .content import content as content
 from .content import diagnosis_content as diagnosis_content
+from .content import file_content as file_content
 from .content import write_coefficients as write_coefficients
 from .page import write_report as write_report
 from .report_data import ReportData as ReportData

@@ -98,11 +98,12 @@ class Axis:
 
     def ends(self, values: Sequence[np.ndarray]) -> Ends:
         """Limits on the scale, between which all values lie."""
-        if self.limits is not None:
-            low, high = self.spaced(self.limits)
-            return float(low), float(high)
-        known = self.spaced(np.concatenate([np.zeros(0), *values]))
+        known = self.spaced(
+            np.concatenate([np.zeros(0), *values]) if self.limits is None else self.limits
+        )
         known = known[np.isfinite(known)] if np.isfinite(known).any() else np.array([0.0, 1.0])
+        if self.limits is not None and known[0] != known[-1]:
+            return float(known[0]), float(known[-1])
         low, high = float(known.min()), float(known.max())
         free = self.margin * ((high - low) or abs(high) or 1.0)
         return low - free, high + free
@@ -327,9 +328,9 @@ def data_uri(svg: str) -> str:
 
 
 def _segments(ends: Sequence[tuple[float, float, float, float]], colour: str) -> Mark:
-    """Thin straight lines."""
-    points = np.array([(x, y, end, stop, np.nan, np.nan) for x, y, end, stop in ends]).reshape(-1, 2)
-    return Mark(*points.T, colour, width=PT.thin)
+    """Thin straight lines, from x, y to x, y."""
+    points = np.array([(*each, np.nan, np.nan) for each in ends]).reshape(-1, 2)
+    return Mark(points[:, 0], points[:, 1], colour, width=PT.thin)
 
 
 def _element(m: Mark, clip: str) -> str:

@@ -96,7 +96,7 @@ def comparison_content(comparison: Comparison, model: Path | None, files: Sequen
         model: its file; None: the nominal one.
         files: names of the files that are written together.
     """
-    return content(ReportData.of(comparison, model, files))
+    return file_content(ReportData.of(comparison, model, files))
 
 
 def diagnosis_content(diagnosis: Diagnosis, model: Path | None, files: Sequence[str]) -> Content:
@@ -107,10 +107,10 @@ def diagnosis_content(diagnosis: Diagnosis, model: Path | None, files: Sequence[
         model: file of the initial model; None: the nominal one.
         files: names of the files that are written together.
     """
-    return content(ReportData.of(diagnosis, model, files))
+    return file_content(ReportData.of(diagnosis, model, files))
 
 
-def content(r: ReportData) -> Content:
+def file_content(r: ReportData) -> Content:
     """The content of the JSON file of a report."""
     prediction, model_error = r.lengths
     runs = {

@@ -3,14 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
-
-import cosim
+from typing import Any, NamedTuple
 
 from . import formatting
-from .page import Drawing, drawing, environment
-
-TEMPLATE = "document.html"
+from .page import Figure, drawing, write_page
 
 
 class Table(NamedTuple):
@@ -22,12 +18,6 @@ class Table(NamedTuple):
     header: Sequence[str]
     rows: Sequence[Sequence[Any]]
     words: bool = False
-
-
-class Figure(Protocol):
-    """A :class:`.chart.Chart`, or what else can be an SVG element of a page."""
-
-    def svg(self, key: str, label: str) -> str: ...
 
 
 class Plot(NamedTuple):
@@ -77,17 +67,11 @@ def write_document(path: Path, document: Document) -> None:
         path: of the file.
         document: its content.
     """
-    drawn: dict[int, list[Drawing]] = {
-        k: [
-            drawing(p.figure, f"plot-{k}-{j}", p.caption, p.caption) for j, p in enumerate(section.plots)
-        ]
+    drawn = [
+        [drawing(p.figure, f"plot-{k}-{j}", p.caption) for j, p in enumerate(section.plots)]
         for k, section in enumerate(document.sections)
-    }
-    text = (
-        environment().get_template(TEMPLATE).render(title=document.title, document=document, drawn=drawn)
-    )
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    ]
+    write_page(path, "document.html", title=document.title, document=document, drawn=drawn)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

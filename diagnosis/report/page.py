@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from .report_data import USES, ReportData, trial_rows
 from .shape import curves
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
     from markupsafe import Markup
 
 PLACE = (NORTH.id, EAST.id)
@@ -36,11 +35,17 @@ class Drawing(NamedTuple):
     file: str
 
 
-def drawing(figure: Any, key: str, caption: str, label: str = "") -> Drawing:
+class Figure(Protocol):
+    """A :class:`.chart.Chart`, or what else can be an SVG element of a page."""
+
+    def svg(self, key: str, label: str) -> str: ...
+
+
+def drawing(figure: Figure, key: str, caption: str, label: str = "") -> Drawing:
     """A picture for the page.
 
     Args:
-        figure: has a method ``svg(key, label)``.
+        figure: what is drawn.
         key: name of the file, that no other picture of the page has.
         caption: text below.
         label: for screen readers; by default the caption.
@@ -74,30 +79,26 @@ def write_report(
     drawn = {section.__name__.strip("_"): [*section(data)] for section in sections}
     advance("report: page")
     made_with = [*_provenance(data), *origin.items()]
-    text = (
-        environment()
-        .get_template("page.html")
-        .render(
-            r=data,
-            diagnosis=data.diagnosis,
-            title="Model against measurements" if data.diagnosis is None else "Diagnosis",
-            verdict=verdict_title(data),
-            sentence=headline(data),
-            pictures=drawn,
-            tiles=[*_tiles(data)],
-            trials=[*trial_rows(data)],
-            coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
-            provenance=[(label, value) for label, value in made_with if value is not None],
-            glossary=[*formatting.glossary(*data.lengths)],
-        )
+    write_page(
+        path,
+        "page.html",
+        r=data,
+        diagnosis=data.diagnosis,
+        title="Model against measurements" if data.diagnosis is None else "Diagnosis",
+        verdict=verdict_title(data),
+        sentence=headline(data),
+        pictures=drawn,
+        tiles=[*_tiles(data)],
+        trials=[*trial_rows(data)],
+        coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
+        provenance=[(label, value) for label, value in made_with if value is not None],
+        glossary=[*formatting.glossary(*data.lengths)],
     )
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
     return path
 
 
-def environment() -> "Environment":
-    """Templates of this folder, and the filters that they use."""
+def write_page(path: Path, template: str, **values: object) -> None:
+    """Write a page by a template of this folder; an older file is replaced when it is complete."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -107,17 +108,12 @@ def environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = (
-        formatting.number,
-        formatting.unit,
-        formatting.percent,
-        formatting.plain,
-        told,
-        boundedness,
-    )
-    made.filters |= {f.__name__: f for f in filters}
-    made.globals["times"] = formatting.times
-    return made
+    f = formatting
+    made.filters |= {x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, told, boundedness)}
+    made.globals["times"] = f.times
+    text = made.get_template(template).render(values)
+    with cosim.atomic_write(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
 
 
 def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:

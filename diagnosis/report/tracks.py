@@ -113,7 +113,8 @@ def heading_bands(e: Evaluation) -> Chart | None:
     panel.draw(since, np.degrees(centre + wrap(e.windows.measured[inside, 2] - centre)), **MEASURED)
     panel.draw(e.bands.since, np.degrees(predicted), AFTER, "after")
     for level in LEVELS:
-        panel.fill(e.bands.since, *np.degrees(e.bands.headings(worst, level)), AFTER, opacity=0.15)
+        low, high = np.degrees(e.bands.headings(worst, level))
+        panel.fill(e.bands.since, low, high, AFTER, opacity=0.15)
     return Chart(0.75 * SINGLE, [panel])
 
 
@@ -127,11 +128,9 @@ def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     paths = [(_finite(measured - p.residuals[inside]), c, label) for p, c, label in _models(e, learned)]
     panel = _map(_around(measured[:, :2], [p[:, :2] for p, _, _ in paths]))
     panel.draw(*_east_north(measured), **MEASURED)
-    for level in LEVELS if e.bands is not None else ():
-        ellipses = np.pad(
-            e.bands.ellipses(worst, level), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan
-        )
-        panel.draw(*_east_north(ellipses.reshape(-1, 2)), paths[-1][1], width=0.0, opacity=0.12)
+    for around in [] if e.bands is None else [e.bands.ellipses(worst, level) for level in LEVELS]:
+        closed = np.insert(around, around.shape[1], np.nan, axis=1).reshape(-1, 2)
+        panel.draw(*_east_north(closed), AFTER, width=0.0, opacity=0.12)
     for predicted, colour, label in paths:
         panel.draw(*_east_north(predicted), colour, label)
         panel.draw(*_east_north(predicted[-1:]), colour, radius=PT.dot)
@@ -179,7 +178,8 @@ def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     drawn = [] if outline is None else hulls(poses, outline.corners)
     for corners in drawn:
         if np.ptp(corners, axis=0).max() < SHIP * room:
-            panel.draw(*np.vstack([corners, corners[:1]]).T, INK, width=PT.thin, opacity=0.4)
+            east, north = np.vstack([corners, corners[:1]]).T
+            panel.draw(east, north, INK, width=PT.thin, opacity=0.4)
 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
