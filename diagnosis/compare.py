@@ -43,7 +43,8 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
     from .predictors import MAP, ship_with
-    from .report import comparison_content, show_comparison, write_report
+    from .report import ReportData, file_content, show_comparison, write_report
+    from .report.document import write_json
 
     if options.criteria is None and (options.sign or options.learned):
         raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")
@@ -59,12 +60,10 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
         advance("where it fails")
         comparison.predictor.write(new)
         files = [*FILES, *(name for name in (MAP,) if (new / name).exists())]
-        content = comparison_content(comparison, options.model, files)
-        (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        report = ReportData.of(comparison, options.model, files)
+        write_json(new / "comparison.json", file_content(report))
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
-        write_report(
-            new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
-        )
+        write_report(new / "report.html", report, advance, origin)
         judged: list[str] = []
         if criteria is not None:
             advance("criteria")
@@ -75,7 +74,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
             written = record.write_into(new, options.sign)
             judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
             judged.append(f"  {', '.join(written)} in {options.out}")
-    return Done(0, [*show_comparison(content, str(options.out)), *map(printable, judged)])
+    return Done(0, [*show_comparison(report, str(options.out)), *map(printable, judged)])
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -14,10 +14,10 @@ from . import session
 from .execution.progress import Advance, silent
 from .gathering import gather
 from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
-from .report.content import diagnosis_content
+from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
-from .report.result_keys import DiagnosisContent
+from .report.report_data import ReportData
 from .report.terminal import summary
 from .runs import Run, read_frame, ship_of_logs
 from .search import DEFAULT, Method, Prior, shares
@@ -114,9 +114,13 @@ class ShownDiagnosis(session.Diagnosis):
     """What a model lacks; shows itself in a terminal in ten lines, and in a notebook with pictures."""
 
     @cached_property
-    def content(self) -> DiagnosisContent:
-        """What ``diagnosis.json`` of the command holds."""
-        return diagnosis_content(self, None, [])
+    def _report(self) -> ReportData:
+        return ReportData.of(self)
+
+    @cached_property
+    def content(self) -> Content:
+        """What ``diagnosis.json`` of the command holds; its keys are attributes as well."""
+        return file_content(self._report)
 
     @property
     def model(self) -> Model:
@@ -146,7 +150,7 @@ class ShownDiagnosis(session.Diagnosis):
     @property
     def plot(self) -> Plots:
         """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``, ``plot.ranking()``."""
-        return Plots(self.content, self.comparison)
+        return Plots(self._report)
 
     def to_ssv(self, path: str | Path = "model.ssv", anyway: bool = False) -> Path:
         """Write the learned model as an SSP parameter set, for ``cosim.simulate(parameters=[...])``.
@@ -165,14 +169,13 @@ class ShownDiagnosis(session.Diagnosis):
 
     def write_report(self, path: str | Path = "report.html") -> Path:
         """Write the report of ``python -m diagnosis.learn``: one HTML file that needs no other."""
-        c = self.comparison
-        return write_report(path, self.content, c.evaluations, c.omega_std)
+        return write_report(path, self._report)
 
     def __repr__(self) -> str:
-        return summary(self.content)
+        return summary(self._report)
 
     def _repr_html_(self) -> str:
-        return as_html(self.content, self.plot)
+        return as_html(self._report)
 
 
 def compare(

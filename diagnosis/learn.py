@@ -50,7 +50,8 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
     from .predictors import WRITTEN, DescribedShip, ship_with
-    from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
+    from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
+    from .report.document import write_json
     from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
@@ -94,15 +95,12 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
         files = [name for name in possible if (new / name).exists() or name in LATER]
-        content = diagnosis_content(diagnosis, options.model, files)
-        (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        write_coefficients(content, new / CSV, new / TEX)
-        comparison = diagnosis.comparison
+        report = ReportData.of(diagnosis, options.model, files)
+        write_json(new / DIAGNOSIS, file_content(report))
+        write_coefficients(diagnosis, new / CSV, new / TEX)
         origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
-        write_report(
-            new / REPORT, content, comparison.evaluations, comparison.omega_std, advance, origin
-        )
-    shown = [*show_diagnosis(content, str(options.out)), *notes]
+        write_report(new / REPORT, report, advance, origin)
+    shown = [*show_diagnosis(report, str(options.out)), *notes]
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)

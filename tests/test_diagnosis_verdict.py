@@ -1,10 +1,10 @@
 """What a diagnosis says of what it does not know: remainder, verdict, withdrawal, confidence."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support import reported
 from support.measured import NOISE, commands, smoothed
 from support.planted import bank, dead_bow, gusts, voyages
 
@@ -42,10 +42,11 @@ GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
 @pytest.mark.parametrize("said", VERDICTS)
 def test_heading_claims_no_more_than_the_findings(said, alone, possible):
     """Unsure are one cause without rivals that is not believed, and possibilities where none is found."""
-    effects = [SimpleNamespace(indistinguishable=[] if alone else ["X_u"])]
-    content = SimpleNamespace(verdict=said, effects=effects, possibilities=["X_u"] if possible else [])
+    effects = [reported.effect("lag", 0.5, indistinguishable=[] if alone else ["X_u"])]
+    possibilities = [reported.effect("X_u", 0.1)] if possible else []
+    r = reported.report_data(None, reported.diagnosis(verdict=said), effects, possibilities)
     unsure = (said == "ambiguous" and alone) or (said == "unexplained" and possible)
-    assert verdict_title(content) == (UNSURE if unsure else VERDICTS[said])
+    assert verdict_title(r) == (UNSURE if unsure else VERDICTS[said])
 
 
 def left(runs, model=None):

@@ -190,7 +190,7 @@ def inputs_of(options: argparse.Namespace) -> dict[str, str]:
 
 def import_later_parts() -> None:
     """Import what is needed once runs are smoothed; it takes a second."""
-    for name in ("diagnosis.session", "diagnosis.report.page", "matplotlib.figure"):
+    for name in ("diagnosis.session", "diagnosis.report.page"):
         import_module(name)
 
 

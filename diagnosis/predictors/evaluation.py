@@ -120,13 +120,13 @@ class Evaluation:
         model: the initial model, or one that moves as the predictor does.
         weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
-        held_out: whether nothing was learned from it.
+        held_out: whether nothing was learned from it, and nothing decided by it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
         predictor: what predicts the run; None: ``model`` does.
-        use: what the run was used for: to learn from, to decide, or only to be predicted.
+        use: what the data were used for.
     """
 
     model: Model
@@ -195,4 +195,5 @@ def evaluate_run(
         errors[-1],
         learned=after,
         predictor=predictor,
+        use="test" if held_out else "train",
     )
