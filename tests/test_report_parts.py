@@ -206,10 +206,12 @@ def test_profile_has_its_bins_before_and_after_in_the_units_of_people():
     assert [*own.legend] == ["noise", "model error"]
 
 
-def test_profile_over_what_never_changes_is_empty():
-    none = np.zeros(0)
-    edge = [Profile(a, SPEED, None, np.array([0.2]), none, none, none) for a in "XYN"]
-    assert "<svg" in figures.profile(SPEED, edge, edge).svg("key", "label")
+def test_profile_over_what_never_changes_has_one_bin():
+    one = np.ones(1)
+    edge = [Profile(a, SPEED, None, np.array([0.2]), one, one, one) for a in "XYN"]
+    made = figures.profile(SPEED, edge, edge)
+    assert made.panels[0].x.limits == (0.2, 0.2)
+    assert "nan" not in made.svg("key", "label")
 
 
 def test_ranking_is_from_the_best_down_with_what_ties_hollow():

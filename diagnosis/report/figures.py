@@ -72,7 +72,8 @@ def profile(
             for profiles in (before, after)
             if profiles is not None
         )
-        edges = covariate.display_factor * first.edges
+        # What never changes has one edge, and one bin.
+        edges = covariate.display_factor * np.resize(first.edges, first.rms.size + 1)
         last_one, own = axis == AXES[-1], covariate is THRUST  # the thrust is that of the axis
         x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=own or last_one)
         panel = Panel(x, Axis(force), zero=True)
