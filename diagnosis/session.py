@@ -168,7 +168,8 @@ def _compared(
     model = predictor.model
     known = [predictor, model, after, *every, *(w.smoothed for w in every)]
     each = range(len(every))
-    evaluations = for_each(of_run, each, known) if predictor.forks else [of_run(k) for k in each]
+    # What is not of this project may not outlive a fork.
+    evaluations = for_each(of_run, each, known) if predictor.parametric else [*map(of_run, each)]
     return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 

@@ -22,6 +22,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -60,16 +61,21 @@ class BlackBox(ABC):
         ship: model of the ship.
 
     Attributes:
+        kind, sha256, given_map: see :class:`.predictor.Description`.
         starts: what a prediction can begin with, of :data:`MOTION`.
         inputs: the forces and commands that it takes.
+        own_run_in: the run-in of every run [s]; None: none from rest, else the usual one.
     """
 
-    parametric, forks = False, False
+    parametric = False
+    kind, sha256 = "black box", ""
 
     def __init__(self, name: str, runs: Sequence[WeakWindows], ship: Model) -> None:
         self.name, self.runs, self.ship = name, runs, ship
         self.starts: frozenset[str] = frozenset(MOTION)
         self.inputs: frozenset[str] = frozenset()
+        self.given_map: Mapping[str, Any] = {}
+        self.own_run_in: float | None = None
 
     @abstractmethod
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
@@ -96,8 +102,10 @@ class BlackBox(ABC):
             InputError: the black box fails.
         """
 
-    @abstractmethod
-    def description(self) -> Description: ...
+    @property
+    def _started_by(self) -> str:
+        """What sets a measured state, a part of a sentence."""
+        return ""
 
     @property
     def whole(self) -> bool:
@@ -107,11 +115,6 @@ class BlackBox(ABC):
     def placed(self) -> bool:
         """Whether predictions are laid onto the measured pose, for that cannot be set."""
         return not set(POSE) <= self.starts
-
-    @property
-    def own_run_in(self) -> float | None:
-        """The run-in of every run [s]; None: none from rest, else the usual one."""
-        return None
 
     def run_in(self, smoothed: Smoothed) -> float:
         if not self.whole or (self.own_run_in is None and at_rest(smoothed)):
@@ -169,6 +172,11 @@ class BlackBox(ABC):
         pose = pose[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
+    def description(self) -> Description:
+        waits = {w.run.name: self.run_in(w.smoothed) for w in self.runs}
+        told = [*self._sentences()]
+        return Description(self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told)
+
     def in_windows(self) -> Predictor:
         return DescribedShip(self.model) if self.whole else self
 
@@ -180,7 +188,9 @@ class BlackBox(ABC):
         )
 
     def _sentences(self) -> Iterator[str]:
-        if self.whole:
+        if not self.whole:
+            yield f"Each window starts from the measured state{self._started_by}."
+        else:
             waits = [self.run_in(w.smoothed) for w in self.runs]
             began = "from rest" if not any(waits) else f"after a run-in of {max(waits):.3g} s"
             yield (

@@ -21,7 +21,7 @@ from .windows import Windows, free_runs
 class DescribedShip:
     """A model of this project, see :class:`.predictor.Predictor` and :class:`.predictor.ModelSource`."""
 
-    parametric, whole, forks = True, False, True
+    parametric, whole = True, False
 
     def __init__(self, model: Model) -> None:
         self.model = model

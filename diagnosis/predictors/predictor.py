@@ -65,7 +65,6 @@ class Predictor(Protocol):
         parametric: whether ``model`` is the predictor itself. Its coefficients can then be fitted and
             calibrated, its stability is judged, and its actuators' outputs are compared.
         whole: whether a run is predicted from the predictor's own start, as its velocity cannot be set.
-        forks: whether a forked process may predict as well.
     """
 
     @property
@@ -76,8 +75,6 @@ class Predictor(Protocol):
     def parametric(self) -> bool: ...
     @property
     def whole(self) -> bool: ...
-    @property
-    def forks(self) -> bool: ...
 
     def run_in(self, smoothed: Smoothed) -> float:
         """The first part of a run that does not count [s]; zero unless :attr:`whole`."""

@@ -15,7 +15,7 @@ v_dot [m/s2] and r_dot [rad/s2] of the body, each an array (n,) or a number.
 
 import hashlib
 import runpy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -29,7 +29,7 @@ from ..execution.progress import Advance, silent
 from ..runs import Smoothed
 from .black_box import MOTION, TAU, BlackBox, Signals, commands_at
 from .described_ship import nominal
-from .predictor import Description, refuse_map
+from .predictor import refuse_map
 from .ship_model import Model
 from .weak_form import WeakWindows
 
@@ -65,9 +65,13 @@ class PythonFunction:
 class FunctionPredictor(BlackBox):
     """How a Python function predicts some runs."""
 
+    kind = "Python function"
+
     def __init__(self, source: PythonFunction, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(source.name, runs, ship)
         self.source, self.inputs = source, frozenset(TAU)
+        if source.file is not None:
+            self.sha256 = hashlib.sha256(source.file.read_bytes()).hexdigest()
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         """By the classical Runge-Kutta method, the command constant within a step."""
@@ -100,17 +104,6 @@ class FunctionPredictor(BlackBox):
         if len(found) != 3:
             raise InputError(f"'{self.name}' must return u_dot, v_dot, r_dot; got {len(found)} values")
         return found
-
-    def description(self) -> Description:
-        file = self.source.file
-        digest = "" if file is None else hashlib.sha256(file.read_bytes()).hexdigest()
-        still = {w.run.name: 0.0 for w in self.runs}
-        return Description(
-            "Python function", self.name, digest, {}, False, still, list(self._sentences())
-        )
-
-    def _sentences(self) -> Iterator[str]:
-        yield "Each window starts from the measured state."
 
 
 def _law(state: vessel.State, commands: Signals, by: FunctionPredictor) -> list[np.ndarray]:

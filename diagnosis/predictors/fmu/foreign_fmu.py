@@ -1,7 +1,7 @@
 """FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ from ...execution.progress import Advance, silent
 from ...runs import OF_UNIT, QUANTITY, UNITS, Column, Run, Smoothed, to_si
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
-from ..predictor import FOUND, MAP, Description
+from ..predictor import FOUND, MAP
 from ..ship_model import Model
 from ..weak_form import WeakWindows
 from .instances import Begun, simulate
@@ -131,6 +131,8 @@ class FmuPredictor(BlackBox):
         InputError: as :meth:`Fmu.variables`.
     """
 
+    kind = "FMU"
+
     def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
         super().__init__(fmu.name, runs, ship)
         measured = [w.run for w in runs]
@@ -138,6 +140,7 @@ class FmuPredictor(BlackBox):
         self.units = SignalUnits(self.map, commands_of(measured))
         self.starts = frozenset(self.map.told("start")) & set(MOTION)
         self.inputs = frozenset(self.map.told("inputs"))
+        self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
 
     @property
     def whole(self) -> bool:
@@ -146,10 +149,6 @@ class FmuPredictor(BlackBox):
     @property
     def placed(self) -> bool:
         return not set(POSE) <= self.map.told("outputs").keys() & self.starts
-
-    @property
-    def own_run_in(self) -> float | None:
-        return self.map.run_in
 
     @cached_property
     def _along_runs(self) -> Model:
@@ -196,22 +195,9 @@ class FmuPredictor(BlackBox):
         u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
         return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
 
-    def description(self) -> Description:
-        return Description(
-            "FMU",
-            self.name,
-            self.fmu.sha256,
-            self.given.content(),
-            self.whole,
-            {w.run.name: self.run_in(w.smoothed) for w in self.runs},
-            list(self._sentences()),
-        )
-
-    def _sentences(self) -> Iterator[str]:
-        if not self.whole:
-            start = ", ".join(c.name for c in self.map.told("start").values())
-            yield f"Each window starts from the measured state, by {start}."
-        yield from super()._sentences()
+    @property
+    def _started_by(self) -> str:
+        return f", by {', '.join(c.name for c in self.map.told('start').values())}"
 
     def write(
         self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
