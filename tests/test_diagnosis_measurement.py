@@ -492,7 +492,7 @@ class TestColumns:
         with_tau().to_csv(tmp_path / "a.csv", index=False)
         assert propose(tmp_path / "a.csv").needed == {}
         done = command(propose_columns.main, tmp_path / "a.csv", "--write", "--anyway")
-        assert "nothing needs to be told" in done.stdout
+        assert "nothing needs to be stated" in done.stdout
         assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
     @pytest.mark.parametrize(

@@ -12,13 +12,15 @@ from .columns.proposal import meaning as meaning
 from .columns.proposal import propose as propose
 from .columns.side_car import line_beside as line_beside
 from .columns.unit_factors import UNITS as UNITS
-from .files.other_columns import other_columns as other_columns
 from .files.reading import Run as Run
 from .files.reading import read as read
 from .files.reading import read_frame as read_frame
 from .files.run_table_file import layout_beside as layout_beside
 from .files.run_table_file import table_of as table_of
 from .files.ship_of_logs import ship_of_logs as ship_of_logs
+from .prepared_run import PreparedRun as PreparedRun
+from .prepared_run import prepare as prepare
+from .prepared_run import read_each as read_each
 from .sensors.examination import examine as examine
 from .sensors.path_closure import Closure as Closure
 from .sensors.path_closure import closure as closure

@@ -10,25 +10,22 @@ from cosim import InputError
 
 from ..columns.columns import Layout, read_layout
 from .csv_tables import csv_table
-from .reading import LOGS
 
 
-def other_columns(path: str | Path, names: Iterable[str]) -> dict[str, np.ndarray]:
+def other_columns(path: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
     """Those of some columns that a file has.
 
     Args:
-        path: as :func:`.read` takes it; a MATLAB file has none.
+        path: a CSV or Parquet file; a MATLAB file has none.
         names: of columns in SI.
 
     Returns:
-        Name -> values (n,), NaN where a cell is empty or no number.
+        Name -> values (n,), NaN where a cell is empty or not a number.
 
     Raises:
         InputError: the file cannot be read.
     """
-    path, wanted = Path(path), set(names)
-    if path.is_dir():
-        path = next((path / name for name in LOGS if (path / name).is_file()), path)
+    wanted = set(names)
     if path.suffix == ".mat":
         return {}
     layout = read_layout(path) or Layout()
