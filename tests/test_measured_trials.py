@@ -98,7 +98,7 @@ def test_a_trial_that_measures_nothing_says_so(sailed, tmp_path, stop, said):
     ("trial", "others", "arguments", "message"),
     [
         (None, {}, (), "does not state which trial it is"),
-        ("zig-zag", {}, (), "is no manoeuvring trial; did you mean 'zigzag'?"),
+        ("zig-zag", {}, (), "is not a manoeuvring trial; did you mean 'zigzag'?"),
         ("same", {"tau_N": 1.0}, (), "never changes"),
         ("same", {}, ("--from", 1e6), "too short"),
     ],

@@ -11,7 +11,7 @@ from .columns.columns import to_si as to_si
 from .columns.proposal import meaning as meaning
 from .columns.proposal import propose as propose
 from .columns.side_car import line_beside as line_beside
-from .columns.unit_factors import UNITS as UNITS
+from .columns.unit_check import UNITS as UNITS
 from .files.reading import Run as Run
 from .files.reading import read as read
 from .files.reading import read_frame as read_frame

@@ -17,7 +17,6 @@ from fmus.ship import Ship, ship
 
 from .cleaning import Track, clean, refuse_short
 from .columns.unit_check import GO_ON
-from .files.other_columns import other_columns
 from .files.reading import Run, read
 from .sensors.examination import examine
 from .sensors.sensor_finding import Examined
@@ -93,15 +92,13 @@ def prepare(
         of: the ship that was measured; None: CyberShip Enterprise 1.
         anyway: whether a run is accepted whose units seem to be other ones than stated, whose channels
             contradict each other beyond repair, or many of whose samples are spikes.
-        also: names of other columns of the file [SI], which are kept in :attr:`.Run.measured`.
+        also: see :func:`.read`.
 
     Raises:
         InputError: the run cannot be read or used.
     """
     of = of or ship()
-    raw = source if isinstance(source, Run) else read(source, of=of)
-    if also and raw.file is not None:
-        raw = replace(raw, measured={**raw.measured, **other_columns(raw.file, also)})
+    raw = source if isinstance(source, Run) else read(source, of=of, also=also)
     sensors = examine(raw, of.scale)
     unrepaired = next((finding for finding in sensors.findings if not finding.repaired), None)
     if unrepaired and not anyway:
