@@ -13,10 +13,10 @@ from .columns.proposal import propose as propose
 from .columns.side_car import line_beside as line_beside
 from .columns.unit_check import UNITS as UNITS
 from .files.reading import Run as Run
+from .files.reading import layout_beside as layout_beside
 from .files.reading import read as read
 from .files.reading import read_frame as read_frame
-from .files.run_table_file import layout_beside as layout_beside
-from .files.run_table_file import table_of as table_of
+from .files.reading import table_of as table_of
 from .files.ship_of_logs import ship_of_logs as ship_of_logs
 from .prepared_run import PreparedRun as PreparedRun
 from .prepared_run import prepare as prepare

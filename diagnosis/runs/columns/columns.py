@@ -217,51 +217,40 @@ def log_of(commands: Iterable[str]) -> Layout:
     return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
 
 
-def log_layout(
-    folder: Path, names: Sequence[str], commands: Mapping[str, str] | None = None
-) -> Layout | None:
-    """The layout of the log of a run: by the roles that its scenario states, else by the usual names.
-
-    Args:
-        folder: of the run.
-        names: columns of its log.
-        commands: of a described ship, see :func:`signals`.
-
-    Returns:
-        None if it is no log of a ship.
-    """
-    log = log_of(commands or THREE)
-    if log.column("x").name in names:
-        return log
-    roles = read_options(folder).roles
-    named = dict(zip((*POSE, *TAU), roles.of("pose", "force"), strict=True))
-    if not set(named.values()) <= set(names):
-        return None
-    return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
-
-
 WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+)\s*[\])]")
 
 
 def layout_of(
-    names: Sequence[str], units: Mapping[str, str], where: str, commands: Mapping[str, str] | None = None
+    names: Sequence[str],
+    units: Mapping[str, str],
+    where: str,
+    commands: Mapping[str, str] | None = None,
+    folder: Path | None = None,
 ) -> Layout:
-    """The layout of a table that says itself in which units it is.
+    """The layout of a log by its usual names or the roles of its scenario, or of a table by its units.
 
     Args:
-        names: of its columns, which may end in a unit, as ``x [mm]``.
+        names: of the columns, which may end in a unit, as ``x [mm]``.
         units: column -> unit, where that is known otherwise; those of no signal do not count.
         where: what messages call the table.
         commands: of a described ship, see :func:`signals`.
+        folder: in which it lies, where the run's scenario may be.
 
     Raises:
         InputError: a unit that the signal cannot have.
     """
+    log = log_of(commands or THREE)
+    if log.column("x").name in names:
+        return log
+    if folder is not None:
+        named = dict(zip((*POSE, *TAU), read_options(folder).roles.of("pose", "force"), strict=True))
+        if set(named.values()) <= set(names):
+            return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
     known = quantities(commands)
-    told = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
+    stated = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
-    told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
-    columns = {s: {"name": name, "unit": unit} for s, (name, unit) in told.items()}
+    stated |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
+    columns = {s: {"name": name, "unit": unit} for s, (name, unit) in stated.items()}
     try:
         return Layout.model_validate({"columns": columns})
     except ValidationError as error:

@@ -77,17 +77,6 @@ def _changed(path: Path, layout: Layout, **changes: Any) -> str:
     return _line(path, layout.model_dump(exclude_defaults=True) | changes)
 
 
-def refuse_separator(path: Path, header: str) -> None:
-    """Refuse a CSV file whose one column is a row of cells, with the line that states the separator."""
-    found = text_layout(path, UTF_8)
-    if found is None or found.separator == Layout().separator:
-        return
-    raise InputError(
-        f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
-        f"{found.separator!r}; {_line(path, found.model_dump(exclude_defaults=True))}"
-    )
-
-
 def refuse_encoding(path: Path, layout: Layout) -> None:
     """Refuse a CSV file whose text is not UTF-8, with the line that states the encoding it may have."""
     if layout.encoding == UTF_8 and b"\0" not in path.read_bytes():
@@ -95,15 +84,18 @@ def refuse_encoding(path: Path, layout: Layout) -> None:
         raise InputError(f"'{path}' is not a text in UTF-8; if it is in Latin-1, {line}")
 
 
-def refuse_preamble(path: Path, layout: Layout, names: Sequence[str]) -> None:
-    """Refuse a CSV file whose names are in a later line than stated, with the line that states which."""
+def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
+    """Refuse a CSV file with another separator or line of names than stated, with the line that does."""
     if layout.column("time").name in names:
         return
     found = text_layout(path, layout.encoding)
     if found is None or (found.skip, found.separator) == (layout.skip, layout.separator):
         return
+    seen = f"has the names of its columns in line {found.skip + 1}"
+    if found.separator != layout.separator:
+        seen = f"has cells that seem to be separated by {found.separator!r}"
     line = _changed(path, layout, **found.model_dump(exclude_defaults=True))
-    raise InputError(f"'{path}' has the names of its columns in line {found.skip + 1}; {line}")
+    raise InputError(f"'{path}' {seen}; {line}")
 
 
 def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:

@@ -8,6 +8,7 @@ files that NTNU publishes of CyberShip Enterprise 1.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,17 +27,15 @@ from ..columns.columns import (
     POWER,
     TAU,
     THREE,
+    Column,
     Layout,
     layout_of,
-    log_layout,
-    log_of,
     outputs,
     quantities,
     read_layout,
     signals,
     to_si,
 )
-from ..columns.side_car import refuse_separator
 from ..columns.unit_check import UNITS
 from .matlab_files import read_matlab
 from .tables import column_names, date_stamps, numbers, table_of_file
@@ -153,9 +152,7 @@ def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None)
     """
     of = of or ship()
     where, names = f"the table '{name}'", [str(column) for column in frame.columns]
-    layout = log_of(of.commands or THREE)
-    if layout.column("x").name not in names:
-        layout = layout_of(names, frame.attrs.get("units", {}), where, of.commands)
+    layout = layout_of(names, frame.attrs.get("units", {}), where, of.commands)
     return _of_table(name, frame.set_axis(names, axis=1), layout, Path(name), where, of)
 
 
@@ -164,10 +161,7 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
     given = layout or read_layout(path)
     try:
         names = column_names(path, given or Layout())
-        if given is None and len(names) == 1:
-            refuse_separator(path, names[0])
-        layout = given or log_layout(path.parent, names, of.commands)
-        layout = layout or layout_of(names, {}, f"'{path}'", of.commands)
+        layout = given or layout_of(names, {}, f"'{path}'", of.commands, path.parent)
         wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of.commands)}
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
     except ImportError:
@@ -246,3 +240,17 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
         return None
     finite = np.where(np.isfinite(commands), commands, np.nan)
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
+
+
+def table_of(run: Run) -> pd.DataFrame:
+    """All that was measured and commanded, by its own names and in SI, as :func:`read` takes it."""
+    pose = dict(zip(POSE, run.pose.T, strict=True))
+    return pd.DataFrame({"time": run.time, **pose, **run.commanded, **run.measured})
+
+
+def layout_beside(run: Run) -> dict[str, Any]:
+    """The file beside that table: noise, and what the one beside the run's own file says of the run."""
+    before = None if run.file is None else read_layout(run.file)
+    kept = (before or Layout()).model_dump(exclude_defaults=True, include={"trial"})
+    columns = {name: Column(name=name, noise=std) for name, std in run.noise.items()}
+    return kept | Layout(columns=columns).model_dump(exclude_defaults=True)

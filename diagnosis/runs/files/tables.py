@@ -10,7 +10,7 @@ import pandas as pd
 from cosim import InputError
 
 from ..columns.columns import SHOWN, Layout
-from ..columns.side_car import decimal_comma, refuse_encoding, refuse_preamble, refuse_units
+from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
 READ_INTERRUPTED = "Calling read(nbytes) on source failed"
@@ -29,7 +29,7 @@ def column_names(path: Path, layout: Layout) -> list[str]:
         return list(parquet.read_schema(path).names)
     first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
     names = [name.strip() for name in first.iloc[0]]
-    refuse_preamble(path, layout, names)
+    refuse_layout(path, layout, names)
     return names
 
 
