@@ -54,8 +54,8 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
             table.to_csv(new / out.name, index=False)
         else:
             table.to_parquet(new / out.name, index=False)
-        told = layout_beside(repaired)
-        (new / side_car).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        beside = layout_beside(repaired)
+        (new / side_car).write_text(json.dumps(beside, indent=2) + "\n", encoding="utf-8")
     closed = _closed(prepared.raw, repaired, craft.scale)
     return Done(0, [*_found(prepared.sensors), *closed, f"written: {out}, {out}.json"])
 

@@ -13,21 +13,8 @@ called, in which unit it is, and how its axis lies::
         },
     }
 
-Columns that it does not name keep their names and SI units. Beside pose and commands a run may hold:
-
-====================  ==============================================================================
-``u v``               velocity over ground ahead and to starboard [m/s]
-``x_dot y_dot``       velocity over ground to north and east [m/s]
-``speed course``      over ground, as a satellite receiver says it [m/s, rad]
-``r``                 yaw rate, positive to starboard [rad/s]
-``u_water v_water``   velocity through the water ahead and to starboard [m/s]
-``a_x a_y``           acceleration ahead and to starboard, u' - v r and v' + u r [m/s2]
-``wind_speed``        of the true wind [m/s]
-``wind_direction``    that it blows from, clockwise from north [rad]
-``x_2 y_2 psi_2``     pose by a second receiver [m, m, rad]
-``ACTUATOR.thrust``   force of an actuator as it is measured [N]
-``ACTUATOR.torque``   on its shaft [N.m]
-====================  ==============================================================================
+Columns that it does not name keep their names and SI units. What each signal means:
+docs/measurements.md.
 """
 
 import codecs
