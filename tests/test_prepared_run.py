@@ -112,7 +112,7 @@ def test_the_file_is_spoilt_and_repaired(prepared):
 @pytest.mark.parametrize(
     ("main", "place"),
     [
-        (learn.main, "diagnosis.session.diagnose"),
+        slow((learn.main, "diagnosis.session.diagnose")),
         (compare.main, "diagnosis.session.evaluate"),
     ],
 )
@@ -136,7 +136,7 @@ def test_of_a_trial_that_is_the_whole_run_or_a_part(prepared, monkeypatch, spoil
     assert (part.used == prepared.samples[inside]).mean() > 0.999  # a spike may be told at an end
 
 
-@pytest.mark.parametrize("main", [pca.main, pls.main, sysid.main])
+@pytest.mark.parametrize("main", [pca.main, slow(pls.main), slow(sysid.main)])
 def test_of_the_analyses_of_the_thesis(prepared, monkeypatch, spoilt, tmp_path, main):
     found = []
     gather = analysis.gather_samples
@@ -154,7 +154,7 @@ def test_of_the_analyses_of_the_thesis(prepared, monkeypatch, spoilt, tmp_path, 
     assert set(filtered.time) <= set(prepared.track.run.time), "the filter gives one for a lost row, too"
 
 
-@pytest.mark.parametrize("main", [replay.main, watch.main])
+@pytest.mark.parametrize("main", [slow(replay.main), watch.main])
 def test_of_playing_it_to_an_observer(prepared, monkeypatch, spoilt, tmp_path, main):
     controller = ("--controller", "abs") if main is replay.main else ()
     source = seen(monkeypatch, "diagnosis.open_loop.play", main, spoilt, *controller, "--out", tmp_path)
