@@ -78,11 +78,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         help="a file of model effects of your own; may be repeated",
     )
     ship_option(made)
-    made.add_argument(
-        "--anyway",
-        action="store_true",
-        help="go on though a run's units, signs or columns seem to be other ones than said",
-    )
+    anyway_option(made)
     made.add_argument(
         "--horizon",
         type=float,
@@ -109,6 +105,16 @@ def ship_option(made: argparse.ArgumentParser) -> None:
         metavar="NAME|FILE.toml",
         help="the ship that was measured: a shipped one, or a description of your own (as the logs "
         "of runs say, else cse1)",
+    )
+
+
+def anyway_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--anyway``, which means the same in all commands."""
+    made.add_argument(
+        "--anyway",
+        action="store_true",
+        help="use a run whose units, signs or columns seem to be other ones than stated, or whose "
+        "channels have faults that they cannot repair",
     )
 
 
@@ -139,6 +145,7 @@ def analysis_parser(
         help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
         f"derivative filter ({estimates})",
     )
+    anyway_option(made)
     out_options(made, Path("results", name))
     return made
 
@@ -160,6 +167,7 @@ def open_loop_parser(name: str, description: str, epilog: str) -> argparse.Argum
         metavar="FILE",
         help="observer, guidance and controller's parameters, in place of the run's own scenario",
     )
+    anyway_option(made)
     out_options(made, Path("results", name))
     return made
 
