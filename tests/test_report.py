@@ -58,7 +58,8 @@ def evaluations(data):
 
 def compared(evaluations, **before):
     """The comparison of these runs; of where the model fails, something else than there is."""
-    c = Comparison(evaluations, [np.full_like(e.before.omega, 0.01) for e in evaluations])
+    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
+    c = Comparison(evaluations, std, evaluations[0].predicted_by)
     vars(c)["before"] = replace(c.before, **before)
     return c
 
