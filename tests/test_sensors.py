@@ -16,9 +16,8 @@ from diagnosis import repair as command
 from diagnosis.runs import closure, examine
 from diagnosis.runs.files.telegrams import filled
 from diagnosis.runs.sensors import motion
-from diagnosis.runs.sensors.accelerations import accelerations
 from diagnosis.runs.sensors.clock_path import integral_of
-from diagnosis.runs.sensors.receivers import receivers
+from diagnosis.runs.sensors.further_channels import accelerations, receivers
 from diagnosis.runs.sensors.wraps import unwrapped
 from diagnosis.runs.smoothing import measured_rates
 from fmus.frames import rotate_to_earth

@@ -26,7 +26,7 @@ from .sensors.path_closure import Closure as Closure
 from .sensors.path_closure import closure as closure
 from .sensors.sensor_finding import Examined as Examined
 from .sensors.sensor_finding import SensorFinding as SensorFinding
-from .sensors.sensor_text import sensor_lines as sensor_lines
+from .sensors.sensor_finding import sensor_lines as sensor_lines
 from .smoothing.command_motion import idle as idle
 from .smoothing.smoother import Motion as Motion
 from .smoothing.smoother import Smoothed as Smoothed

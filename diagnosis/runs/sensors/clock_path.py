@@ -9,63 +9,43 @@ fault of a single channel does. Unknown are pose and c at nodes and the constant
     P_(j+1) - P_j = c_j (D_j + constants) + a random walk of the velocity's and of the rate's error,
     c_(j+1) - c_j   a random walk.
 
-All is linear but for c times a constant, which is iterated. The variances are those of restricted
-maximum likelihood, by the fixed point of Harville (1977), J. Am. Stat. Assoc. 72, 320-338.
+All is linear but for c times a constant, which is iterated: banded least squares with a variance for each
+group of equations, as those of the smoother (:mod:`..smoothing.penalised`). The variances are those of
+restricted maximum likelihood, by the fixed point of Harville (1977), J. Am. Stat. Assoc. 72, 320-338.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import cholesky_banded
 from scipy.sparse import csr_array
 
+from ..smoothing.outliers import OUTLIER
+from ..smoothing.penalised import Equations, System
 from .constants import Column
 from .evidence import Evidence
 
-BAND = 8  # unknowns of two neighbouring nodes: north, east, heading, clock
+STATES = 4  # unknowns of a node: north, east, heading, rate of the clock
+CLOCKS = slice(STATES - 1, None, STATES)  # the rates among all unknowns
 # s between two nodes, or as long as a sampling period. Chosen: a clock of arrival wanders over seconds.
 SPACING = 1.0
-MOST_NODES, MOST_SAMPLES = 20_000, 8  # and samples between two of them, evenly chosen of more
-# Standard deviation believed of c about 1 at each node: of a clock that may be off, none of which runs
-# at half or double rate, and of one that may not.
+# Nodes, and samples between two of them, evenly chosen of more: memory and time. Chosen: a hundred MB.
+MOST_NODES, MOST_SAMPLES = 20_000, 8
+# Prior standard deviation of c about 1 at each node: of a clock that may be off, none of which runs at
+# half or double rate, and of one that may not.
 ANCHOR, EVEN = 0.5, 1e-6
+HOLD = (
+    1e-6  # 1/m, 1/rad; inverse of the prior standard deviation of a pose that nothing measures (chosen)
+)
 SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
-BEGIN = np.array(
-    [0.1, 0.1, 0.03]
-)  # of the walks in a second: of the noise, and of the rate; first guesses
-# Of the noise, and of it over the whole run; what is less makes no difference to the path.
-LEAST, LEAST_WALK = 1e-2, np.array([1e-3, 1e-3, 1e-4])
+BEGIN = 0.1  # of the walks in a second, times the noise or the rate; first guess
+LEAST = 1e-3  # of the noise, and of the walks over the whole run; less makes no difference to a path (chosen)
 SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
 STILL = (
     1e-6  # relative change of all deviations in a sweep that ends them; chosen: no digit told changes
 )
-PROBES = 6  # random vectors that estimate traces (Hutchinson 1990)
-OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is left out
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A path that was found.
-
-    Attributes:
-        clock: (m - 1,), rate c between the nodes.
-        constants: (k,), value of each constant fault.
-        covariance: (k, k), of these.
-        std: (7,), standard deviations of the groups.
-        criterion: -2 log of the likelihood, restricted to all but the constants.
-        residual: standardised, of each equation.
-    """
-
-    clock: np.ndarray
-    constants: np.ndarray
-    covariance: np.ndarray
-    std: np.ndarray
-    criterion: float
-    residual: np.ndarray
-    system: "_System"
 
 
 class PathProblem:
@@ -89,81 +69,78 @@ class PathProblem:
     ) -> None:
         self.evidence, self.constants, self.noise = e, constants, noise
         self.gaps, self.without = gaps, without
-        time = e.time
-        rows = e.rows
+        time, rows = e.time, e.rows
         for start, end in gaps:
             rows = rows[(time[rows] <= start) | (time[rows] >= end)]
         spacing = max(SPACING, float(time[rows[-1]] - time[rows[0]]) / MOST_NODES)
         self.nodes = rows[_spaced(time[rows], spacing)]
-        m = self.nodes.size
         self.edges = time[self.nodes]
-        steps = np.diff(self.edges)
-        self.cut = np.zeros(m - 1, bool)
+        self.cut = np.zeros(self.nodes.size - 1, bool)
         for start, end in gaps:
             self.cut |= (self.edges[1:] > start) & (self.edges[:-1] < end)
         rows = rows[(rows >= self.nodes[0]) & (rows < self.nodes[-1])]
-        thin = max(1, rows.size // (MOST_SAMPLES * m))
-        self.rows = np.array([k for k in rows[::thin].tolist() if k not in without])
-        self.at = np.searchsorted(self.nodes, self.rows, side="right") - 1
-        at_cut = self.cut[self.at] & (self.rows != self.nodes[self.at])
-        self.rows, self.at = self.rows[~at_cut], self.at[~at_cut]
-        self.whole = np.flatnonzero(~self.cut)
-        self.pairs = np.flatnonzero(~self.cut[:-1] & ~self.cut[1:])
-        self.moved = np.column_stack([e.gone, e.turned])
-        self._build(steps)
+        rows = rows[:: max(1, rows.size // (MOST_SAMPLES * self.nodes.size))]
+        rows = rows[~np.isin(rows, list(without))]
+        at = np.searchsorted(self.nodes, rows, side="right") - 1
+        whole = ~self.cut[at] | (rows == self.nodes[at])
+        self._build(rows[whole], at[whole])
 
-    def _build(self, steps: np.ndarray) -> None:
-        e, m = self.evidence, self.nodes.size
+    def _build(self, rows: np.ndarray, at: np.ndarray) -> None:
+        """The equations, of samples in some rows after their nodes, from node to node, and of priors."""
+        e, m, nodes, steps = self.evidence, self.nodes.size, self.nodes, np.diff(self.edges)
         c, s = np.cos(e.psi), np.sin(e.psi)
         one, none = np.ones_like(c), np.zeros_like(c)
         axes = np.stack([np.column_stack(a) for a in ((c, s, none), (-s, c, none), (none, none, one))])
         pose = np.column_stack([e.run.pose[:, :2] - e.run.pose[e.rows[0], :2], e.psi])
-        measured = [
-            k for k, there in ((0, e.velocity), (1, e.velocity), (2, e.rate)) if there is not None
-        ]
-        parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # equation, unknown, factor
+        moved = np.column_stack([e.gone, e.turned])
+        measured = [0, 1] * (e.velocity is not None) + [2] * (e.rate is not None)
+        entries: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # equation, unknown, factor
+        # Of each part of the equations that constants change: first one, axis, rows of begin and end.
         self.parts: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
-        right, groups, lengths, count = [], [], [], 0
+        right, groups, lengths = [], [], []
 
         def add(
-            group: int, entries: list[tuple[np.ndarray, np.ndarray]], y: np.ndarray, h: np.ndarray
+            group: int, of: list[tuple[np.ndarray, np.ndarray]], y: np.ndarray, h: np.ndarray
         ) -> int:
-            nonlocal count
-            parts.extend(
-                (count + np.arange(y.size), at, np.broadcast_to(f, y.shape)) for at, f in entries
-            )
+            begin = sum(each.size for each in right)
+            entries.extend((begin + np.arange(y.size), u, np.broadcast_to(f, y.shape)) for u, f in of)
             right.append(y)
             groups.append(np.full(y.size, group))
             lengths.append(np.broadcast_to(h, y.shape))
-            count += y.size
-            return count - y.size
+            return begin
 
-        rows, at, one = self.rows, self.at, np.ones(1)
-        whole, here, there = self.whole, self.nodes[:-1][self.whole], self.nodes[1:][self.whole]
+        def ahead(a: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+            return (a * (moved[end] - moved[start])).sum(axis=1)
+
+        one, clock = np.ones(1), STATES - 1
         for k in measured:  # samples of the pose
-            a = axes[k][rows]
-            ahead = (a * (self.moved[rows] - self.moved[self.nodes[at]])).sum(axis=1)
-            entries = [(4 * at + i, a[:, i]) for i in range(3) if a[:, i].any()]
-            begin = add(k, [*entries, (4 * at + 3, ahead)], (a * pose[rows]).sum(axis=1), one)
-            self.parts.append((begin, a, self.nodes[at], rows))
+            a, start = axes[k][rows], nodes[at]
+            of = [(STATES * at + i, a[:, i]) for i in range(clock) if a[:, i].any()]
+            of.append((STATES * at + clock, ahead(a, start, rows)))
+            self.parts.append((add(k, of, (a * pose[rows]).sum(axis=1), one), a, start, rows))
+        j = np.flatnonzero(~self.cut)
         for k in measured:  # from node to node
-            a = axes[k][here]
-            ahead = (a * (self.moved[there] - self.moved[here])).sum(axis=1)
-            entries = [(4 * (whole + j) + i, (2 * j - 1) * a[:, i]) for i in range(3) for j in (0, 1)]
-            group = TURN if k == 2 else DRIFT
-            begin = add(group, [*entries, (4 * whole + 3, -ahead)], np.zeros(whole.size), steps[whole])
-            self.parts.append((begin, -a, here, there))
-        j = self.pairs
-        ends = [(4 * j + 7, one), (4 * j + 3, -one)]
-        add(CLOCK, ends, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
-        add(RATE, [(4 * np.arange(m) + 3, one)], np.ones(m), one)
-        for i in range(3):  # holds what nothing measures
-            add(FIXED, [(4 * np.arange(m) + i, np.array([1e-6]))], np.zeros(m), one)
-        equation, unknown, factor = (np.concatenate(each) for each in zip(*parts, strict=True))
-        self.matrix = csr_array((factor, (equation, unknown)), shape=(count, 4 * m))
-        self.right, self.group = np.concatenate(right), np.concatenate(groups)
-        self.steps = np.sqrt(np.concatenate(lengths))
-        self.present = sorted(set(self.group.tolist()) - {RATE, FIXED})
+            a, start, end = axes[k][nodes[j]], nodes[j], nodes[j + 1]
+            of = [(STATES * j + i, -a[:, i]) for i in range(clock)]
+            of += [(STATES * (j + 1) + i, a[:, i]) for i in range(clock)]
+            of.append((STATES * j + clock, -ahead(a, start, end)))
+            begin = add(TURN if k == HEADING else DRIFT, of, np.zeros(j.size), steps[j])
+            self.parts.append((begin, -a, start, end))
+        j = np.flatnonzero(~self.cut[:-1] & ~self.cut[1:])
+        of = [(STATES * (j + 1) + clock, one), (STATES * j + clock, -one)]
+        add(CLOCK, of, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
+        add(RATE, [(STATES * np.arange(m) + clock, one)], np.ones(m), one)
+        for i in range(clock):
+            add(FIXED, [(STATES * np.arange(m) + i, np.array([HOLD]))], np.zeros(m), one)
+        equation, unknown, factor = (np.concatenate(each) for each in zip(*entries, strict=True))
+        self.right, group = np.concatenate(right), np.concatenate(groups)
+        matrix = csr_array((factor, (equation, unknown)), shape=(group.size, STATES * m))
+        root = 1.0 / np.sqrt(np.concatenate(lengths))
+        self.present = sorted(set(group.tolist()) - {RATE, FIXED})
+        normals = np.array([_normal(matrix[group == g], root[group == g]) for g in range(FIXED + 1)])
+        # The walk of the clock and its anchor are one prior, which counts as a whole.
+        counts = np.array([np.sum(group == g) if g < CLOCK else 0 for g in range(FIXED + 1)])
+        self.equations = Equations(matrix, matrix.T, root, group, normals, counts)
 
     def border(self, clock: np.ndarray) -> np.ndarray:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
@@ -178,106 +155,88 @@ class PathProblem:
                 made[begin : begin + end.size, k] = np.einsum("ij,ij->i", a, path[end] - path[start])
         return made
 
-    def solve(self, fixed_clock: bool = False) -> Solution:
+    def solve(self, fixed_clock: bool = False) -> "Path":
         """The likeliest path.
 
         Args:
-            fixed_clock: whether the clock is believed to run evenly at rate 1.
+            fixed_clock: whether the clock is taken to run evenly at rate 1.
         """
         place, angle = self.noise
-        walk = np.array([place, angle, 1.0])
-        std = np.array([place, place, angle, *(BEGIN * walk), EVEN if fixed_clock else ANCHOR])
-        seconds = float(self.edges[-1] - self.edges[0])
-        floor = np.array([*(LEAST * std[:3]), *(LEAST_WALK * walk / np.sqrt(seconds)), 0.0])
-        clock, rng = np.ones(self.nodes.size - 1), np.random.default_rng(0)
-        probes = rng.choice([-1.0, 1.0], (self.right.size, PROBES))
+        samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
+        std = np.array([*samples, *(BEGIN * walk), EVEN if fixed_clock else ANCHOR, 1.0])
+        least = LEAST * np.array([*samples, *(walk / np.sqrt(self.edges[-1] - self.edges[0]))])
+        path = Path(self, std, np.ones(self.nodes.size - 1))
         for _ in range(SWEEPS):
-            system, before = _System(self, std, clock), std.copy()
-            clock = system.unknown[3::4][:-1]
-            share = system.leverage(probes)
+            std = path.std.copy()
             for g in self.present:
                 if g == CLOCK and fixed_clock:
                     continue
-                of = self.group == g
-                free = max(of.sum() - share[of].mean(axis=1).sum(), 1.0)
-                std[g] = max(std[g] * np.sqrt((system.residual[of] ** 2).sum() / free), floor[g])
-            if (np.abs(std - before) <= STILL * before).all():
+                off = path.residual[self.equations.group == g]
+                free = max(off.size - path.system.trace(g), 1.0)
+                std[g] = max(std[g] * float(np.sqrt((off**2).sum() / free)), least[g])
+            changed = (np.abs(std - path.std) > STILL * path.std).any()
+            path = Path(self, std, path.clock)
+            if not changed:
                 break
-        system = _System(self, std, clock)
-        return Solution(
-            system.unknown[3::4][:-1].copy(),
-            system.constants,
-            system.covariance,
-            std,
-            system.criterion,
-            system.residual,
-            system,
-        )
+        return path
 
-    def outliers(self, solution: Solution) -> frozenset[int]:
+    def outliers(self, path: "Path") -> frozenset[int]:
         """Samples far from the path."""
         far: set[int] = set()
         for begin, _, _, rows in self.parts[: len(self.parts) // 2]:
-            off = np.abs(solution.residual[begin : begin + rows.size])
+            off = np.abs(path.residual[begin : begin + rows.size])
             far |= set(rows[off > OUTLIER].tolist())
         return frozenset(far)
 
 
-class _System:
-    """The equations with weights, solved."""
+class Path:
+    """The likeliest path for some variances.
+
+    Args:
+        p: its equations.
+        std: (8,), standard deviations of the groups.
+        clock: (m - 1,), rate of the clock between the nodes, by which the constants act.
+
+    Attributes:
+        clock: (m - 1,), rate c between the nodes.
+        constants: (k,), value of each constant fault.
+        covariance: (k, k), of these.
+        std: (8,), standard deviations of the groups.
+        residual: standardised, of each equation.
+        criterion: -2 log of the likelihood, restricted to all but the constants.
+    """
 
     def __init__(self, p: PathProblem, std: np.ndarray, clock: np.ndarray) -> None:
-        weight = 1.0 / (np.append(std, 1.0)[p.group] * p.steps)
-        entries = np.repeat(weight, np.diff(p.matrix.indptr)) * p.matrix.data
-        self.weighted = csr_array((entries, p.matrix.indices, p.matrix.indptr), p.matrix.shape)
-        self._turned = self.weighted.T
-        right, self.border = p.right * weight, p.border(clock) * weight[:, None]
-        normal = self._turned @ self.weighted
-        band = np.zeros((BAND, 4 * p.nodes.size))
-        for k in range(BAND):
-            band[k, : band.shape[1] - k] = normal.diagonal(-k)
-        self.factor = cholesky_banded(band, lower=True)
-        mixed = self._turned @ self.border
-        self.mixed = self.solve(mixed)
-        schur = self.border.T @ self.border - mixed.T @ np.asarray(self.mixed)
-        self.covariance = np.linalg.pinv(schur, hermitian=True)
-        plain = self.solve(self._turned @ right)
-        self.constants = self.covariance @ (self.border.T @ right - mixed.T @ plain)
-        self.unknown = plain - self.mixed @ self.constants
-        self.residual = right - self.weighted @ self.unknown - self.border @ self.constants
-        other = p.group < CLOCK  # the walk of the clock and its anchor are one prior
-        determinant = np.log(self.factor[0]).sum() - np.log(weight[other]).sum()
-        determinant -= 0.5 * _prior(p, weight**2)
-        self.criterion = float(2.0 * determinant + (self.residual**2).sum())
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """N^-1 times columns."""
-        return cho_solve_banded((self.factor, True), right)
-
-    def leverage(self, probes: np.ndarray) -> np.ndarray:
-        """(equations, probes): whose mean is the leverage of each equation."""
-        return (self.weighted @ self.solve(self._turned @ probes)) * probes
+        self.std, self.system = std, System(p.equations, std**-2.0)
+        data = np.column_stack([p.right, p.border(clock)])
+        found = self.system.solve(data)
+        off = self.system.residual(data, found)
+        left, border, self._by_constants = off[:, 0], off[:, 1:], found[:, 1:]
+        self.covariance = np.linalg.pinv(border.T @ border, hermitian=True)
+        self.constants = self.covariance @ (border.T @ left)
+        self.clock = (found[:, 0] - self._by_constants @ self.constants)[CLOCKS][:-1]
+        self.residual = left - border @ self.constants
+        prior = sum(self.system.precision[g] * p.equations.normals[g] for g in (CLOCK, RATE))
+        factor = cholesky_banded(prior[::STATES, CLOCKS], lower=True)
+        self.criterion = self.system.deviance(self.residual) - 2.0 * float(np.log(factor[0]).sum())
 
     def mean_clock(self, weights: np.ndarray) -> np.ndarray:
         """(k,): standard deviation of weighted means (k, m) of the clock's rate at the nodes."""
-        right = np.zeros((self.unknown.size, weights.shape[0]))
-        right[3::4] = weights.T
-        found = self.solve(right)
-        by_constants = self.mixed.T @ right
-        variance = (right * found).sum(axis=0)
+        right = np.zeros((len(self._by_constants), weights.shape[0]))
+        right[CLOCKS] = weights.T
+        by_constants = self._by_constants.T @ right
+        variance = (right * self.system.inverse(right)).sum(axis=0)
         variance += (by_constants * (self.covariance @ by_constants)).sum(axis=0)
         return np.sqrt(variance)
 
 
-def _prior(p: PathProblem, precision: np.ndarray) -> float:
-    """log |Q| of the precision Q of the rates of the clock before anything is measured."""
-    walk, j = precision[p.group == CLOCK], p.pairs
-    band = np.zeros((2, p.nodes.size))
-    band[0] = precision[p.group == RATE]
-    band[0, j] += walk
-    band[0, j + 1] += walk
-    band[1, j] = -walk
-    return float(2.0 * np.log(cholesky_banded(band, lower=True)[0]).sum())
+def _normal(matrix: csr_array, root: np.ndarray) -> np.ndarray:
+    """(band, unknowns): lower band of M^T W M, in which two neighbouring nodes lie."""
+    normal = matrix.T @ (matrix * (root**2)[:, None])
+    band = np.zeros((2 * STATES, matrix.shape[1]))
+    for k in range(len(band)):
+        band[k, : band.shape[1] - k] = normal.diagonal(-k)
+    return band
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:

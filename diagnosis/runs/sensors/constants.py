@@ -1,7 +1,7 @@
 """What may be constantly wrong between two channels: how it would move or turn the ship that they tell.
 
-Of each kind one function, which registers itself. It gives the path that one unit of the fault adds to
-what velocity and yaw rate say, so that the fault is found by least squares together with all others.
+Each fault is a column: the path that one unit of it adds to what velocity and yaw rate say, so that it is
+found by least squares together with all others.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
     "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
     "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
 }
-# Smaller faults are not told, as they matter in no manoeuvre; metres and seconds are those of CyberShip
+# Smaller faults are not reported, as they matter in no manoeuvre; metres and seconds are those of CyberShip
 # Enterprise 1, times the scale of the ship. All chosen.
 LEAST_SCALE = 0.005  # of the channel
 LEAST_ANGLE = 0.0035  # rad, 0.2 deg
@@ -55,101 +55,53 @@ class Column(NamedTuple):
     clocked: bool = True
 
 
-Law = Callable[[Evidence, Scale], "Column | tuple[Column, ...]"]
-LAWS: list[tuple[Needs, Law]] = []
-
-
-def constant(needs: Needs) -> Callable[[Law], Law]:
-    """Register a constant fault; its function takes the evidence and the ship's scale."""
-
-    def register(law: Law) -> Law:
-        LAWS.append((needs, law))
-        return law
-
-    return register
-
-
 def columns(e: Evidence, scale: Scale) -> list[Column]:
     """All constant faults that the channels of a run can show."""
-    given = {"velocity": e.velocity is not None, "rate": e.rate is not None}
-    found = [law(e, scale) for needs, law in LAWS if given[needs]]
-    return [c for each in found for c in ((each,) if isinstance(each, Column) else each)]
+    late = LEAST_DELAY * float(np.median(np.diff(e.time[e.rows])))
+    return [*_of_velocity(e, scale, late), *_of_rate(e, scale, late)]
 
 
-def _path(e: Evidence, move: np.ndarray | None = None, turn: np.ndarray | None = None) -> np.ndarray:
+def _path(e: Evidence, move: np.ndarray | float = 0.0, turn: np.ndarray | float = 0.0) -> np.ndarray:
     path = np.zeros((e.time.size, 3))
-    if move is not None:
-        path[:, :2] = move
-    if turn is not None:
-        path[:, 2] = turn
+    path[:, :2], path[:, 2] = move, turn
     return path
 
 
-@constant("velocity")
-def speed_scale(e: Evidence, scale: Scale) -> Column:
-    """The velocity is measured too large by a factor 1 + value."""
-    assert e.by is not None
-    return Column(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST_SCALE)
-
-
-@constant("velocity")
-def axes(e: Evidence, scale: Scale) -> Column:
-    """Heading and the axes of the velocity differ: the heading is too large by the value."""
-    assert e.by is not None
-    channel = "psi" if e.by == ("u", "v") else e.by[1]
-    across = np.column_stack([e.gone[:, 1], -e.gone[:, 0]])
-    sign = 1.0 if channel != "y_dot" else -1.0
-    return Column(channel, "offset", "rad", "velocity", _path(e, sign * across), LEAST_ANGLE)
-
-
-@constant("velocity")
-def place(e: Evidence, scale: Scale) -> tuple[Column, Column]:
-    """The position is measured at a place that far ahead and to starboard of that of the velocity."""
-    c, s = np.cos(e.psi), np.sin(e.psi)
-    sides = (("x", np.column_stack([c, s])), ("y", np.column_stack([-s, c])))
-    made = [
-        Column(name, "place", "m", "velocity", _path(e, side), LEAST_PLACE * scale.length, False)
-        for name, side in sides
-    ]
-    return made[0], made[1]
-
-
-@constant("velocity")
-def velocity_delay(e: Evidence, scale: Scale) -> Column:
-    """The velocity is stamped later than the position by the value.
-
-    In the ship's own axes it is turned by the heading of now, so that what turns of the ship change in
-    the velocity over ground is not late.
-    """
-    assert e.by is not None
-    assert e.velocity is not None
-    path = _path(e, e.velocity)
+def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[Column]:
+    """Scale and axes of the velocity, the place of the position aboard, and the velocity's delay."""
+    if e.velocity is None or e.by is None:
+        return []
+    # The heading is too large by the value, or the axes of the velocity are turned.
+    axes = "psi" if e.by == ("u", "v") else e.by[1]
+    across = np.column_stack([e.gone[:, 1], -e.gone[:, 0]]) * (-1.0 if axes == "y_dot" else 1.0)
+    # The position is measured that far ahead and to starboard of where the velocity is.
+    c, s, place = np.cos(e.psi), np.sin(e.psi), LEAST_PLACE * scale.length
+    ahead, aside = (_path(e, np.column_stack(side)) for side in ((c, s), (-s, c)))
+    # In the ship's own axes the velocity is turned by the heading of now, so that what turns of the ship
+    # change in the velocity over ground is not late.
+    delay = _path(e, e.velocity)
     if e.by == ("u", "v"):
         mean, turn = 0.5 * (e.velocity[1:] + e.velocity[:-1]), np.diff(e.psi)
-        path[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
-    return Column(e.by[0], "delay", "s", "velocity", path, LEAST_DELAY * _period(e), False)
+        delay[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
+    return [
+        Column(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST_SCALE),
+        Column(axes, "offset", "rad", "velocity", _path(e, across), LEAST_ANGLE),
+        Column("x", "place", "m", "velocity", ahead, place, False),
+        Column("y", "place", "m", "velocity", aside, place, False),
+        Column(e.by[0], "delay", "s", "velocity", delay, late, False),
+    ]
 
 
-@constant("rate")
-def rate_scale(e: Evidence, scale: Scale) -> Column:
-    """The yaw rate is measured too large by a factor 1 + value."""
-    return Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST_SCALE)
-
-
-@constant("rate")
-def rate_offset(e: Evidence, scale: Scale) -> Column:
-    """The yaw rate is measured too large by the value."""
-    return Column(
-        "r", "offset", "rad/s", "rate", _path(e, turn=e.time[0] - e.time), LEAST_RATE * scale.rate
-    )
-
-
-@constant("rate")
-def rate_delay(e: Evidence, scale: Scale) -> Column:
-    """The yaw rate is stamped later than the heading by the value."""
-    assert e.rate is not None
-    path = _path(e, turn=e.rate)
-    return Column("r", "delay", "s", "rate", path, LEAST_DELAY * _period(e), False)
+def _of_rate(e: Evidence, scale: Scale, late: float) -> list[Column]:
+    """Scale, offset and delay of the yaw rate."""
+    if e.rate is None:
+        return []
+    offset = _path(e, turn=e.time[0] - e.time)
+    return [
+        Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST_SCALE),
+        Column("r", "offset", "rad/s", "rate", offset, LEAST_RATE * scale.rate),
+        Column("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
+    ]
 
 
 def deviations(e: Evidence) -> list[Column]:
@@ -165,8 +117,3 @@ def deviations(e: Evidence) -> list[Column]:
             path[:, :2] = integral(e.time, across)
         made.append(Column("psi", kind, "rad", "rate", path, LEAST_ANGLE, False))
     return made
-
-
-def _period(e: Evidence) -> float:
-    """Median time between two samples of the pose [s]."""
-    return float(np.median(np.diff(e.time[e.rows])))

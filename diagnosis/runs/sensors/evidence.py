@@ -7,11 +7,16 @@ import numpy as np
 
 from fmus.frames import rotate_to_earth
 
-from ..cleaning import in_order, lost, repeated
+from ..cleaning import in_order, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
 
-FEWEST = 60  # samples; chosen: an estimate of a few constants and of two noises
+FEWEST = 60  # samples or windows; chosen: an estimate of a few constants and of two noises
+SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
+BLOCKS = 20  # parts of a run whose spread gives a standard deviation; chosen
+AGREED = 0.7  # correlation from which on two channels tell of the same motion (chosen)
+# Of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
+STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
 VELOCITIES = (("u", "v"), ("x_dot", "y_dot"), ("speed", "course"))
 
@@ -106,3 +111,38 @@ def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.n
         course = np.interp(run.time, run.time[there], course)
         return np.column_stack([speed * np.cos(course), speed * np.sin(course)])
     return np.column_stack(rotate_to_earth(psi, _whole(run, "u"), _whole(run, "v")))
+
+
+def straight(rate: np.ndarray) -> np.ndarray:
+    """(n,): rows with a yaw rate (n,) of straight legs."""
+    return np.abs(rate) < STRAIGHT * np.quantile(np.abs(rate), 0.95)
+
+
+def spread_of(values: np.ndarray) -> float:
+    """Standard deviation of normal values about their median, by the median of their distances to it."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def blocked_fit(
+    columns: np.ndarray, right: np.ndarray, time: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares on a run whose errors last, and the standard deviation by the jackknife over its parts.
+
+    Args:
+        columns: (d n, k), what one unit of each unknown gives.
+        right: (d n,), d quantities one after the other.
+        time: (n,), of each of their rows [s].
+
+    Returns:
+        Two arrays (k,).
+    """
+    several = right.size // time.size
+    block = np.tile((BLOCKS * np.arange(time.size)) // time.size, several)
+
+    def solved(keep: np.ndarray) -> np.ndarray:
+        return np.linalg.lstsq(columns[keep], right[keep], rcond=None)[0]
+
+    value = solved(np.ones(right.size, bool))
+    parts = np.array([solved(block != k) for k in range(BLOCKS)])
+    std = np.sqrt((BLOCKS - 1) / BLOCKS * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))

@@ -1,32 +1,17 @@
 """All checks of a run's channels, each on what the ones before have repaired."""
 
-from collections.abc import Callable
-
 from fmus.scale import Scale
 
 from ..files.reading import Run
-from .accelerations import accelerations
+from .further_channels import accelerations, receivers, through_water
 from .motion import motion
-from .receivers import receivers
 from .sensor_finding import Examined
-from .through_water import through_water
 from .unit_faults import sway, units
 from .wraps import wraps
 
-# Each receives a run and the ship's scale; in the order in which one needs what others repair.
-CHECKS: tuple[Callable[[Run, Scale], Examined], ...] = (
-    wraps,
-    units,
-    sway,
-    receivers,
-    motion,
-    accelerations,
-    through_water,
-)
-
 
 def examine(run: Run, scale: Scale) -> Examined:
-    """Hold channels that say the same twice against each other.
+    """Cross-check channels that are redundant.
 
     Args:
         run: as it was read.
@@ -36,6 +21,7 @@ def examine(run: Run, scale: Scale) -> Examined:
         The run as far as its own channels repair it, and what they say of each other.
     """
     found = Examined(run)
-    for check in CHECKS:
+    # In the order in which one needs what others repair.
+    for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
         found = found.plus(check(found.run, scale))
     return found

@@ -4,15 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .evidence import Evidence
+from ..cleaning import LONG
+from .evidence import AGREED, Evidence, spread_of
 from .sensor_finding import Z95, SensorFinding
 
 FAR = 8.0  # robust standard deviations of how far steps differ from what the speed says (chosen)
 SHORTEST = 0.5  # s; a shorter jump does no harm (chosen)
 FAST = 3.0  # times the log's step: what is less is a clock that runs fast (chosen)
 STAND = 0.75  # of the log's step that no motion fills, where the log jumps ahead (chosen)
-LONG = 5.0  # sampling periods that the log's step has then; chosen
-ALIGNED = 0.7  # cosine between the jump and the way that the velocity says (chosen)
 LEAST_TURN = 0.1  # rad, of a heading that jumps along; chosen
 MOST_BEND = 1.5  # rad, half of the turn of a bend that is taken as even (chosen)
 # Windows elsewhere: times that are tried, from a share to a multiple of what the speed says; how many
@@ -63,10 +62,10 @@ def gaps(e: Evidence) -> list[Gap]:
     late = np.where(going, way / np.where(going, mean, 1.0) - step, 0.0)
     period = float(np.median(step))
     beyond = late * mean  # m; where a ship is slow, noise of the position is a long time
-    noise = 1.4826 * float(np.median(np.abs(beyond - np.median(beyond))))
-    aligned = (moved * said).sum(axis=1) > ALIGNED * way * np.hypot(*said.T)
+    noise = spread_of(beyond)
+    aligned = (moved * said).sum(axis=1) > AGREED * way * np.hypot(*said.T)
     turned = np.diff(e.psi[rows]) - np.diff(e.turned[rows])
-    least = FAR * 1.4826 * float(np.median(np.abs(turned - np.median(turned))))
+    least = FAR * spread_of(turned)
     # Position and heading jump together in time alone, however the ship went meanwhile.
     missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
     ahead = (late < -STAND * step) & (step > LONG * period)

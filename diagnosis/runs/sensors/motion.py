@@ -2,26 +2,25 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
+from scipy.special import chdtri
 
 from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
-from .clock_path import DRIFT, HEADING, TURN, PathProblem, Solution, integral_of
+from .clock_path import DRIFT, HEADING, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
-from .evidence import Evidence, evidence
+from .evidence import SURE, Evidence, evidence, straight
 from .gaps import Gap, gaps
 from .repairing import Correction, corrected
-from .sensor_finding import Z95, Examined, SensorFinding
+from .sensor_finding import Examined, SensorFinding
 
-SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
-# Fall of -2 log L by which a clock that wanders is believed: 0.1 % by chance is 10.8 for one variance.
-LIKELIER = 12.0
-DEVIATES = 20.0  # the same for the four coefficients of a compass' deviation: 0.1 % by chance is 18.5
+CHANCE = 5e-4  # of a fall of -2 log L by which a clock or a compass is found where it is sound (chosen)
 LEAST_CLOCK = 0.01  # of the rate: a clock that is nearer to one does no harm (chosen)
 STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
 TURNS = 0.02  # standard deviation of the yaw rate's scale up to which turns tell the clock (chosen)
@@ -36,7 +35,6 @@ TWO_CLOCKS = (
     "position and speed would need another clock than heading and yaw rate: something else is wrong "
     "there, such as a filter, or values that were held, and nothing but a delay is repaired"
 )
-STRAIGHT = 0.2  # of the largest yaw rate: rows that turn less are on straight legs (chosen)
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
 LEAST_NOISE = 1e-6  # m, rad; keeps the equations well-posed where nothing is noisy
 
@@ -54,7 +52,7 @@ class Motion(NamedTuple):
     """
 
     problem: PathProblem
-    solution: Solution
+    solution: Path
     wanders: bool
     kept: list[Column]
     either: bool = False
@@ -130,7 +128,8 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
         loose = wandering.solve()
     problem = PathProblem(e, every, sizes, cut, without)
     columns, solution = list(every), problem.solve(fixed_clock=True)
-    wanders = solution.criterion - loose.criterion > LIKELIER
+    likelier, deviates = (float(chdtri(k, CHANCE)) for k in (1, len(DEVIATIONS)))
+    wanders = solution.criterion - loose.criterion > likelier
     wanders = wanders and _uneven(Motion(wandering, loose, True, []))
     if wanders:
         problem, columns, solution = wandering, free, loose
@@ -140,7 +139,7 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Mo
         deviating = [*every, *deviations(e)]
         even = PathProblem(e, deviating, sizes, cut, without)
         told = even.solve(fixed_clock=True)
-        either = told.criterion + DEVIATES < solution.criterion + LIKELIER * wanders
+        either = told.criterion + deviates < solution.criterion + likelier * wanders
         if either and swung:
             problem, columns, solution, wanders, either = even, deviating, told, False, False
     either = either or (wanders and e.velocity is None)  # nor does a way tell of it
@@ -161,7 +160,7 @@ def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
     return [c for c in every if (c.channel, c.kind) != (named, "scale")]
 
 
-def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
+def _sure(every: Sequence[Column], solution: Path) -> list[Column]:
     std = np.sqrt(np.diag(solution.covariance))
     return [
         c
@@ -172,32 +171,22 @@ def _sure(every: Sequence[Column], solution: Solution) -> list[Column]:
 
 def _clock(found: Motion) -> list[SensorFinding]:
     """The stretches in which a clock that wanders is off; or its even rate, where all channels agree."""
-    if found.wanders:
-        stretches = [_rate(*each) for each in _stretches(found)]
-        if not found.either:
-            return stretches
-        alike, or_else = tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}"
-        return [
-            replace(each, alike=alike, repaired=False, sentence=each.sentence + or_else)
-            for each in stretches
-        ]
-    scales = _even(found)
-    if scales is None:
-        return []
-    value, s = scales
-    begin, end = found.problem.edges[[0, -1]].tolist()
-    text = f"the log's clock is off throughout: {value:.4g} s pass in a second of it, by speed and turn"
-    interval = value - Z95 * s, value + Z95 * s
-    alike = ("scale of all speeds and rates",)
-    return [SensorFinding("time", "clock_rate", value, "1", interval, begin, end, text, alike)]
-
-
-def _rate(begin: float, end: float, value: float, s: float) -> SensorFinding:
-    """A stretch in which the clock is off."""
-    way = "slow" if value > 1.0 else "fast"
-    text = f"the log's clock runs {way}: {value:.3g} s pass in a second of it"
-    interval = value - Z95 * s, value + Z95 * s
-    return SensorFinding("time", "clock_rate", value, "1", interval, begin, end, text)
+    clock = ("time", "clock_rate", "1")
+    if not found.wanders:
+        scales, text = _even(found), "the log's clock is off throughout: {:.4g} s pass in a second of it"
+        if scales is None:
+            return []
+        text = text.format(scales[0]) + ", by speed and turn"
+        alike = ("scale of all speeds and rates",)
+        return [SensorFinding.estimated(clock, *scales, found.problem.edges, text, alike)]
+    alike, or_else = (tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}") if found.either else ((), "")
+    made = []
+    for begin, end, value, s in _stretches(found):
+        way = "slow" if value > 1.0 else "fast"
+        text = f"the log's clock runs {way}: {value:.3g} s pass in a second of it{or_else}"
+        ends = np.array([begin, end])
+        made.append(SensorFinding.estimated(clock, value, s, ends, text, alike, not found.either))
+    return made
 
 
 def _even(found: Motion) -> tuple[float, float] | None:
@@ -213,23 +202,22 @@ def _even(found: Motion) -> tuple[float, float] | None:
 
 
 def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
-    begin, end = found.problem.edges[[0, -1]].tolist()
     by_clock = _even(found) is not None
     turns = e.rate is not None and _turning(found)
     made = []
     for c, x, s in zip(found.kept, found.solution.constants.tolist(), found.std.tolist(), strict=True):
-        if c.kind == "scale" and by_clock:
-            continue
-        value, half = (1.0 / (1.0 - x), Z95 * s / (1.0 - x) ** 2) if c.kind == "scale" else (x, Z95 * s)
-        # No speed tells whether the clock is at fault; nearer to one it does no harm.
-        only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
-        alone = c.kind == "scale" and not found.wanders and (only or not turns)
-        alike = ("clock_rate",) if alone else ()
-        text = _told(c, value, e) + (f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}" if alone else "")
-        interval = value - half, value + half
-        made.append(
-            SensorFinding(c.channel, c.kind, value, c.unit, interval, begin, end, text, alike, not alone)
-        )
+        value, std, text, alike = x, s, "", ()
+        if c.kind == "scale":
+            if by_clock:
+                continue
+            value, std = 1.0 / (1.0 - x), s / (1.0 - x) ** 2
+            # No speed tells whether the clock is at fault; nearer to one it does no harm.
+            only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
+            if not found.wanders and (only or not turns):
+                alike, text = ("clock_rate",), f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}"
+        fault, edges = (c.channel, c.kind, c.unit), found.problem.edges
+        text = _told(c, value, e) + text
+        made.append(SensorFinding.estimated(fault, value, std, edges, text, alike, not alike))
     return made
 
 
@@ -278,7 +266,7 @@ def _blocks(found: Motion) -> _Blocks:
     weights /= weights.sum(axis=1)[:, None]
     first = np.array([edges[np.flatnonzero(w)[0]] for w in weights])
     last = np.array([edges[np.flatnonzero(w)[-1] + 1] for w in weights])
-    return _Blocks(weights[:, :-1] @ clock, found.solution.system.mean_clock(weights), first, last)
+    return _Blocks(weights[:, :-1] @ clock, found.solution.mean_clock(weights), first, last)
 
 
 def _uneven(found: Motion) -> bool:
@@ -314,18 +302,14 @@ def _stretches(found: Motion) -> list[tuple[float, float, float, float]]:
     """Begin, end [s] and mean rate of the clock with its standard deviation, where it is off."""
     mean, std, first, last = _blocks(found)
     off = np.where(np.abs(mean - 1.0) > np.maximum(SURE * std, LEAST_CLOCK), np.sign(mean - 1.0), 0.0)
-    found_at, k = [], 0
-    while k < off.size:
-        end = k
-        while end + 1 < off.size and off[end + 1] == off[k]:
-            end += 1
-        if off[k]:
-            of = slice(k, end + 1)
-            value = float(np.average(mean[of], weights=last[of] - first[of]))
-            s = float(np.sqrt((std[of] ** 2).sum()) / (end + 1 - k))
-            found_at.append((float(first[k]), float(last[end]), value, s))
-        k = end + 1
-    return found_at
+    made = []
+    for way, group in groupby(range(off.size), key=lambda k: off[k]):
+        of = list(group)
+        if way:
+            value = float(np.average(mean[of], weights=(last - first)[of]))
+            s = float(np.sqrt((std[of] ** 2).sum()) / len(of))
+            made.append((float(first[of[0]]), float(last[of[-1]]), value, s))
+    return made
 
 
 def _leeway(e: Evidence) -> tuple[str, ...]:
@@ -333,18 +317,17 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
     if e.by != ("u", "v") or e.rate is None:
         return ()
     u, v = e.run.measured["u"][e.rows], e.run.measured["v"][e.rows]
-    rate = np.abs(e.rate[e.rows])
     fast = np.abs(u) > 0.5 * np.nanquantile(np.abs(u), 0.9)
-    straight = fast & (rate < STRAIGHT * np.quantile(rate, 0.98))
-    if straight.sum() < len(e.rows) // 20:
+    legs = fast & straight(e.rate[e.rows])
+    if legs.sum() < len(e.rows) // 20:
         return ()
-    angle = np.arctan2(v[straight], np.abs(u[straight]))
+    angle = np.arctan2(v[legs], np.abs(u[legs]))
     middle, spread = float(np.median(angle)), float(np.median(np.abs(angle - np.median(angle))))
     if not max(LEAST_LEEWAY, 2.0 * spread) < abs(middle) < MOST_LEEWAY:
         return ()
     return (
         f"on straight legs the ship goes {np.degrees(middle):.2g}° to one side: the heading's axis is "
-        "off, or a force pushes to that side; position, speed and heading cannot tell these apart",
+        "off, or a force acts to that side; position, speed and heading cannot discriminate these",
     )
 
 

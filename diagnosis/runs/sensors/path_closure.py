@@ -6,11 +6,11 @@ import numpy as np
 
 from fmus.scale import Scale
 
+from ..cleaning import LONG
 from ..files.reading import Run
 from .evidence import Evidence, evidence
 from .wraps import wraps
 
-LONGEST = 5.0  # times the usual step between two samples; over a longer one nothing is compared (chosen)
 TURNING = 0.5  # of the largest mean yaw rate of a window, from which on it counts as a turn (chosen)
 
 
@@ -54,7 +54,7 @@ def _windows(e: Evidence, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """First and last rows of windows without a gap."""
     time = e.time[e.rows]
     steps = np.diff(time)
-    part = np.concatenate([[0], np.cumsum(steps > LONGEST * np.median(steps))])
+    part = np.concatenate([[0], np.cumsum(steps > LONG * np.median(steps))])
     end = np.searchsorted(time, time + seconds)
     begin = np.flatnonzero(end < time.size)
     begin = begin[part[begin] == part[end[begin]]]

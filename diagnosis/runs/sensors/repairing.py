@@ -9,11 +9,10 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 
 from ..files.reading import Run
 from .constants import DEVIATIONS
-from .evidence import Evidence
+from .evidence import Evidence, straight
 from .gaps import Gap
 
 TWICE = 2.0  # times nearer to no leeway, from which on an axis is taken as the right one (chosen)
-MOST_LEGS = 0.3  # of the largest yaw rate: rows that turn less are straight enough (chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +80,9 @@ def heading_is_off(e: Evidence, offset: float) -> bool:
         offset: by which heading and axes of the velocity differ [rad].
     """
     assert e.velocity is not None
-    rate = np.abs(np.gradient(e.psi, e.time)) if e.rate is None else np.abs(e.rate)
-    straight = rate <= MOST_LEGS * np.quantile(rate, 0.95)
+    legs = straight(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
     u, v = rotate_to_body(e.psi, *e.velocity.T)
-    leeway = float(np.median(np.arctan2(v, np.abs(u))[straight]))
+    leeway = float(np.median(np.arctan2(v, np.abs(u))[legs]))
     return TWICE * abs(leeway) < abs(leeway - offset)
 
 

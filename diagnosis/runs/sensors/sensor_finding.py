@@ -1,11 +1,16 @@
 """What redundant channels say of each other."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
 
 from ..files.reading import Run
 from .constants import Kind
 
 Z95 = 1.96  # standard deviations, 95 % of a normal distribution
+MOST_STRETCHES = 3  # of a clock, each with its line; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +41,22 @@ class SensorFinding:
     alike: tuple[str, ...] = ()
     repaired: bool = True
 
+    @classmethod
+    def estimated(
+        cls,
+        fault: tuple[str, Kind, str],
+        value: float,
+        std: float,
+        time: np.ndarray,
+        sentence: str,
+        alike: tuple[str, ...] = (),
+        repaired: bool = True,
+    ) -> "SensorFinding":
+        """A fault (channel, kind, unit) with a normal error, between the first and last of some times [s]."""
+        interval, (channel, kind, unit) = (value - Z95 * std, value + Z95 * std), fault
+        ends = float(time[0]), float(time[-1])
+        return cls(channel, kind, value, unit, interval, *ends, sentence, alike, repaired)
+
 
 @dataclass(frozen=True, eq=False)
 class Examined:
@@ -45,8 +66,8 @@ class Examined:
         run: as far as it could be repaired by them.
         findings: faults.
         notes: what else is to be said, a line each.
-        agreeing: channels beside the pose that agree with it -> standard deviation of their mean over
-            the time between two samples of the pose, in SI.
+        agreeing: channels in addition to the pose that agree with it -> standard deviation of their mean
+            over the time between two samples of the pose, in SI.
     """
 
     run: Run
@@ -56,9 +77,36 @@ class Examined:
 
     def plus(self, other: "Examined") -> "Examined":
         """What was found first, and then."""
-        return Examined(
-            other.run,
-            self.findings + other.findings,
-            self.notes + other.notes,
-            self.agreeing | other.agreeing,
-        )
+        findings, notes = self.findings + other.findings, self.notes + other.notes
+        return Examined(other.run, findings, notes, self.agreeing | other.agreeing)
+
+
+class Told(Protocol):
+    """What is needed of a finding, or of its result in a file."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def value(self) -> float | None: ...
+    @property
+    def start(self) -> float | None: ...
+    @property
+    def end(self) -> float | None: ...
+    @property
+    def sentence(self) -> str: ...
+    @property
+    def repaired(self) -> bool: ...
+
+
+def sensor_lines(found: Iterable[Told]) -> Iterator[str]:
+    """A line for each fault; many stretches of a clock share one."""
+    found = list(found)
+    rates = [f for f in found if f.kind == "clock_rate"]
+    if len(rates) > MOST_STRETCHES:
+        values = [f.value for f in rates if f.value is not None]
+        span = f"{min(values):.3g} to {max(values):.3g} s pass in a second of it"
+        yield f"the log's clock runs unevenly: {span}, in {len(rates)} stretches"
+        found = [f for f in found if f.kind != "clock_rate"]
+    for f in found:
+        when = f", {f.start:.1f} to {f.end:.1f} s" if f.kind == "clock_rate" else ""
+        yield f"{f.sentence}{when}{'' if f.repaired else ' (not repaired)'}"

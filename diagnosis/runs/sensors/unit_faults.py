@@ -11,16 +11,14 @@ from fmus.scale import Scale
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from .blocked_fit import SURE, blocked_fit
-from .evidence import Evidence, evidence, integral
-from .sensor_finding import Z95, Examined, SensorFinding
+from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, spread_of
+from .sensor_finding import Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
 MOST = 0.35  # a factor nearer to one than this is a scale, and is estimated with all else (chosen)
 NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
 FEWEST = 8  # windows; chosen
 SIGN = "the other sign"  # and nothing else
-AGREED = 0.7  # correlation from which on two channels tell of the same (chosen)
 OPPOSITE = "its sign is the other one"
 
 
@@ -60,10 +58,9 @@ def mirrored(run: Run) -> Examined:
         other = replace(run, pose=pose)
         meant = evidence(other)
         if meant is not None and _both_agree(meant):
-            ends = float(e.time[0]), float(e.time[-1])
             text = f"{name} contradicts u, v and r: {OPPOSITE}"
-            finding = SensorFinding(name, "scale", -1.0, "1", (-1.0, -1.0), *ends, text)
-            return Examined(other, (finding,))
+            fault = (name, "scale", "1")
+            return Examined(other, (SensorFinding.estimated(fault, -1.0, 0.0, e.time, text),))
     return Examined(run)
 
 
@@ -99,10 +96,9 @@ def sway(run: Run, scale: Scale) -> Examined:
     value, std = blocked_fit(columns, way.T.ravel(), np.arange(len(way)))
     if not value[1] < -SURE * std[1]:
         return Examined(run)
-    half = Z95 * std[1] / value[1] ** 2
-    factor, ends = 1.0 / value[1], (float(e.time[0]), float(e.time[-1]))
-    text = f"v is {factor:.3g} times what the pose says: {OPPOSITE}"
-    finding = SensorFinding("v", "scale", factor, "1", (factor - half, factor + half), *ends, text)
+    text = f"v is {1.0 / value[1]:.3g} times what the pose says: {OPPOSITE}"
+    factor, s = float(1.0 / value[1]), float(std[1] / value[1] ** 2)
+    finding = SensorFinding.estimated(("v", "scale", "1"), factor, s, e.time, text)
     return Examined(replace(run, measured=dict(run.measured) | {"v": -run.measured["v"]}), (finding,))
 
 
@@ -144,16 +140,13 @@ def _judged(
     if abs(middle - 1.0) < MOST:
         return found
     value = 1.0 / middle
-    half = Z95 * 1.4826 * float(np.median(np.abs(1.0 / ratio - value))) / np.sqrt(ratio.size)
+    s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
     name, factor = _nearest(abs(value), unit_factors(quantity))
     true = np.copysign(factor, value) if name else value
     text = f"{told} is {value:.4g} times what the pose says"
     text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
     measured = dict(found.run.measured) | {n: found.run.measured[n] / true for n in names}
-    begin, end = float(e.time[0]), float(e.time[-1])
-    finding = SensorFinding(
-        names[0], "scale", value, "1", (value - half, value + half), begin, end, text
-    )
+    finding = SensorFinding.estimated((names[0], "scale", "1"), value, s, e.time, text)
     return replace(found, run=replace(found.run, measured=measured), findings=(*found.findings, finding))
 
 

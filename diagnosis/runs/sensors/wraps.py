@@ -31,11 +31,9 @@ def wraps(run: Run, scale: Scale) -> Examined:
             pose[:, 2] = repaired
         else:
             measured[name] = repaired
-        first, last = float(run.time[rows[0]]), float(run.time[rows[-1]])
         text = f"{name} was interpolated where it wraps, in {rows.size} rows"
-        findings.append(
-            SensorFinding(name, "wrap", float(rows.size), "1", (rows.size, rows.size), first, last, text)
-        )
+        fault, many = (name, "wrap", "1"), float(rows.size)
+        findings.append(SensorFinding.estimated(fault, many, 0.0, run.time[rows], text))
     if not findings:
         return Examined(run)
     return Examined(replace(run, pose=pose, measured=measured), tuple(findings))

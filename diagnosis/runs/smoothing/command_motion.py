@@ -7,7 +7,7 @@ on evenly spaced times, of commands that are held from row to row.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -123,9 +123,8 @@ class Commands:
         row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
         return self._impulses[row] + run.tau_cmd[row] * (time - run.time[row])[:, None]
 
-    def sampled(self, x: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
-        """Signals (m, k) at the run's rows."""
-        time = self.track.run.time[rows]
+    def sampled(self, x: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Signals (m, k) at times [s]."""
         return np.column_stack([np.interp(time, self.even, column) for column in x.T])
 
     def motion(self, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +150,9 @@ class Commands:
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
-        eta, eta_dot, eta_ddot = (_channels(self.sampled(each)) for each in (x, x_dot, x_ddot))
+        eta, eta_dot, eta_ddot = (
+            _channels(self.sampled(each, self.track.run.time)) for each in (x, x_dot, x_ddot)
+        )
         return CommandResponse(eta, eta_dot, eta_ddot, delay)
 
 

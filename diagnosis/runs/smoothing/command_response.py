@@ -20,6 +20,7 @@ import numpy as np
 from .command_motion import CommandResponse, Commands
 from .delay import Regression, likeliest_delay
 from .likelihood import adapt, deviance, likeliest
+from .outliers import Inliers
 from .penalised import Fit, Problem, solve
 
 ROUNDS = 3  # of gains and smoothness in turn; further ones change neither (chosen)
@@ -30,40 +31,34 @@ BETTER = 1e-3
 
 
 def with_commands(
-    even: Problem,
-    alone: Problem,
-    smoothness: np.ndarray,
-    fit: Fit,
-    weights: np.ndarray,
-    commands: Commands,
-) -> tuple[Problem, np.ndarray, Fit, CommandResponse]:
-    """A smoothing spline beside the response to the commands, if that is likelier than a spline alone.
+    p: Problem, alone: Inliers, fit: Fit, commands: Commands
+) -> tuple[Problem, np.ndarray, CommandResponse]:
+    """A smoothing spline in addition to the response to the commands, if that is likelier than it alone.
 
     Args:
-        even: the pose, with an even penalty.
-        alone: with the penalty of a spline that knows of no commands.
-        smoothness, fit: (3,), of that spline, and the spline.
-        weights: (n,), of the samples.
+        p: the pose, with an even penalty.
+        alone, fit: splines that know of no commands.
         commands: commands and headings.
 
     Returns:
-        What is left beside the response, its smoothness (3,) and spline, and the response.
+        What is left by the response, its smoothness (3,), and the response.
     """
-    response = CommandResponse.none(commands.psi.size)
-    least = deviance(even, weights, likeliest(even, weights, smoothness)) - PARAMETERS
-    delay, sure = likeliest_delay(Regression(even, fit, commands))
-    rest, smoother, near = even, smoothness, None
+    weights, run = alone.weights, commands.track.run
+    time = run.time[p.rows] - run.time[0]
+    near = likeliest(p, weights, alone.even)
+    least = deviance(p, weights, near) - PARAMETERS
+    delay, sure = likeliest_delay(Regression(p, fit, commands, time))
+    found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
-        gains = Regression(even, fit, commands).gains(delay)
-        tried = commands.response(gains, delay)._replace(sure=sure)
-        left = even._replace(z=even.z - tried.eta[even.rows])
-        near = likeliest(left, weights, near)
-        cost = deviance(left, weights, near)
+        response = commands.response(Regression(p, fit, commands, time).gains(delay), delay)
+        rest = p._replace(z=p.z - response.eta[p.rows])
+        near = likeliest(rest, weights, near)
+        cost = deviance(rest, weights, near)
         if cost >= least:
             break
-        rest, smoother, response, least = left, near, tried, cost - BETTER
-        fit = solve(rest, smoother, weights)
-    if rest is even:
-        return alone, smoothness, fit, response
-    adapted, smoother = adapt(rest, smoother, weights)
-    return adapted, smoother, solve(adapted, smoother, weights), response
+        found, least = (rest, near, response._replace(sure=sure)), cost - BETTER
+        fit = solve(rest, near, weights)
+    if found is None:
+        return alone.problem, alone.smoothness, CommandResponse.none(commands.psi.size)
+    rest, near, response = found
+    return *adapt(rest, near, weights), response

@@ -18,8 +18,8 @@ from scipy.linalg import LinAlgError
 from scipy.special import stdtrit
 
 from .command_motion import Commands
-from .penalised import Fit, Problem
-from .spline import POINTS
+from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
+from .spline import basis, knots, middles, roughness
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 COARSE = 0.2  # s, between the delays that are tried first
@@ -43,10 +43,11 @@ class Regression:
         problem: the pose.
         fit: a smoothing spline of it.
         commands: commands and headings.
+        time: (n,), of the pose, since the run's start [s].
     """
 
-    def __init__(self, problem: Problem, fit: Fit, commands: Commands) -> None:
-        self.problem, self.fit, self.commands = problem, fit, commands
+    def __init__(self, problem: Problem, fit: Fit, commands: Commands, time: np.ndarray) -> None:
+        self.problem, self.fit, self.commands, self.time = problem, fit, commands, time
         self.time_scale = commands.track.scale.time
         pose = [self._residual(c, problem.z[:, [c]]) for c in range(3)]
         self.pose = np.vstack(pose[:2]), pose[2]
@@ -61,9 +62,9 @@ class Regression:
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r(A) for unit gains of commands tau (m, 3): of the plane, north above east, and of yaw."""
-        commands, rows = self.commands, self.problem.rows
-        ahead = commands.sampled(commands.motion(commands.rotation[:, None] * tau)[0], rows)
-        yaw = commands.sampled(commands.motion(tau)[0], rows)
+        commands, time = self.commands, self.time + self.commands.track.run.time[0]
+        ahead = commands.sampled(commands.motion(commands.rotation[:, None] * tau)[0], time)
+        yaw = commands.sampled(commands.motion(tau)[0], time)
         # A force to starboard moves the ship as one ahead does, a right angle further.
         north, east = np.real(ahead), np.imag(ahead)
         plane = {0: np.hstack([north, -east]), 1: np.hstack([east, north])}
@@ -74,19 +75,40 @@ class Regression:
 
     def _residual(self, channel: int, x: np.ndarray) -> np.ndarray:
         """r(x) of signals (n, k) in a channel, in units of the noise."""
-        system = self.fit.systems[channel]
-        return np.vstack(system.residual(x, system.solve(x))) / self.problem.sigma[channel]
+        system, y = self.fit.systems[channel], self.problem.data(channel, x)
+        return system.residual(y, system.solve(y))
 
     @property
     def block(self) -> np.ndarray:
         """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
-        grid, run = self.problem.grid, self.commands.track.run
-        stretches = zip(grid.start, grid.intervals, strict=True)
-        middle = [start + (np.arange(n) + 0.5) * grid.spacing for start, n in stretches]
-        time = [run.time[self.problem.rows] - run.time[0], np.repeat(np.concatenate(middle), POINTS)]
-        return np.unique(
-            np.floor(np.concatenate(time) / (LATENESS_BLOCK * self.time_scale)), return_inverse=True
-        )[1]
+        spline = self.problem.spline
+        rows = np.concatenate([self.time, roughness(spline.grid, spline.stiffness[0])[1]])
+        return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
+
+    def thinned(self) -> "Regression":
+        """The same on means of the pose over :data:`NOTICED` seconds, where a spline with such knots does.
+
+        It does if its time constant, its spacing times the sixth root of its smoothness, is no shorter.
+        """
+        p, spline = self.problem, self.problem.spline
+        systems, grid = self.fit.systems, spline.grid
+        many = int(NOTICED * self.time_scale / grid.spacing)
+        smoothness = np.array([s.precision[JERK] / s.precision[POSE] for s in systems]) / many**5.0
+        if many < 2 or (smoothness < 1.0).any():
+            return self
+        coarse = knots(grid.start, grid.end, many * grid.spacing)
+        part = np.unique(basis(coarse, self.time).first, return_inverse=True)[1]
+        weights = systems[0].equations.root[: part.size] ** 2
+        counts = np.bincount(part, weights)
+        there = counts > 0.0
+        time, *z = (np.bincount(part, weights * x)[there] / counts[there] for x in (self.time, *p.z.T))
+        at, to = (middles(each) for each in (grid, coarse))
+        stiffness = np.array([np.interp(to, at, each) for each in spline.stiffness])
+        thin = p._replace(
+            z=np.column_stack(z),
+            spline=Spline(coarse, basis(coarse, time), stiffness, Rates.none(coarse)),
+        )
+        return Regression(thin, solve(thin, smoothness, counts[there]), self.commands, time)
 
 
 def size_of(a: np.ndarray) -> np.ndarray:
@@ -143,7 +165,7 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
     logarithm of their number) is zero.
     """
-    period, lateness = regression.commands.track.period, Lateness(regression)
+    period, lateness = regression.commands.track.period, Lateness(regression.thinned())
     coarse, longest, fine, noticed = (
         x * regression.time_scale for x in (COARSE, LONGEST, FINE, NOTICED)
     )

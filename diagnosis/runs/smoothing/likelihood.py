@@ -9,30 +9,35 @@ As the minimum over c does not move to first order, its derivative is
 
     d(-2 log L) / d(log s) = s tr(A^-1 K) - rank(K) + s c^T K c / sigma^2.
 
-A coarse minimisation finds the valley, and the root of this derivative its bottom, to rounding.
+It is zero where the roughness s c^T K c / sigma^2 has its expected value rank(K) - s tr(A^-1 K). The
+logarithm of their ratio is nearly linear in log s, and its root, the bottom of a valley of -2 log L, is found
+to rounding.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 from scipy.linalg import LinAlgError
 from scipy.ndimage import uniform_filter1d
-from scipy.optimize import brentq, minimize_scalar, root_scalar
+from scipy.optimize import brentq, minimize_scalar
 
-from .penalised import Equations, Problem, System, Weighted, solve
+from .penalised import JERK, Equations, Problem, System, solve
 from .spline import third
 
 ADAPTIONS = 2  # rounds of adapting the penalty; a third changes less than the noise does (chosen)
 LEAST_JERK = 0.2  # of the mean square: where there is none, it may yet begin (chosen)
-DECADES = (
-    -8.0,
-    8.0,
-)  # of the smoothness: from none at all to motions slower than 7 s at knots of 0.05 s
-COARSE = 0.1  # decades, of the search for the valley; its bottom is a root
-# Decades, of the secant method's last step: it converges with order 1.6, and stands at rounding then.
-LAST_STEP = 1e-7
+# Decades of the smoothness: from none at all to motions slower than 7 s at knots of 0.05 s.
+DECADES = (-8.0, 8.0)
+# By decade, growth of the logarithm of the roughness over its expected value for white jerk: 5/6 log 10, the
+# ratio of the integrals of h^2 and h over all frequencies w, with h = 1 / (1 + w^6).
+GROWTH = 1.9
+COARSE = 1.0  # decades, of the search for the valley and of the first step in it (chosen)
+BEYOND = 1.5  # times the distance that this tells: the root then lies between (chosen)
+# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three errors, 1e-7.
+LAST_STEP = 3e-4
+MOST_STEPS = 10  # of it, before the slower method of Brent; three are the rule (chosen)
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
@@ -43,89 +48,102 @@ def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -
         weights: (n,), of the samples.
         near: (3,), smoothness to begin the search with; None: everywhere.
     """
-    starts = (None, None, None) if near is None else np.log10(near).tolist()
-    shared = Weighted(p, weights)
-    return 10.0 ** np.array([Criterion(shared, k).minimum(starts[k]) for k in range(3)])
+    starts = [None] * 3 if near is None else np.log10(near).tolist()
+    return 10.0 ** np.array(
+        [c.minimum(start) for c, start in zip(criteria(p, weights), starts, strict=True)]
+    )
 
 
 def deviance(p: Problem, weights: np.ndarray, smoothness: np.ndarray) -> float:
     """-2 log L at a smoothness (3,), the sum of all channels."""
-    shared = Weighted(p, weights)
-    return sum(Criterion(shared, k).cost(float(np.log10(smoothness[k]))) for k in range(3))
+    decades = np.log10(smoothness).tolist()
+    return sum(c.cost(at) for c, at in zip(criteria(p, weights), decades, strict=True))
+
+
+def criteria(p: Problem, weights: np.ndarray) -> list["Criterion"]:
+    """-2 log L of each channel, for weights (n,) of the samples."""
+    return [Criterion(p, k, e) for k, e in enumerate(p.equations(weights))]
 
 
 class Criterion:
     """-2 log L of one channel over its smoothness, in decades.
 
     Args:
-        w: problem and weights.
+        p: problem.
         channel: 0 to 2.
+        equations: of the channel.
     """
 
-    def __init__(self, w: Weighted, channel: int) -> None:
-        p = w.problem
-        self._equations, self._rank = Equations(w, channel), p.grid.rank
-        self._z, self._variance = p.right(channel), p.sigma[channel] ** 2
+    def __init__(self, p: Problem, channel: int, equations: Equations) -> None:
+        self._problem, self._channel, self._equations = p, channel, equations
+        self._y = p.data(channel, p.z[:, [channel]])
 
-    def _parts(self, decades: float) -> tuple[System, float, float]:
-        """The system, and the sums of squares of residuals and roughness in units of the noise."""
-        system = System(self._equations, 10.0**decades)
-        off, rough = system.residual(self._z, system.solve(self._z))
-        return system, float(np.sum(off**2)) / self._variance, float(np.sum(rough**2)) / self._variance
+    def _solved(self, decades: float) -> tuple[System, np.ndarray]:
+        """The system, and its residuals (rows, 1)."""
+        system = System(self._equations, self._problem.precision(self._channel, 10.0**decades))
+        return system, system.residual(self._y, system.estimate(self._y))
 
     def cost(self, decades: float) -> float:
         """-2 log L, infinite where the spline is not determined."""
         try:
-            system, off, rough = self._parts(decades)
+            system, off = self._solved(decades)
         except LinAlgError:
             return np.inf
-        return system.log_determinant - self._rank * np.log(system.smoothness) + off + rough
+        return system.deviance(off)
 
-    def slope(self, decades: float) -> float:
-        """d(-2 log L) / d(log s), with the natural logarithm.
+    def excess(self, decades: float) -> float:
+        """Logarithm of the roughness over its expected value; of the sign of d(-2 log L) / d(log s).
 
         Raises:
             LinAlgError: the spline is not determined.
         """
-        system, _, rough = self._parts(decades)
-        found = system.trace - self._rank + rough
-        if not np.isfinite(found):
+        system, off = self._solved(decades)
+        e = self._equations
+        found = float(np.sum(off[e.group == JERK] ** 2))
+        expected = float(e.counts[JERK]) - system.trace(JERK)
+        if not (np.isfinite(found) and expected > 0.0):
             raise LinAlgError("the likelihood of its smoothness is not finite")
-        return found
+        return float(np.log(found / expected)) if found > 0.0 else -np.inf
 
     def minimum(self, near: float | None) -> float:
-        """Where it is least [decades]; searched from nearby or, with None, everywhere."""
+        """Where it is least [decades]; searched downhill from nearby or, with None, everywhere."""
         if near is None:
-            search = {"bounds": DECADES, "method": "bounded", "options": {"xatol": COARSE}}
-            found: Any = minimize_scalar(self.cost, **search)
+            found: Any = minimize_scalar(
+                self.cost, bounds=DECADES, method="bounded", options={"xatol": COARSE}
+            )
             near = float(found.x)
-        return _bottom(cache(self.slope), near)
-
-
-def _bottom(slope: Callable[[float], float], near: float) -> float:
-    """Where a slope goes from negative to positive, searched downhill from nearby, or the bound."""
-    ahead = 1.0 if slope(near) < 0.0 else -1.0
-    before, step = near, COARSE
-    while True:
-        try:
-            beyond = min(max(before + ahead * step, DECADES[0]), DECADES[1])
-            passed = slope(beyond) * ahead >= 0.0
-        except LinAlgError:  # so little smoothing that the spline is not determined
-            return before
-        if passed:
-            break
-        if beyond in DECADES:
-            return beyond
-        before, step = beyond, 2.0 * step
-    found: Any = root_scalar(slope, x0=before, x1=beyond, method="secant", xtol=LAST_STEP)
-    if found.converged and min(before, beyond) <= found.root <= max(before, beyond):
-        return float(found.root)
-    between: Any = brentq(slope, before, beyond, xtol=LAST_STEP**1.5)
-    return float(between)
+        excess = cache(self.excess)
+        before, step = near, float(np.clip(-BEYOND / GROWTH * excess(near), -COARSE, COARSE))
+        if abs(step) < LAST_STEP**2:
+            return near
+        while True:
+            try:
+                beyond = float(np.clip(before + step, *DECADES))
+                passed = excess(beyond) * step >= 0.0
+            except LinAlgError:  # so little smoothing that the spline is not determined
+                return before
+            if passed:
+                break
+            if beyond in DECADES:
+                return beyond
+            before, step = beyond, 2.0 * step
+        tried = {excess(x): x for x in (before, beyond)}
+        for _ in range(MOST_STEPS):
+            nearest = sorted(tried, key=abs)[:3]
+            root = float(KroghInterpolator(nearest, [tried[f] for f in nearest])(0.0))
+            if not min(before, beyond) <= root <= max(before, beyond):
+                break
+            if abs(root - tried[nearest[0]]) < LAST_STEP:
+                return root
+            tried[excess(root)] = root
+        between: Any = brentq(excess, before, beyond, xtol=LAST_STEP**2)
+        return float(between)
 
 
 def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
     """A problem with its penalty adapted to the jerk, and the likeliest smoothness (3,) then.
+
+    The weight of each interval is the inverse of the local mean square of the jerk that a fit has.
 
     Args:
         p: problem with an even penalty.
@@ -133,15 +151,10 @@ def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Prob
         weights: (n,), of the samples.
     """
     for _ in range(ADAPTIONS):
-        p = adapted(p, smoothness, weights)
+        square = third(p.spline.grid, solve(p, smoothness, weights).coefficients) ** 2
+        mean = np.maximum(square.mean(axis=0), 1e-30)
+        local = uniform_filter1d(square, p.average, axis=0, mode="nearest")
+        share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
+        p = p.adapted(stiffness=1.0 / share.T)
         smoothness = likeliest(p, weights, smoothness)
     return p, smoothness
-
-
-def adapted(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> Problem:
-    """The problem with a penalty by the inverse of the local mean square of the jerk that a fit has."""
-    square = third(p.grid, solve(p, smoothness, weights).coefficients) ** 2
-    mean = np.maximum(square.mean(axis=0), 1e-30)
-    local = uniform_filter1d(square, p.average, axis=0, mode="nearest")
-    share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
-    return p._replace(stiffness=1.0 / share.T)

@@ -1,10 +1,11 @@
 """Outliers of a run: Huber's robust weights, then a test of each sample by its deleted residual."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .likelihood import adapt, likeliest
 from .penalised import Problem, solve
-from .spline import inverse_band, variance
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
 # Standard deviations from which on the loss of Huber (1964) is linear. Chosen: 95 % of normal noise
@@ -28,22 +29,36 @@ class TooFewError(Exception):
         self.rows = rows
 
 
-def robust(p: Problem, local: np.ndarray) -> tuple[Problem, np.ndarray, np.ndarray]:
+class Inliers(NamedTuple):
+    """Which samples are no outliers, and the splines through them.
+
+    Attributes:
+        problem: with its penalty adapted to the jerk.
+        smoothness: (3,), of its splines.
+        weights: (n,), 0 for an outlier, else 1.
+        even: (3,), smoothness with an even penalty.
+    """
+
+    problem: Problem
+    smoothness: np.ndarray
+    weights: np.ndarray
+    even: np.ndarray
+
+
+def robust(p: Problem, local: np.ndarray) -> Inliers:
     """Which samples are no outliers, and the smoothness of the spline through them.
 
     Args:
         p: problem with an even penalty.
         local: (3,), smoothness that follows a few samples, to find what sticks out.
 
-    Returns:
-        The problem with its penalty adapted to the jerk, smoothness (3,), weights (n,) of 0 and 1.
-
     Raises:
         TooFewError: in some stretch.
     """
     weights = outlier_test(p, local, robust_weights(p, local))
-    p, smoothness = adapt(p, likeliest(p, weights), weights)
-    return p, smoothness, outlier_test(p, smoothness, weights)
+    even = likeliest(p, weights)
+    p, smoothness = adapt(p, even, weights)
+    return Inliers(p, smoothness, outlier_test(p, smoothness, weights), even)
 
 
 def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
@@ -51,7 +66,7 @@ def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
     far = FAR * np.maximum(np.quantile(np.abs(p.z), 0.9, axis=0), p.sigma)
     weights = np.minimum(1.0, (far / np.maximum(np.abs(p.z), far * 1e-9)).min(axis=1))
     for _ in range(REWEIGHTINGS):
-        off = np.abs(p.z - p.b(solve(p, smoothness, weights).coefficients)) / p.sigma
+        off = np.abs(p.z - p.spline.b(solve(p, smoothness, weights).coefficients)) / p.sigma
         before, weights = weights, np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
         if np.abs(weights - before).max() < SAME_WEIGHT:
             break
@@ -67,11 +82,12 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
     Raises:
         TooFewError: in some stretch.
     """
-    stretch = np.searchsorted(p.grid.first, p.b.first, side="right") - 1
+    b = p.spline.b
+    stretch = np.searchsorted(p.spline.grid.first, b.first, side="right") - 1
     for _ in range(REWEIGHTINGS):
         fit = solve(p, smoothness, weights)
-        spread = variance(p.b, inverse_band(fit.factors))
-        off = np.abs(p.z - p.b(fit.coefficients)) / p.sigma
+        spread = b.variance(fit.covariance) / p.sigma**2
+        off = np.abs(p.z - b(fit.coefficients)) / p.sigma
         leverage = np.minimum(weights[:, None] * spread, 0.999)
         expected = np.where(leverage > 0.0, np.sqrt(1.0 - leverage), np.sqrt(1.0 + spread))
         kept = (off <= OUTLIER * expected).all(axis=1).astype(float)

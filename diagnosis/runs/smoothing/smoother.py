@@ -24,9 +24,9 @@ from .command_response import with_commands
 from .delay import NOTICED
 from .likelihood import adapt
 from .measured_rates import ALONE, Agreeing, measured_rates
-from .outliers import TooFewError, robust
-from .penalised import Problem, solve
-from .spline import Knots, basis, inverse_band, knots, roughness, variance
+from .outliers import Inliers, TooFewError, robust
+from .penalised import Problem, Rates, Spline, solve
+from .spline import Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
@@ -159,13 +159,13 @@ def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
     if pose is None:
         rows, weights, stiffness, smoothness = run.pose_only
         p, origin = _problem(run.track, rows)
-        p = p._replace(stiffness=stiffness)
+        p = p.adapted(stiffness=stiffness)
     else:
-        _, _, origin, (p, smoothness, weights) = _judged(replace(run.track, pose=pose))
-    time = run.time - run.time[0]
-    where = within(p.grid, time)
+        _, _, origin, (p, smoothness, weights, _) = _judged(replace(run.track, pose=pose))
+    grid, time = p.spline.grid, run.time - run.time[0]
+    where = within(grid, time)
     coefficients = solve(p, smoothness, weights).coefficients
-    derivatives = (spread(basis(p.grid, time[where], k)(coefficients), where) for k in range(3))
+    derivatives = (spread(basis(grid, time[where], k)(coefficients), where) for k in range(3))
     return _motion(origin, *derivatives)
 
 
@@ -187,18 +187,16 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
     average = max(1, round(AVERAGE * scale.time / grid.spacing))
-    b = basis(grid, time[dense])
-    return Problem(dense, z, b, grid, roughness(grid), stiffness, sigma, average), origin
+    spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
+    return Problem(dense, z, sigma, average, spline), origin
 
 
-def _judged(
-    track: Track,
-) -> tuple[np.ndarray, Problem, np.ndarray, tuple[Problem, np.ndarray, np.ndarray]]:
-    """Rows of a run in stretches that agree, their problem and origin, and :func:`.outliers.robust`."""
+def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
+    """Rows of a run in stretches that agree, their problem and origin, and the splines through them."""
     rows = np.flatnonzero(track.valid)
     while True:
         even, origin = _problem(track, rows)
-        local = np.full(3, LOCAL * (track.period / even.grid.spacing) ** 5)
+        local = np.full(3, LOCAL * (track.period / even.spline.grid.spacing) ** 5)
         try:
             return rows, even, origin, robust(even, local)
         except TooFewError as stretch:
@@ -207,34 +205,32 @@ def _judged(
 
 def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
     time, scale = track.run.time - track.run.time[0], track.scale
-    rows, even, origin, (adapted, smoothness, weights) = _judged(track)
-    grid, dense, sigma = even.grid, even.rows, even.sigma
+    rows, even, origin, alone = _judged(track)
+    p, smoothness, weights, _ = alone
+    grid, dense, sigma = even.spline.grid, even.rows, even.sigma
+    pose_only = PoseOnly(rows, weights, p.spline.stiffness, smoothness)
     inside = within(grid, time)
-    pose_only = PoseOnly(rows, weights, adapted.stiffness, smoothness)
-    fit = solve(adapted, smoothness, weights)
-    psi = origin[2] + spread(basis(grid, time[inside])(fit.coefficients), inside)[:, 2]
+    bases = [basis(grid, time[inside], k) for k in range(3)]
+    fit = solve(p, smoothness, weights)
+    psi = origin[2] + spread(bases[0](fit.coefficients), inside)[:, 2]
     first = basis(grid, time[dense[:1]], 1)(fit.coefficients)[0]
     still = idle(scale)
     slow = np.hypot(*first[:2]) < still[0] and abs(first[2]) < still[2]
     commands = Commands(track, psi, grid, bool(slow))
-    left = with_commands(even, adapted, smoothness, fit, weights, commands)
-    adapted, smoothness, fit, response = left
+    p, smoothness, response = with_commands(even, alone, fit, commands)
     rates = measured_rates(track, dense, psi, agreeing, grid)
     if rates is not None:
         at, beside = rates
         beside = beside._replace(z=beside.z - response.eta_dot[at])
-        adapted, smoothness = adapt(adapted._replace(rates=beside), smoothness, weights)
-        fit = solve(adapted, smoothness, weights)
-    inverse = inverse_band(fit.factors) * sigma[:, None] ** 2
+        p, smoothness = adapt(p.adapted(rates=beside), smoothness, weights)
+    fit = solve(p, smoothness, weights)
+    covariance = fit.covariance
     spikes = track.valid.copy()
     spikes[rows] = False
     spikes[dense] = weights == 0.0
-    derivatives = [basis(grid, time[inside], k) for k in range(3)]
-    known = zip(derivatives, response[:3], strict=True)
+    known = zip(bases, response[:3], strict=True)
     motion = _motion(origin, *(spread(b(fit.coefficients) + x[inside], inside) for b, x in known))
-    eta_std, eta_dot_std, eta_ddot_std = (
-        spread(np.sqrt(variance(b, inverse)), inside) for b in derivatives
-    )
+    eta_std, eta_dot_std, eta_ddot_std = (spread(np.sqrt(b.variance(covariance)), inside) for b in bases)
     return Smoothed(
         track,
         spikes,

@@ -10,10 +10,13 @@ sampling, as a banded linear system. With f = B c and knots every h, h^5 times t
 K the Gram matrix of the third derivatives in units of h.
 """
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, PPoly
+from scipy.linalg import cholesky_banded
 from scipy.sparse import csr_array
 
 DEGREE = 5  # of the smoothing spline with a penalty on the third derivative: 2 * 3 - 1
@@ -22,32 +25,31 @@ WIDTH = DEGREE + 1  # basis functions that overlap
 # exp(-n / (2 s^(1/6))), to 5e-5 at the smoothness s = 1e6, to 1e-2 at the largest one, 1e8.
 MEMORY = 200
 ROUNDING = 1e-6  # of an interval: by so much a stretch may end beyond its last knot
+FIRST, SECOND = np.triu_indices(WIDTH)  # pairs of the basis functions that overlap
 
 
-def _pieces() -> np.ndarray:
-    """(power, function): the six basis functions on an interval, as polynomials over [0, 1]."""
-    spline = PPoly.from_spline(BSpline.basis_element(np.arange(WIDTH + 1.0), extrapolate=False).tck)
-    inside = np.searchsorted(spline.x, np.arange(WIDTH)[::-1])
-    return spline.c[::-1, inside]
+def _pieces(degree: int) -> np.ndarray:
+    """(power, function): the basis functions on an interval, as polynomials over [0, 1]."""
+    element = BSpline.basis_element(np.arange(degree + 2.0), extrapolate=False)
+    spline = PPoly.from_spline(element.tck)
+    return spline.c[::-1, np.searchsorted(spline.x, np.arange(degree + 1)[::-1])]
 
 
-PIECES = [_pieces()]
+PIECES = [_pieces(DEGREE)]  # and their derivatives
 for _ in range(3):
     PIECES.append(np.arange(1.0, len(PIECES[-1]))[:, None] * PIECES[-1][1:])
 
 
-POINTS = 3  # per interval: with them Gauss' rule is exact for the square of a parabola
+def _products(pieces: np.ndarray) -> np.ndarray:
+    """(functions, functions): integrals over [0, 1] of the products of polynomials (power, function)."""
+    powers = np.arange(len(pieces))
+    return pieces.T @ (1.0 / (powers[:, None] + powers + 1.0)) @ pieces
 
 
-def _third_at_points() -> np.ndarray:
-    """(3, 6): third derivatives at Gauss' points of [0, 1], times the square roots of their weights."""
-    points, weights = np.polynomial.legendre.leggauss(POINTS)
-    third = np.vander(0.5 * points + 0.5, WIDTH - 3, increasing=True) @ PIECES[3]
-    return np.sqrt(0.5 * weights)[:, None] * third
-
-
-THIRD = _third_at_points()
-PENALTY = THIRD.T @ THIRD  # (6, 6): integral of the products of third derivatives over [0, 1]
+PARABOLAS = _products(_pieces(DEGREE - 3))  # of the third derivative
+DIFFERENCE = np.array(
+    [-1.0, 3.0, -3.0, 1.0]
+)  # third difference of coefficients: those of the third derivative
 
 
 class Knots(NamedTuple):
@@ -84,27 +86,48 @@ def knots(start: np.ndarray, end: np.ndarray, spacing: float) -> Knots:
     return Knots(start, end, first, intervals, spacing)
 
 
-class Basis(NamedTuple):
-    """The six basis functions that are not zero at each of some times.
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """Rows of a matrix with six successive entries each, such as the basis functions at some times.
 
     Attributes:
-        first: (n,), index of the first.
-        values: (n, 6), their values.
-        matrix: (n, size), the same as a sparse matrix.
+        first: (n,), column of the first entry.
+        values: (n, 6), the entries.
+        size: number of columns.
     """
 
     first: np.ndarray
     values: np.ndarray
-    matrix: csr_array
+    size: int
+
+    @cached_property
+    def matrix(self) -> csr_array:
+        """(n, size), the same as a sparse matrix."""
+        return self._sparse(self.values, np.arange(WIDTH), 1)
+
+    @cached_property
+    def _pairs(self) -> csr_array:
+        """(n, 6 size): products of entries, those of the diagonal first."""
+        return self._sparse(
+            self.values[:, FIRST] * self.values[:, SECOND], FIRST + (SECOND - FIRST) * self.size, WIDTH
+        )
+
+    def _sparse(self, values: np.ndarray, columns: np.ndarray, many: int) -> csr_array:
+        at, ends = self.first[:, None] + columns, np.arange(0, values.size + 1, columns.size)
+        return csr_array((values.ravel(), at.ravel(), ends), shape=(len(values), many * self.size))
 
     def __call__(self, coefficients: np.ndarray) -> np.ndarray:
         """(n, channels): the spline, for coefficients (size, channels)."""
         return self.matrix @ coefficients
 
+    def gram(self, weights: np.ndarray) -> np.ndarray:
+        """(6, size): lower band of B^T W B, for weights (n,)."""
+        return (self._pairs.T @ weights).reshape(WIDTH, self.size)
 
-def _basis(first: np.ndarray, values: np.ndarray, size: int) -> Basis:
-    at, rows = (first[:, None] + np.arange(WIDTH)).ravel(), np.arange(0, values.size + 1, WIDTH)
-    return Basis(first, values, csr_array((values.ravel(), at, rows), shape=(first.size, size)))
+    def variance(self, inverse: np.ndarray) -> np.ndarray:
+        """(n, channels): variance of a spline whose coefficients have this covariance (6, size, channels)."""
+        twice = np.where(np.arange(WIDTH) == 0, 1.0, 2.0)[:, None, None] * inverse
+        return self._pairs @ twice.reshape(WIDTH * self.size, -1)
 
 
 def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
@@ -114,54 +137,56 @@ def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
     interval = np.clip(np.floor(place), 0, grid.intervals[stretch] - 1).astype(int)
     powers = np.vander(place - interval, WIDTH - derivative, increasing=True)
     values = powers @ PIECES[derivative] / grid.spacing**derivative
-    return _basis(grid.first[stretch] + interval, values, grid.size)
+    return Basis(grid.first[stretch] + interval, values, grid.size)
 
 
-def gram(b: Basis, weights: np.ndarray, size: int) -> np.ndarray:
-    """(6, size): lower band of B^T W B, for weights (n,)."""
-    band = np.zeros((WIDTH, size))
-    for j in range(WIDTH):
-        for k in range(j, WIDTH):
-            band[k - j] += np.bincount(b.first + j, weights * b.values[:, j] * b.values[:, k], size)
-    return band
+def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
+    """R with R^T R = K, the integral of squared third derivatives times the spacing^5, and where it is.
 
-
-def penalty(grid: Knots, weights: np.ndarray) -> np.ndarray:
-    """(6, size): lower band of the integral of squared third derivatives, times the spacing^5.
+    The third derivative is a spline of degree two with the third differences of the coefficients: R is a
+    Cholesky factor of its Gram matrix times these differences. |R c|^2 is a sum of squares that loses no
+    digits, where c^T K c is a small difference of large numbers.
 
     Args:
         grid: knots.
         weights: (intervals,), of each interval, those of all stretches in a row.
+
+    Returns:
+        R, and the time [s] of each of its rows, two more than intervals in each stretch.
     """
-    band = np.zeros((WIDTH, grid.size))
-    stretches = np.split(weights, np.cumsum(grid.intervals)[:-1])
-    for first, of_stretch in zip(grid.first, stretches, strict=True):
-        for j in range(WIDTH):
-            at = slice(first + j, first + j + of_stretch.size)
-            for k in range(j, WIDTH):
-                band[k - j, at] += PENALTY[j, k] * of_stretch
-    return band
+    rows = grid.intervals + 2
+    band = np.zeros((3, int(rows.sum())))
+    at = successive(np.cumsum(rows) - rows, grid.intervals)
+    for j in range(3):
+        for k in range(j, 3):
+            band[k - j, at + j] += PARABOLAS[j, k] * weights
+    values = np.zeros((band.shape[1], WIDTH))
+    for j, factor in enumerate(cholesky_banded(band, lower=True)):
+        values[:, j : j + 4] += factor[:, None] * DIFFERENCE
+    row = successive(0 * rows, rows)
+    beyond = np.maximum(row - np.repeat(grid.intervals - 1, rows), 0)  # entries there are zero
+    for k in (1, 2):
+        values[beyond == k] = np.roll(values[beyond == k], k, axis=1)
+    time = np.repeat(grid.start, rows) + (row + 0.5) * grid.spacing
+    return Basis(successive(grid.first, rows) - beyond, values, grid.size), time
 
 
-def roughness(grid: Knots) -> csr_array:
-    """(3 intervals, size): R with R^T R = K, the penalty of equal weights.
-
-    The integral of squared third derivatives is |R c|^2, a sum of squares that loses no digits, where
-    c^T K c is a small difference of large numbers.
-    """
-    intervals = int(grid.intervals.sum())
-    return _basis(np.repeat(inside(grid), POINTS), np.tile(THIRD, (intervals, 1)), grid.size).matrix
+def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Of each stretch as many successive indices as are counted, all in a row."""
+    return np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
-def inside(grid: Knots) -> np.ndarray:
-    """(intervals,): index of the first basis function of each interval of all stretches."""
-    return np.concatenate([f + np.arange(n) for f, n in zip(grid.first, grid.intervals, strict=True)])
+def middles(grid: Knots) -> np.ndarray:
+    """(intervals,): times [s] in the middle of all intervals."""
+    row = successive(0 * grid.intervals, grid.intervals)
+    return np.repeat(grid.start, grid.intervals) + (row + 0.5) * grid.spacing
 
 
 def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
     """(intervals, channels): third derivative in the middle of each interval."""
-    values = np.tile(0.5 ** np.arange(WIDTH - 3) @ PIECES[3], (int(grid.intervals.sum()), 1))
-    return _basis(inside(grid), values / grid.spacing**3, grid.size)(coefficients)
+    middle = 0.5 ** np.arange(WIDTH - 3) @ PIECES[3] / grid.spacing**3
+    at = successive(grid.first, grid.intervals)
+    return Basis(at, np.tile(middle, (at.size, 1)), grid.size)(coefficients)
 
 
 def inverse_band(factors: np.ndarray) -> np.ndarray:
@@ -174,37 +199,32 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
         factors: (channels, 6, size), lower bands of L.
 
     Returns:
-        (size, channels, 6): entries (i, i) to (i, i + 5) of each inverse.
+        (6, size, channels): lower bands of the inverses.
     """
     channels, _, size = factors.shape
-    parts = -(-size // MEMORY)
-    padded = np.zeros((WIDTH, (parts + 1) * MEMORY, channels))
-    padded[0] = 1.0
-    padded[:, :size] = factors.transpose(1, 2, 0)
-    below = (padded[1:] / padded[0]).transpose(1, 2, 0).copy()
-    squared = 1.0 / padded[0] ** 2
-    at = MEMORY * np.arange(parts)
-    found = np.empty((parts, MEMORY, channels, WIDTH))
-    known = np.zeros((parts, channels, WIDTH, WIDTH))  # of the six coefficients from i on
-    for i in range(2 * MEMORY - 1, -1, -1):
-        later = known[..., :DEGREE, :DEGREE].copy()
-        under = below[at + i]
-        row = -np.matmul(later, under[..., None])[..., 0]
-        known[..., 1:, 1:] = later
-        known[..., 0, 0] = squared[at + i] - (under * row).sum(axis=-1)
-        known[..., 0, 1:] = row
-        known[..., 1:, 0] = row
-        if i < MEMORY:
-            found[:, i] = known[..., 0, :]
-    return found.reshape(parts * MEMORY, channels, WIDTH)[:size]
-
-
-def variance(b: Basis, inverse: np.ndarray) -> np.ndarray:
-    """(n, channels): variance of the spline whose coefficients have this covariance."""
-    total = np.zeros((b.first.size, inverse.shape[1]))
-    for j in range(WIDTH):
-        for apart in range(WIDTH - j):
-            times = 1.0 if apart == 0 else 2.0
-            weight = times * b.values[:, j] * b.values[:, j + apart]
-            total += weight[:, None] * inverse[b.first + j, :, apart]
-    return total
+    parts = -(-size // MEMORY) + 1
+    padded = np.zeros((channels, WIDTH, parts * MEMORY))
+    padded[:, 0] = 1.0
+    padded[..., :size] = factors
+    blocks = padded.reshape(channels, WIDTH, parts, -1, DEGREE)  # of five coefficients
+    corner = np.zeros((blocks.shape[3], parts, channels, DEGREE, DEGREE))  # of L, in a block
+    below = np.zeros_like(corner)  # of L, under it
+    for j in range(DEGREE):
+        for i in range(WIDTH):
+            to, row = (corner, i + j) if i + j < DEGREE else (below, i + j - DEGREE)
+            to[..., row, j] = blocks[:, i, ..., j].T
+    back = np.linalg.inv(corner)
+    own, turn = back.swapaxes(-1, -2) @ back, -below @ back
+    diagonal, beside = np.zeros_like(own), np.zeros_like(own)
+    later = np.zeros_like(own[0])
+    for _ in range(2):  # once to forget the start
+        later = np.concatenate([later[1:], 0.0 * later[:1]])
+        for k in range(len(own) - 1, -1, -1):
+            beside[k] = later @ turn[k]
+            diagonal[k] = later = own[k] + turn[k].swapaxes(-1, -2) @ beside[k]
+    found = np.empty((WIDTH, channels, parts, len(own), DEGREE))
+    for j in range(DEGREE):
+        for i in range(WIDTH):
+            of, row = (diagonal, i + j) if i + j < DEGREE else (beside, i + j - DEGREE)
+            found[i, ..., j] = of[..., row, j].T
+    return found.reshape(WIDTH, channels, -1)[..., :size].swapaxes(1, 2)
