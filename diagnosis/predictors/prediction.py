@@ -104,8 +104,8 @@ class Starts:
         for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
             response = Response(smoothed.track.run, model, not at_rest(smoothed))
             if response.slow or self.h > COARSE * smoothed.track.period:
-                start = smoothed.time[rows] + np.arange(self.steps)[:, None] * self.h
-                found.append(response.mean(start, start + self.h))
+                edges = smoothed.time[rows] + np.arange(self.steps + 1)[:, None] * self.h
+                found.append(response.means(edges))
             else:
                 commands = held(smoothed, model, time)
                 found.append((commands, commands))

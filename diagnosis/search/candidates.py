@@ -16,7 +16,6 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from ..predictors.weak_form import remember_responses
 from .nonlinear.multistart import Landscape, best_values
 from .nonlinear.segmentation import FLOOR, intervals, problem
 
@@ -257,7 +256,5 @@ def candidates(
     each = any(ship.layout_of(w.run.commands) is apart for w in data)
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
     possible = [e for e in effects if e.search.by == "regression" and (each or APART not in e.needs)]
-    tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
-    remember_responses(data, [model, *map(model.plus, tried)])
     found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
     return [c for c in found if c.shapes]
