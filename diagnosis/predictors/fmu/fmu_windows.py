@@ -25,8 +25,9 @@ from ...runs import UNITS, Column, Run, Smoothed, to_si
 from ..evaluation import Evaluation, PredictionError
 from ..prediction import at_rest
 from ..ship_model import Model
+from ..thrust import STEP
 from ..weak_form import WeakWindows, omega
-from ..windows import RunWindows, Windows, between_steps
+from ..windows import Windows, between_steps
 from .foreign_fmu import TAU, Fmu, commands_of
 from .variable_map import MOTION, POSE, VELOCITY, VariableMap, quantities
 
@@ -202,8 +203,8 @@ def whole_run(smoothed: Smoothed, use: Use) -> tuple[np.ndarray, np.ndarray]:
 
 def step_of(smoothed: Smoothed) -> float:
     """Step of predictions [s], which divides the sample period."""
-    none = np.zeros(0, int)
-    return RunWindows(smoothed, none, none, none).step_and_commands[0]
+    row = round(float(np.median(np.diff(smoothed.time))), 9)
+    return row / float(np.ceil(row / (STEP * smoothed.scale.time) - 1e-6))
 
 
 def _poses(smoothed: Smoothed, use: Use, begins: np.ndarray, h: float, steps: int) -> np.ndarray:
