@@ -325,9 +325,10 @@ def arriving(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def _response(w: WeakWindows, model: Model) -> np.ndarray:
-    key = Response.key(model)
-    moving = not at_rest(w.smoothed)
-    return w.recall("response", key, lambda: Response(w.run, model, moving).between_samples, MEMORIES)
+    def between() -> np.ndarray:
+        return Response(w.run, model, not at_rest(w.smoothed)).between_samples
+
+    return w.recall("response", Response.key(model), between, MEMORIES)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:

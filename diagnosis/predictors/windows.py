@@ -188,7 +188,7 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s], a whole part or a multiple of the sample period; names of the commands."""
+        """Step of integration [s], a part or a multiple of the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
         most = LONGEST_STEP * self.smoothed.scale.time
         step = row / np.ceil(row / most - 1e-6) if row > most else row * np.floor(most / row + 1e-6)
