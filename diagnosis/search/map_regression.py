@@ -19,15 +19,10 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from .gram import Folds, GramTable
+from .most_likely import RIDGE, ridge
 
-RIDGE = 1e-9  # relative: collinear regressors share what they explain
 # Sum of squares, in units of noise and ship, below which a column holds nothing on these data.
 EMPTY = 1e-12
-
-
-def ridge(H: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """(p, p), what makes an information matrix regular, for parameters with units (p,)."""
-    return RIDGE * np.diag(np.diag(H) + unit**-2.0)
 
 
 def _form(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:

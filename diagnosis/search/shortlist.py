@@ -14,7 +14,8 @@ from ..execution.parallel import for_each
 from ..predictors.correlation import independent
 from .candidates import Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
-from .map_regression import Scored, regression, ridge, score
+from .map_regression import Scored, regression, score
+from .most_likely import ridge
 from .nonlinear.segmentation import FLOOR
 from .refinement import Estimate, Refined, Start, TrainingSet, as_shape, nuisance_of, refine, timed
 

@@ -32,6 +32,7 @@ from fmus.scale import Scale
 from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
 from ...predictors.weak_form import EVERY, OVERLAP, thrust_along
+from ..most_likely import ridge
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
@@ -46,7 +47,6 @@ FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of t
 # Share of the time at work of a thruster in a run in which it fails at the most: what is so most of the
 # time is the rule and no failure, such as a dead band of small commands; chosen.
 EXCEPTION = 0.5
-RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -184,7 +184,7 @@ class Problem:
     @cached_property
     def _information(self) -> tuple[np.ndarray, bool]:
         H = self.nuisance.T @ self.nuisance + self.precision
-        return cho_factor(H + RIDGE * np.diag(np.diag(H) + self.unit**-2.0))
+        return cho_factor(H + ridge(H, self.unit))
 
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
