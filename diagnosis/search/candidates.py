@@ -30,7 +30,7 @@ MOST = 0.5  # share of its largest force from which on it counts as saturated; c
 # Share of a curve's weight that a node must have: half a second of four minutes.
 INSIDE = 2e-3
 FEWEST = 3  # nodes of a curve: of fewer there is no bend
-SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
+SLIGHT = 1e-12  # sum of squares of a force, in the units above, below which it is none: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """
     unit = np.square(columns.sum(axis=2))
     axes = unit.sum(axis=0) > 0.0
-    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
+    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), SLIGHT)) + SLIGHT
     bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
     return bend.T @ bend
 

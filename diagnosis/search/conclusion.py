@@ -13,12 +13,11 @@ from .confidence import Evidence, confidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
-from .most_likely import ridge
+from .most_likely import NORMAL_95, ridge
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance_of, refit, weighted_rows
 
 SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-STEPS = 6  # at the most; two or three are usual
+STEPS = 6  # of whatever is iterated, at the most; two or three are usual
 ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
+NORMAL_95 = 1.96  # standard deviations, of a normal distribution within which 95 % lie
 HALVINGS = (1.0, 0.5, 0.25)  # of a step
 RIDGE = 1e-9  # relative, far above rounding: collinear parameters share what they explain
 

@@ -31,14 +31,13 @@ from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
 from ..candidates import SMALL, model_error
-from ..most_likely import Quadratic, most_likely, ridge
+from ..most_likely import STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
 from ..refinement import SMALLEST_SCALE, Estimate
 from .disturbance import NO_PUSH, Push, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
 ROUNDING = 1e-10  # of the largest variance in a window
-POWERS = 5  # iterations of k, which changes by less than 1 % after three
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ class Information:
     def power(self, P: np.ndarray) -> float:
         """k, for a prior precision P (q, q)."""
         k = 1.0
-        for _ in range(POWERS):
+        for _ in range(STEPS):
             S = np.linalg.inv(regular(k * self.H + P))
             k = float(np.sum(S * self.H) / np.sum(S * self.G))
         return k
