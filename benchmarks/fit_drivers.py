@@ -121,24 +121,24 @@ def prediction(runs: Sequence[WeakWindows], driver: str) -> Tally:
         found, before = at, np.inf
         for _ in range(PASSES):
             count["slopes"] += 1
-            known = problem.information(found)
+            known: Any = problem.information(found)
             share = np.sqrt(known.power(problem.precision) / len(problem.windows))
 
-            def residual(x: np.ndarray, share: float = share, known: Any = known) -> np.ndarray:
+            def weighed(x: np.ndarray, share: Any = share, known: Any = known) -> np.ndarray:
                 count["residuals"] += 1
                 there = problem.moved(at, x - first).model(prior)
                 pairs = zip(known.weights, problem.windows, strict=True)
                 parts = [whitened(W, s.residuals(there)).ravel() for W, s in pairs]
                 return np.concatenate([share * np.nan_to_num(p) for p in parts] + [L @ x])
 
-            def slopes(x: np.ndarray, share: float = share, known: Any = known) -> np.ndarray:
+            def sloped(x: np.ndarray, share: Any = share, known: Any = known) -> np.ndarray:
                 count["slopes"] += 1
                 there = problem.moved(at, x - first).model(prior)
                 pairs = zip(known.weights, problem.windows, strict=True)
                 parts = [whitened(W, problem.around(s, there).slopes) for W, s in pairs]
                 return np.concatenate([*(-share * p.reshape(-1, x.size) for p in parts), L])
 
-            fit = scipy_fit(residual, slopes, problem.theta(found), driver)
+            fit = scipy_fit(weighed, sloped, problem.theta(found), driver)
             found = problem.moved(at, fit.x - first)
             if before - 2.0 * fit.cost < ENOUGH:
                 break

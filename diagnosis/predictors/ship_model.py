@@ -64,7 +64,7 @@ def parameters(component: Component, values: Values) -> Any:
         InputError: a name that the component does not have.
     """
     places, starts = _declared(component.params)
-    flat = [*starts]
+    flat: list[Any] = [*starts]
     for name, value in values.items():
         if name not in places:
             raise InputError(f"{component.name} has no parameter '{name}'{nearest(name, places)}")
