@@ -98,6 +98,7 @@ def sail(
     rng: np.random.Generator,
     wrong: int | None,
     orders: Iterator[tuple[float, ...]] | None = None,
+    seconds: float = SECONDS,
 ) -> pd.DataFrame:
     """A run of the real ship, as a sensor of its size measures it.
 
@@ -107,6 +108,7 @@ def sail(
         rng: of commands and noise.
         wrong: seed of what is wrong with the coefficients; None: nothing is.
         orders: a command for each step (those of :func:`commands`).
+        seconds: at the size of CyberShip Enterprise 1.
     """
     off = None if wrong is None else np.random.default_rng(wrong)
     b = ship.vessel.prepared(parameters(ship.vessel, {"x_0": 0.0, "y_0": 0.0, **cause.vessel}, off))
@@ -116,7 +118,7 @@ def sail(
     s, past = ship.vessel.init(Force(), b.params), at_rest(drive.effects)
     orders = orders or commands(ship, rng)
     rows = []
-    for k in range(round(SECONDS / STEP)):
+    for k in range(round(seconds / STEP)):
         now = next(orders)
         if k % EVERY == 0:
             pose = np.array([s.x, s.y, s.psi]) + noise(ship) * rng.standard_normal(3)

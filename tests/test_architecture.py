@@ -339,7 +339,7 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
 
 
 # Time and calibration of single parts of the diagnosis.
-MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.learning_time")
+MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.fit_drivers", "benchmarks.learning_time")
 
 
 @pytest.mark.parametrize("package", ["studies", "benchmarks"])

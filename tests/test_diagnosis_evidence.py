@@ -24,6 +24,7 @@ from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import concluded
 from diagnosis.verdict.confidence import probability
 from fmus.declare import Range, Variable
+from fmus.ops import wrap
 from fmus.scale import Scale
 
 
@@ -137,15 +138,20 @@ def test_errors_of_windows_are_root_mean_squares_by_their_samples():
     assert np.isnan(none).all()
 
 
-def test_poses_between_steps_are_on_a_line_and_headings_on_the_short_way():
-    steps = np.zeros((3, 3, 2, 2))
-    steps[:, 0] = np.array([0.0, 2.0, 6.0])[:, None, None] * [[1.0, 10.0], [2.0, 20.0]]
-    steps[:, 2] = np.array([3.0, -3.0, -2.0])[:, None, None]
-    found = between_steps(steps, np.array([0, 1, 0, 1]), np.array([0.5, 1.25, 2.0, 3.0]))
+def test_poses_between_steps_are_on_a_cubic_and_headings_on_the_short_way():
+    t = np.arange(6.0)
+    steps = np.zeros((6, 3, 2, 2))
+    steps[:, 0] = (t**3 - 2.0 * t)[:, None, None] * [[1.0, 10.0], [2.0, 20.0]]
+    steps[:, 2] = wrap(3.0 + 0.2 * t)[:, None, None]
+    place = np.array([0.5, 1.25, 4.7, 6.0])
+    found = between_steps(steps, np.array([0, 1, 0, 1]), place)
     assert found.shape == (2, 4, 3)
-    assert found[0, :, 0] == pytest.approx([1.0, 30.0, 6.0, 100.0]), "beyond the last step goes on"
-    assert found[1, :, 0] == pytest.approx(2.0 * found[0, :, 0])
-    assert found[0, :2, 2] == pytest.approx([3.0 + 0.5 * (2.0 * np.pi - 6.0), -2.75])
+    exact = (place**3 - 2.0 * place) * [1.0, 10.0, 1.0, 10.0]
+    assert found[0, :, 0] == pytest.approx(exact), "beyond the last step goes on"
+    assert found[1, :, 0] == pytest.approx(2.0 * exact)
+    assert wrap(found[0, :, 2] - 3.0 - 0.2 * place) == pytest.approx(0.0, abs=1e-12)
+    two = between_steps(steps[:2], np.array([0]), np.array([0.5]))
+    assert two[0, 0, 0] == pytest.approx(-0.5), "two steps are on a line"
 
 
 # The remainder in words

@@ -495,7 +495,7 @@ def test_candidates_that_are_the_same_share_their_probability():
     blocks = np.random.default_rng(0).exponential(10.0, 20)
     one = Scored(0, 0, blocks, blocks, 0.0, 5.0)
     far = replace(one, candidate=2, blocks=blocks + 10.0)
-    shares = first_share([one, replace(one, candidate=1), far], 200, np.random.default_rng(0))
+    shares = first_share([one, replace(one, candidate=1), far], np.random.default_rng(0))
     assert shares == pytest.approx([0.5, 0.5, 0.0], abs=1e-6)
 
 

@@ -18,6 +18,7 @@ from fmus.ops import wrap
 from ..runs import Smoothed
 from .prediction import LONGEST_STEP, Starts, by_clock, predict
 from .ship_model import Model
+from .thrust import STEP
 from .weak_form import HORIZON
 
 # Times the scale of the ship.
@@ -223,16 +224,17 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s], which divides the sample period; names of the commands."""
+        """Step of integration [s], a part or a multiple of the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
-        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
-        return row / parts, self.smoothed.track.run.signals
+        most = LONGEST_STEP * self.smoothed.scale.time
+        step = row / np.ceil(row / most - 1e-6) if row > most else row * np.floor(most / row + 1e-6)
+        return float(step), self.smoothed.track.run.signals
 
 
 def step_of(smoothed: Smoothed) -> float:
-    """Step of predictions [s], which divides the sample period."""
-    none = np.zeros(0, int)
-    return RunWindows(smoothed, none, none, none).step_and_commands[0]
+    """Step of predictions by what is not a model of this project [s]; it divides the sample period."""
+    row = round(float(np.median(np.diff(smoothed.time))), 9)
+    return row / float(np.ceil(row / (STEP * smoothed.scale.time) - 1e-6))
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
@@ -283,7 +285,7 @@ def free_runs(
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Predicted pose at the samples, by linear interpolation between steps.
+    """Predicted pose at the samples, by cubic interpolation between steps.
 
     Args:
         predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
@@ -293,9 +295,15 @@ def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) 
     Returns:
         (p, samples, 3) [m, m, rad].
     """
-    step = np.clip(np.floor(place + 1e-6).astype(int), 0, len(predicted) - 2)
-    low, high = (predicted[k, :, :, column] for k in (step, step + 1))
+    first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
+    nodes = range(min(4, len(predicted)))
+    poses = [predicted[first + k, :, :, column] for k in nodes]
     with np.errstate(invalid="ignore", over="ignore"):
-        change = high - low
-        change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
-        return (low + (place - step)[:, None, None] * change).transpose(2, 0, 1)
+        found = poses[0]
+        for k in nodes[1:]:
+            rest = (place - first - j for j in nodes if j != k)
+            share = np.prod([*rest], axis=0) / np.prod([float(k - j) for j in nodes if j != k])
+            change = poses[k] - poses[0]
+            change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
+            found = found + share[:, None, None] * change
+        return found.transpose(2, 0, 1)

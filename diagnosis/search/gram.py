@@ -15,6 +15,7 @@ import numpy as np
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
 from .candidates import Candidate
+from .most_likely import ridge
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
 FOLDS = 8  # of cross-validation over blocks
@@ -22,8 +23,6 @@ WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
 # Stretches of fewer runs that are left out in turn; of a single run each is as long as the shortest run
 # that can be learned from; chosen.
 STRETCHES = 4
-# Ridge of the regression for the noise, relative to the regressors: they may be collinear.
-NOISE_RIDGE = 1e-6
 
 Key = tuple[int, int]
 
@@ -135,7 +134,8 @@ def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
         A = A[:, np.abs(A).max(axis=0) > 0.0]
         scale = np.sqrt((A**2).mean(axis=0))
         A = A / scale
-        gram = A.T @ A + NOISE_RIDGE * len(A) * np.eye(A.shape[1])
+        gram = A.T @ A
+        gram += ridge(gram, np.inf)
         fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
         return float(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
 
