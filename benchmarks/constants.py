@@ -35,6 +35,7 @@ HEADER = """# Constants that act on a verdict
 This page lists the constants by which the diagnosis decides, each with its value, unit and reason.
 With it you can look up a constant and its place in the code. No command has an option for them.
 
+<!-- not run: writes this page, and takes hours -->
 ```sh
 python -m benchmarks.constants --page > docs/constants.md    # write this page from the code
 python -m benchmarks.sensitivity    # what changes with each at half and at double

@@ -1,6 +1,7 @@
 """The pages of docs: what they name exists, and their links lead somewhere."""
 
 import ast
+import importlib
 import json
 import re
 import shlex
