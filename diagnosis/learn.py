@@ -49,8 +49,7 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .commands.initial_model import initial_model, proposing, write_map
     from .gathering import gather  # only now: it takes a while to import
-    from .predictors import ship_with, write_model
-    from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
+    from .predictors import ship_with
     from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
@@ -64,7 +63,8 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         paths = [*options.train, *options.test]
         runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
         from . import session
-        from .predictors import write_wrapper
+        from .predictors import write_model, write_wrapper
+        from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
         from .search.prediction_fit.output_fit import fitted
 
         train = len(options.train)
