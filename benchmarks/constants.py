@@ -50,7 +50,7 @@ class Constant(NamedTuple):
         file: relative to the package.
         line: from 1 on; 0 in data files.
         kind: one of :data:`KINDS`.
-        name: as the code says it, ``OBJECT.field`` of settings; "" of a literal.
+        name: as the code says it, ``Class.field`` or ``OBJECT.field`` of settings; "" of a literal.
         numbers: how many there are.
         value: as it is written.
         reason: comment beside or above, or the entry of the class' docstring.
@@ -77,8 +77,10 @@ def size(node: ast.AST) -> int:
     """Numbers in an expression: arithmetic on numbers is one, a tuple has as many as are in it."""
     if isinstance(node, ast.Subscript):
         return size(node.value)
-    if isinstance(node, ast.Lambda):
-        return 0  # its numbers are literals
+    if isinstance(node, ast.Lambda) or (
+        isinstance(node, ast.Call) and ast.unparse(node.func) == "range"
+    ):
+        return 0  # literals of a function; names of indices
     parts = [size(child) for child in ast.iter_child_nodes(node)]
     if isinstance(node, (ast.BinOp, ast.UnaryOp)):
         return max(parts)
@@ -105,6 +107,7 @@ class Reader(ast.NodeVisitor):
         classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
         self._documented = {c.name: attributes(ast.get_docstring(c) or "") for c in classes}
         self._docs: dict[str, str] = {}
+        self._class = ""
         self.visit(tree)
 
     def _add(self, node: ast.AST, name: str, value: ast.AST, reason: str = "", kind: str = "") -> None:
@@ -138,7 +141,9 @@ class Reader(ast.NodeVisitor):
                 told = docs.get(given.arg or "", reason)
                 self._add(given.value, f"{name}.{given.arg}", given.value, told, "field")
             value = ast.Tuple(value.args, ast.Load())
-        self._add(node, name, value, self._docs.get(name, "") or reason or description(value))
+        self._add(
+            node, self._class + name, value, self._docs.get(name, "") or reason or description(value)
+        )
         self._inside(node)
 
     def _inside(self, node: ast.AST) -> None:
@@ -157,13 +162,13 @@ class Reader(ast.NodeVisitor):
             self.visit(node.value)
 
     def visit_ClassDef(self, node: ast.ClassDef) -> None:
-        before = self._kind, self._docs
+        before = self._kind, self._docs, self._class
         if self._kind == "module":
             self._kind = "field"
-        self._docs = attributes(ast.get_docstring(node) or "")
+        self._docs, self._class = attributes(ast.get_docstring(node) or ""), f"{node.name}."
         for each in node.body:
             self.visit(each)
-        self._kind, self._docs = before
+        self._kind, self._docs, self._class = before
 
     def visit_FunctionDef(self, node: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) -> None:
         given = node.args

@@ -51,7 +51,7 @@ def noise_gain() -> dict[int, np.ndarray]:
     transform = np.trapezoid(w * np.cos(FREQUENCIES[:, None] * t), t, axis=1)
     H = 1.0 / (1.0 + (FREQUENCIES / CORNERS[:, None]) ** 6)
     densities = {order: FREQUENCIES**order * transform**2 / np.pi for order in ORDERS}
-    return {order: np.trapezoid(d * H, FREQUENCIES, axis=1) for order, d in densities.items()}
+    return {order: np.asarray(np.trapezoid(d * H, FREQUENCIES)) for order, d in densities.items()}
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
