@@ -329,6 +329,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 )
         return 0
     print("\n".join(table(found, options.by)))
+    named = [name for c in found if c.kind in ("module", "field") for name in c.name.split(", ")]
+    print(f"\n{len(named)} names of constants of modules and fields of settings")
     return int(options.most is not None and sum(c.numbers for c in found) > options.most)
 
 

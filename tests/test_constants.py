@@ -123,7 +123,8 @@ def test_the_command_counts_lists_and_refuses(tmp_path, capsys):
     run = [str(tmp_path)]
     assert command.main(run) == 0
     assert "| room | 3 | 0 | 0 | 0 | 0 | 3 |\n| all | 3 | 0 | 0 | 1 | 0 | 4 |" in capsys.readouterr().out
-    assert command.main([*run, "--most", "4"]) == 0
+    assert command.main([*run, "--by", "kind", "--most", "4"]) == 0
+    assert "\n2 names of constants" in capsys.readouterr().out
     assert command.main([*run, "--most", "3"]) == 1
     assert command.main([*run, "--most", "1", "--without", "room"]) == 0
     assert command.main([*run, "--most", "3", "--kinds", "module"]) == 0
