@@ -21,7 +21,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from cosim import atomic_write
-from cosim.command import command_parser, run_command, whole_number
+from cosim.command import INTERRUPTED, command_parser, run_command, whole_number
 from studies.study_command import progress
 
 from ..constants import PACKAGE, constants, deciding
@@ -69,6 +69,7 @@ def answer_one(seed: int, constant: str, factor: float, problems: Sequence[str],
 
     folder = Path(out).parent / f"problems{seed}"
     evidence = Path(out) / "prepared" if Task(seed, constant, factor).prepared else None
+    signal.signal(signal.SIGALRM, too_long)
     for name in problems:
         signal.alarm(LIMIT)
         try:
@@ -77,6 +78,10 @@ def answer_one(seed: int, constant: str, factor: float, problems: Sequence[str],
             found = [f"failed: {error!r}", "", float("nan")]
         signal.alarm(0)
         print(json.dumps([name, *found]), flush=True)
+
+
+def too_long(number: int, frame: object) -> None:
+    raise TimeoutError(f"no answer in {LIMIT} s")
 
 
 def work(task: Task, problems: Sequence[str], out: Path, keep: Callable[[list], None]) -> None:
@@ -91,7 +96,7 @@ def work(task: Task, problems: Sequence[str], out: Path, keep: Callable[[list], 
                 name, *answer = json.loads(line)
                 left.remove(name)
                 keep([*task, name, *answer])
-            if process.wait() > 0:  # by an exception on import, or by the alarm
+            if process.wait() not in (0, INTERRUPTED):  # an exception on import
                 for name in left:
                     keep([*task, name, "failed", "", float("nan")])
         finally:
