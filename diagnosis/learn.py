@@ -50,8 +50,6 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
     from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
     from .predictors import WRITTEN, DescribedShip, ship_with
-    from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
-    from .report.document import write_json
     from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
@@ -68,6 +66,8 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         paths = [*options.train, *options.validate, *options.test]
         runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
+        from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
+        from .report.document import write_json
         from .search.prediction_fit.output_fit import fitted
 
         train, decide = len(options.train), len(options.train) + len(options.validate)

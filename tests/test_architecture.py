@@ -383,9 +383,9 @@ def test_file_names_are_unique(package):
     assert not set(names) & set(others) - ALSO_ELSEWHERE
 
 
-# cosim.command is a public path; studies.allocation and benchmarks.ellipse are commands, fmus has components of
-# these names.
-ALSO_ELSEWHERE = {"command", "allocation", "ellipse"}
+# cosim.command is a public path; studies.allocation, benchmarks.constants and benchmarks.ellipse are commands,
+# fmus and diagnosis have files of these names.
+ALSO_ELSEWHERE = {"command", "allocation", "constants", "ellipse"}
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import ast
 import importlib
 import json
-import pkgutil
 import re
 import shlex
 import subprocess
@@ -11,16 +10,11 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support.command import command
 
 import cosim
-import diagnosis.assessment
-import diagnosis.predictors
-import diagnosis.runs
-import diagnosis.search
-import diagnosis.verdict
+import diagnosis
 import fmus
 from fmus.build.finding import load
 
@@ -64,34 +58,6 @@ def test_symbols_are_where_the_page_says(names, files):
     assert set(names) <= there
     for file in files:
         assert defined(file) & set(names), f"none of them is in {file}"
-
-
-def constants():
-    """Names and values of the table of constants of the diagnosis."""
-    table = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8").partition("## Constants")[2]
-    for names, values in re.findall(r"^\| ([A-Z_0-9, ]+) \| ([^|]+) \|", table, re.MULTILINE):
-        yield from zip(names.split(", "), re.findall(r"[\d.]+", values), strict=True)
-
-
-def modules_with_constants():
-    """The modules of the diagnosis in which the constants of the table may stand."""
-    parts = (
-        diagnosis.runs,
-        diagnosis.predictors,
-        diagnosis.assessment,
-        diagnosis.search,
-        diagnosis.verdict,
-    )
-    for part in parts:
-        for found in pkgutil.walk_packages(part.__path__, f"{part.__name__}."):
-            if not found.name.endswith(".peers"):
-                yield importlib.import_module(found.name)
-
-
-@pytest.mark.parametrize(("name", "value"), [*constants()])
-def test_constants_of_the_diagnosis_are_those_of_the_page(name, value):
-    found = [getattr(module, name, None) for module in modules_with_constants()]
-    assert any(np.ndim(x) == 0 and x == float(value) for x in found)
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda p: p.name)
