@@ -92,7 +92,14 @@ def parameters(
     return packer(component.params)(list({**values, **given}.values()))
 
 
-def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) -> pd.DataFrame:
+def sail(
+    ship: Ship,
+    cause: Cause,
+    rng: np.random.Generator,
+    wrong: int | None,
+    orders: Iterator[tuple[float, ...]] | None = None,
+    seconds: float = SECONDS,
+) -> pd.DataFrame:
     """A run of the real ship, as a sensor of its size measures it.
 
     Args:
@@ -100,6 +107,8 @@ def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) 
         cause: what is hidden.
         rng: of commands and noise.
         wrong: seed of what is wrong with the coefficients; None: nothing is.
+        orders: a command for each step (those of :func:`commands`).
+        seconds: at the size of CyberShip Enterprise 1.
     """
     off = None if wrong is None else np.random.default_rng(wrong)
     b = ship.vessel.prepared(parameters(ship.vessel, {"x_0": 0.0, "y_0": 0.0, **cause.vessel}, off))
@@ -107,9 +116,9 @@ def sail(ship: Ship, cause: Cause, rng: np.random.Generator, wrong: int | None) 
     layout, scale = ship.layout, ship.scale
     h = STEP * scale.time
     s, past = ship.vessel.init(Force(), b.params), at_rest(drive.effects)
-    orders = commands(ship, rng)
+    orders = orders or commands(ship, rng)
     rows = []
-    for k in range(round(SECONDS / STEP)):
+    for k in range(round(seconds / STEP)):
         now = next(orders)
         if k % EVERY == 0:
             pose = np.array([s.x, s.y, s.psi]) + noise(ship) * rng.standard_normal(3)

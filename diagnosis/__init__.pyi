@@ -12,6 +12,9 @@ from .interactive import diagnose as diagnose
 from .interactive import load as load
 from .predictors import Fmu as Fmu
 from .predictors import Model as Model
+from .predictors import ModelSource as ModelSource
+from .predictors import Predictor as Predictor
+from .predictors import PythonFunction as PythonFunction
 from .predictors import WeakWindows as WeakWindows
 from .predictors import omega as omega
 from .predictors import read_model as read_model
@@ -23,11 +26,12 @@ from .predictors.evaluation import evaluate_run as evaluate_run
 from .predictors.uncertainty import omega_std as omega_std
 from .predictors.windows import WindowErrors as WindowErrors
 from .predictors.windows import Windows as Windows
+from .report.content import ComparisonContent as ComparisonContent
+from .report.content import Content as Content
+from .report.content import DiagnosisContent as DiagnosisContent
+from .report.content import EffectResult as EffectResult
 from .report.content import comparison_content as comparison_content
 from .report.content import diagnosis_content as diagnosis_content
-from .report.result_keys import ComparisonContent as ComparisonContent
-from .report.result_keys import DiagnosisContent as DiagnosisContent
-from .report.result_keys import EffectResult as EffectResult
 from .runs import Counts as Counts
 from .runs import Run as Run
 from .runs import Smoothed as Smoothed

@@ -16,7 +16,6 @@ from cosim import InputError
 from cosim.command import printable, run_command
 
 from .commands.command_line import (
-    MAP,
     Done,
     command_of,
     import_later_parts,
@@ -41,31 +40,30 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .acceptance import FILES as RECORD
     from .acceptance import lines, read_criteria, validate
-    from .commands.initial_model import initial_model, proposing, write_map
+    from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
-    from .predictors import ship_with
-    from .report import comparison_content, show_comparison, write_report
+    from .predictors import MAP, ship_with
+    from .report import ReportData, file_content, show_comparison, write_report
+    from .report.document import write_json
 
     if options.criteria is None and (options.sign or options.learned):
         raise InputError("--sign and --learned are of a record: --criteria FILE.json is missing")
     criteria = None if options.criteria is None else read_criteria(options.criteria)
     with together(options.out, (*FILES, MAP, *RECORD)) as new:
-        model, fmu = initial_model(options.model, options.map, ship_with(options.effects, options.ship))
-        runs = gather(options.runs, advance, options.anyway, model, options.horizon, import_later_parts)
+        model = initial_model(options.model, options.map, ship_with(options.effects, options.ship))
+        paths, start = options.runs, model.start
+        runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
 
         with proposing():
-            comparison = session.evaluate(runs, fmu or model, advance=advance)
+            comparison = session.evaluate(runs, model, advance=advance)
         advance("where it fails")
-        files = FILES if fmu is None else (*FILES, MAP)
-        content = comparison_content(comparison, options.model, files)
-        (new / "comparison.json").write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        if comparison.use is not None:
-            write_map(new / MAP, comparison.use.given.content())
+        comparison.predictor.write(new)
+        files = [*FILES, *(name for name in (MAP,) if (new / name).exists())]
+        report = ReportData.of(comparison, options.model, files)
+        write_json(new / "comparison.json", file_content(report))
         origin = {"command": command_of("compare"), "SHA-256 of the input": inputs_of(options)}
-        write_report(
-            new / "report.html", content, comparison.evaluations, comparison.omega_std, advance, origin
-        )
+        write_report(new / "report.html", report, advance, origin)
         judged: list[str] = []
         if criteria is not None:
             advance("criteria")
@@ -76,7 +74,7 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
             written = record.write_into(new, options.sign)
             judged = ["Criteria", *(f"  {line}" for line in lines(record.content))]
             judged.append(f"  {', '.join(written)} in {options.out}")
-    return Done(0, [*show_comparison(content, str(options.out)), *map(printable, judged)])
+    return Done(0, [*show_comparison(report, str(options.out)), *map(printable, judged)])
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
-from .commands.initial_model import initial_model
 from .execution.progress import Advance, silent
 from .gathering import gather
-from .predictors import Fmu, Model, WeakWindows, ship_with, write_model
-from .report.content import diagnosis_content
+from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
+from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
 from .report.page import write_report
-from .report.result_keys import DiagnosisContent
+from .report.report_data import ReportData
 from .report.terminal import summary
 from .runs import Run, read_frame, ship_of_logs
 from .search import DEFAULT, Method, Prior, shares
+from .verdict.pruning_criteria import USUAL as PAIRED
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -91,7 +91,7 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
         return model
     loaded = [w for w in runs if isinstance(w, WeakWindows)]
     if loaded and name is None:
-        return session.nominal(loaded)
+        return nominal(loaded)
     if name is None:
         files = [run.folder if isinstance(run, Result) else run for run in runs]
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
@@ -114,9 +114,13 @@ class ShownDiagnosis(session.Diagnosis):
     """What a model lacks; shows itself in a terminal in ten lines, and in a notebook with pictures."""
 
     @cached_property
-    def content(self) -> DiagnosisContent:
-        """What ``diagnosis.json`` of the command holds."""
-        return diagnosis_content(self, None, [])
+    def _report(self) -> ReportData:
+        return ReportData.of(self)
+
+    @cached_property
+    def content(self) -> Content:
+        """What ``diagnosis.json`` of the command holds; its keys are attributes as well."""
+        return file_content(self._report)
 
     @property
     def model(self) -> Model:
@@ -146,7 +150,7 @@ class ShownDiagnosis(session.Diagnosis):
     @property
     def plot(self) -> Plots:
         """Pictures: ``plot.where()``, ``plot.omega()``, ``plot.track()``, ``plot.ranking()``."""
-        return Plots(self.content, self.comparison)
+        return Plots(self._report)
 
     def to_ssv(self, path: str | Path = "model.ssv", anyway: bool = False) -> Path:
         """Write the learned model as an SSP parameter set, for ``cosim.simulate(parameters=[...])``.
@@ -165,19 +169,18 @@ class ShownDiagnosis(session.Diagnosis):
 
     def write_report(self, path: str | Path = "report.html") -> Path:
         """Write the report of ``python -m diagnosis.learn``: one HTML file that needs no other."""
-        c = self.comparison
-        return write_report(path, self.content, c.evaluations, c.omega_std)
+        return write_report(path, self._report)
 
     def __repr__(self) -> str:
-        return summary(self.content)
+        return summary(self._report)
 
     def _repr_html_(self) -> str:
-        return as_html(self.content, self.plot)
+        return as_html(self._report)
 
 
 def compare(
     runs: Sequence[WeakWindows] | Source | Sequence[Source],
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     map: str | Path | None = None,  # noqa: A002 - as the option of the command
     advance: Advance = silent,
     ship: str | Path | None = None,
@@ -186,7 +189,8 @@ def compare(
 
     Args:
         runs: from :func:`load`, or what that takes.
-        model: the nominal one of the runs' ship by default; or the path of a parameter set or an FMU.
+        model: the nominal one of the runs' ship by default; an FMU, a Python function, or the path of
+            what ``--model`` takes.
         map: file that tells which of an FMU's variables are which signals; else its names and units do.
         advance: receives the name of each step when it begins.
         ship: whose nominal model that is, as :func:`load` has it.
@@ -197,7 +201,8 @@ def compare(
     given = _listed(runs)
     of = _model_of(model if isinstance(model, Model) else None, ship, given)
     if isinstance(model, (str, Path)):
-        of, model = initial_model(model, map, of.ship)
+        model = open_model(model, map, of.ship)
+        of = model.start or of
     loaded = given if _are_loaded(given) else load(given, model=of)
     return session.evaluate(loaded, model or of, advance=advance)
 
@@ -206,33 +211,42 @@ def diagnose(
     runs: Sequence[WeakWindows] | Source | Sequence[Source],
     held_out: Sequence[WeakWindows] | Source | Sequence[Source] = (),
     prior: Prior = None,
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
     ship: str | Path | None = None,
+    validate: Sequence[WeakWindows] | Source | Sequence[Source] = (),
+    pruning: str = PAIRED,
 ) -> ShownDiagnosis:
     """Learn what a model lacks.
 
     Args:
         runs: to learn from: from :func:`load`, or what that takes.
-        held_out: runs to test on only; likewise.
+        held_out: test runs, likewise: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            beside which the effects of that ship are tried.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
+            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
         ship: whose nominal model is the initial one, as :func:`load` has it.
+        validate: validation runs, likewise: they decide what is kept; without any, training data left
+            out in turn do.
+        pruning: criterion by which effects are rejected: "paired", "bic", or a file.
 
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    given, others = _listed(runs), _listed(held_out)
-    of = _model_of(model if isinstance(model, Model) else None, ship, [*given, *others])
+    parts = [_listed(runs), _listed(validate), _listed(held_out)]
+    of = _model_of(model if isinstance(model, Model) else None, ship, [r for p in parts for r in p])
+    if isinstance(model, (str, Path)):
+        model = open_model(model, ship=of.ship)
+        of = model.start or of
     shares(of.ship, prior)  # before any work
-    train = given if _are_loaded(given) else load(given, model=of)
-    test = others if not others or _are_loaded(others) else load(others, model=of)
-    found = session.diagnose(train, test, prior, model or of, advance, seed, by)
+    train, decide, test = (
+        p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
+    )
+    found = session.diagnose(train, test, prior, model or of, advance, seed, by, decide, pruning)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -13,7 +13,6 @@ from cosim import InputError
 from cosim.command import FAILED, run_command
 
 from .commands.command_line import (
-    MAP,
     Done,
     command_of,
     import_later_parts,
@@ -27,6 +26,8 @@ from .commands.command_line import (
 from .execution.progress import Advance
 from .execution.result_folder import together
 from .search.methods import DEFAULT, METHODS, method
+from .verdict.pruning_criteria import CRITERIA, criterion
+from .verdict.pruning_criteria import USUAL as PAIRED
 
 DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "diagnosis.json",
@@ -36,7 +37,6 @@ DIAGNOSIS, MODEL, POSTERIOR, REPORT, CSV, TEX = FILES = (
     "coefficients.csv",
     "coefficients.tex",
 )
-FOUND = "found.fmu"  # of an FMU with what was found
 LATER = (DIAGNOSIS, REPORT, CSV, TEX)  # written when all is known
 
 
@@ -47,57 +47,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .commands.initial_model import initial_model, proposing, write_map
+    from .commands.initial_model import initial_model, proposing
     from .gathering import gather  # only now: it takes a while to import
-    from .predictors import ship_with, write_model
-    from .report import diagnosis_content, show_diagnosis, write_coefficients, write_report
+    from .predictors import WRITTEN, DescribedShip, ship_with
     from .search import shares
 
     method(options.method)  # before any work: an unknown name, or a library that is missing
-    with together(options.out, (*FILES, FOUND, MAP)) as new:
+    possible = [*dict.fromkeys((*FILES, *WRITTEN))]
+    with together(options.out, possible) as new:
         craft = ship_with(options.effects, options.ship)
-        model, fmu = initial_model(options.model, options.map, craft)
-        if fmu is not None and options.fit:
-            raise InputError("--fit is for a model of this project, not for an FMU")
+        model = initial_model(options.model, options.map, craft)
+        start = model.start
+        if options.fit and not model.parametric:
+            raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
         shares(craft, options.prior)
         by = method(options.method)
-        paths = [*options.train, *options.test]
-        runs = gather(paths, advance, options.anyway, model, options.horizon, import_later_parts)
+        criterion(options.pruning)
+        paths = [*options.train, *options.validate, *options.test]
+        runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session
-        from .predictors import write_wrapper
+        from .report import ReportData, file_content, show_diagnosis, write_coefficients, write_report
+        from .report.document import write_json
         from .search.prediction_fit.output_fit import fitted
 
-        train = len(options.train)
-        model = fitted(runs[:train], model, options.prior, options.fit)
+        train, decide = len(options.train), len(options.train) + len(options.validate)
+        if options.fit and start is not None:
+            model = DescribedShip(fitted(runs[:train], start, options.prior, options.fit))
         with proposing():
             diagnosis = session.diagnose(
-                runs[:train], runs[train:], options.prior, fmu or model, advance, by=by
+                runs[:train],
+                runs[decide:],
+                options.prior,
+                model,
+                advance,
+                by=by,
+                validate=runs[train:decide],
+                pruning=options.pruning,
             )
-        refused, use, notes = "", diagnosis.comparison.use, []
-        if use is not None:
-            told, map_of_it = write_wrapper(
-                new / FOUND, use, diagnosis.start, diagnosis.learned.model, runs
-            )
-            notes = [told]
-            write_map(new / MAP, (map_of_it or use.given).content())
-        elif not (diagnosis.sound or options.allow_unstable):
+        refused, notes, predictor = "", [], diagnosis.comparison.predictor
+        if not (diagnosis.sound or options.allow_unstable):
             refused = UNSOUND
         else:
             try:
-                write_model(new / MODEL, diagnosis.learned.model)
-                diagnosis.posterior.write(new / POSTERIOR)
+                notes = predictor.write(new, diagnosis.learned.model, runs)
+                if predictor.parametric:
+                    diagnosis.posterior.write(new / POSTERIOR)
             except InputError as error:  # a parameter that no FMU would take
                 refused = str(error)
-        files = [name for name in (*FILES, FOUND, MAP) if (new / name).exists() or name in LATER]
-        content = diagnosis_content(diagnosis, options.model, files)
-        (new / DIAGNOSIS).write_text(content.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        write_coefficients(content, new / CSV, new / TEX)
-        comparison = diagnosis.comparison
+        files = [name for name in possible if (new / name).exists() or name in LATER]
+        report = ReportData.of(diagnosis, options.model, files)
+        write_json(new / DIAGNOSIS, file_content(report))
+        write_coefficients(diagnosis, new / CSV, new / TEX)
         origin = {"command": command_of("learn"), "SHA-256 of the input": inputs_of(options)}
-        write_report(
-            new / REPORT, content, comparison.evaluations, comparison.omega_std, advance, origin
-        )
-    shown = [*show_diagnosis(content, str(options.out)), *notes]
+        write_report(new / REPORT, report, advance, origin)
+    shown = [*show_diagnosis(report, str(options.out)), *notes]
     if refused:
         return Done(FAILED, [*shown, f"{MODEL} is NOT written: {refused}"])
     return Done(0, shown)
@@ -111,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
         "learn",
         "Learn from measured runs which physical effect a model lacks, and how sure that is.",
         "examples:  %(prog)s run1.csv run2.csv --test run3.csv\n"
+        "           %(prog)s run1.csv run2.csv --validate run3.csv --test run4.csv\n"
         "           %(prog)s results/hidden_drag --prior 0 --out results/found\n"
         "           %(prog)s run1.csv --prior mass=0.01,thrust=0.5,X_u=0.1\n"
         "           %(prog)s run1.csv --effects my_effects.py\n"
@@ -124,15 +128,19 @@ def _parser() -> argparse.ArgumentParser:
         metavar="TRAIN",
         help="measured run to learn from, or folder of a log",
     )
-    made.add_argument(
-        "--test",
-        type=Path,
-        nargs="+",
-        action="extend",
-        metavar="RUN",
-        default=[],
-        help="runs of which nothing is learned, to see the error fall",
-    )
+    for option, what in (
+        ("--validate", "decide what is kept and how sure it is (training data left out in turn)"),
+        ("--test", "are predicted and decide nothing, to see the error fall"),
+    ):
+        made.add_argument(
+            option,
+            type=Path,
+            nargs="+",
+            action="extend",
+            metavar="RUN",
+            default=[],
+            help=f"runs that {what}",
+        )
     made.add_argument(
         "--prior",
         type=prior,
@@ -153,6 +161,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         default=DEFAULT,
         help=f"of identification: {', '.join(METHODS)}, or a FILE.py of your own ({DEFAULT})",
+    )
+    made.add_argument(
+        "--pruning",
+        metavar="NAME",
+        default=PAIRED,
+        help=f"criterion by which effects are rejected: {', '.join(CRITERIA)}, or a FILE.py of your own "
+        f"({PAIRED})",
     )
     made.add_argument(
         "--allow-unstable", action="store_true", help="write model.ssv though it is not sound"

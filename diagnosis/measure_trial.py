@@ -17,11 +17,12 @@ from cosim.command import command_parser, printable, run_command
 from cosim.results import read_options
 from cosim.trials import KINDS, Outcome, draw_trial, executes, outcome, sheet, simulated_trial
 
-from .commands.command_line import Done, out_options, run
+from .commands.command_line import Done, anyway_option, out_options, run, ship_option
 from .execution.progress import Advance
 from .execution.result_folder import together
 
 FILES = ("trial.json", "trial.png")
+PART = "part"  # a channel that marks the rows of the trial, whatever becomes of their times
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,39 +46,45 @@ def trial(options: argparse.Namespace, advance: Advance) -> Done:
 
 
 def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, list[str]]:
-    """A measured trial, smoothed, and what its channels say of the measurement.
+    """A measured trial, smoothed, and what its channels show of the measurement.
+
+    The whole run is prepared, as for all commands; the trial is the part of it between two times of the
+    file, whatever its channels show of its clock.
 
     Raises:
-        InputError: it cannot be read, or nobody says which trial it is.
+        InputError: the run cannot be read, or its kind of trial is not stated.
     """
     from .assessment.trial_errors import length_of, measured_passage
-    from .gathering import gather
+    from .gathering import motion, usable
     from .predictors import Model, ship_with
-    from .runs import read, sensor_lines
+    from .runs import prepare, read, sensor_lines
 
     craft = ship_with((), options.ship)
-    found = read(options.run, of=craft)
-    kind = options.trial or found.trial
+    advance("reading")
+    whole = read(options.run, of=craft)
+    kind = options.trial or whole.trial
     if kind is None:
         raise InputError(
-            f"'{options.run}' does not say which trial it is: give --trial, or put "
+            f"'{options.run}' does not state which trial it is: give --trial, or put "
             f'{{"trial": "zigzag"}} into \'{options.run}.json\''
         )
     low, high = options.start or -np.inf, np.inf if options.stop is None else options.stop
-    found = replace(found.rows((found.time >= low) & (found.time <= high)), trial=kind)
-    (windows,) = gather([found], advance, options.anyway, Model(ship=craft))
+    inside = ((whole.time >= low) & (whole.time <= high)).astype(float)
+    marked = replace(whole, trial=kind, measured={**whole.measured, PART: inside})
+    prepared = prepare(marked, craft, options.anyway)
+    part = prepared.part(prepared.track.run.measured[PART] > 0.5)
+    advance("smoothing")
+    usable([motion(part)], Model(ship=craft), options.anyway)
     length = length_of(craft)
-    whole = measured_passage(windows.smoothed, craft)
-    seen = outcome(kind, whole, length)
-    examined = windows.smoothed.sensors
-    notes = [] if examined is None else [*sensor_lines(examined.findings), *examined.notes]
-    way = whole.along(whole.time[0], executes(whole)[0])
+    passage = measured_passage(part.smoothed, craft)
+    notes = [*sensor_lines(prepared.sensors.findings), *prepared.sensors.notes]
+    way = passage.along(passage.time[0], executes(passage)[0])
     if way < length:
         notes.append(
             f"only {way:.3g} m before the first execute: heading and speed there are of the last ship's "
             f"length, {length:.3g} m; begin the trial earlier"
         )
-    return seen, notes
+    return outcome(kind, passage, length), notes
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -90,15 +97,15 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written)",
     )
     made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
-    made.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")
+    ship_option(made)
     made.add_argument(
         "--trial", choices=KINDS, help="which it is (as the file beside it, or the log, says)"
     )
-    made.add_argument("--from", dest="start", metavar="T", type=float, help="first time used [s]")
-    made.add_argument("--to", dest="stop", metavar="T", type=float, help="last time used [s]")
     made.add_argument(
-        "--anyway", action="store_true", help="though units or signs seem to be other ones than said"
+        "--from", dest="start", metavar="T", type=float, help="first time of the file that is used [s]"
     )
+    made.add_argument("--to", dest="stop", metavar="T", type=float, help="last one [s]")
+    anyway_option(made)
     out_options(made, Path("results", "trial"))
     return made
 

@@ -31,7 +31,7 @@ def pca(options: argparse.Namespace, advance: Advance) -> Done:
 
     of = ship_with((), options.ship)
     with together(options.out, FILES) as new:
-        runs = gather_samples(options.runs, options.estimates, advance, of)
+        runs = gather_samples(options.runs, options.estimates, advance, of, options.anyway)
         advance("principal components")
         found = analyse(runs, options.components)
         write_json(new / FILES[0], content(found, options.estimates))

@@ -38,7 +38,7 @@ def pls(options: argparse.Namespace, advance: Advance) -> Done:
 
     of = ship_with((), options.ship)
     with together(options.out, FILES) as new:
-        runs = gather_samples(options.runs, options.estimates, advance, of)
+        runs = gather_samples(options.runs, options.estimates, advance, of, options.anyway)
         samples = joined(runs)
         if not options.keep_outliers:
             advance("outliers")

@@ -13,7 +13,7 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import command_parser, printable, run_command
 
-from .commands.command_line import Done, run
+from .commands.command_line import Done, anyway_option, run, ship_option
 from .execution.progress import Advance
 from .execution.result_folder import together
 
@@ -29,7 +29,7 @@ def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .gathering import gather
     from .predictors import Model, ship_with
-    from .runs import clean, propose  # only now: they take a second to import
+    from .runs import propose  # only now: they take a second to import
 
     craft = ship_with((), options.ship)
     path = options.file
@@ -37,26 +37,24 @@ def columns(options: argparse.Namespace, advance: Advance) -> Done:
     if options.write and not options.overwrite and beside.exists():
         raise InputError(f"'{beside}' is there already; --overwrite replaces it")
     found = propose(path, craft)
-    gather(
-        [found.run], advance, options.anyway, Model(ship=craft)
-    )  # as load does: refuses what is no ship's motion
-    track = clean(found.run, options.anyway)
-    counts, seconds = track.counts(), track.run.time[-1] - track.run.time[0]
+    (windows,) = gather([found.run], advance, options.anyway, Model(ship=craft))  # as all commands do
+    track, counts = windows.smoothed.track, windows.smoothed.counts
+    seconds = track.run.time[-1] - track.run.time[0]
     shown = [
         f"'{path}': {counts.samples} samples in {seconds:.4g} s, one each {track.period:.3g} s; "
-        f"{counts.frozen} frozen, {counts.dropped} dropped",
+        f"{counts.frozen} frozen, {counts.dropped} dropped, {counts.spikes} spikes",
         *track.notes,
     ]
     if found.unused:
         shown.append(f"not used: {', '.join(found.unused)}")
     if not found.needed:
-        return Done(0, [*map(printable, shown), f"nothing needs to be told beside '{path}'"])
+        return Done(0, [*map(printable, shown), f"nothing needs to be stated next to '{path}'"])
     text = json.dumps(found.needed, indent=2, ensure_ascii=False)
     if options.write:
         with together(path.parent, (beside.name,)) as new:
             (new / beside.name).write_text(f"{text}\n", encoding="utf-8")
-    told = f"written into '{beside}':" if options.write else f"--write puts this into '{beside}':"
-    return Done(0, [*map(printable, [*shown, told]), text])
+    stated = f"written into '{beside}':" if options.write else f"--write puts this into '{beside}':"
+    return Done(0, [*map(printable, [*shown, stated]), text])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -69,12 +67,10 @@ def _parser() -> argparse.ArgumentParser:
         "exit codes: 0 done, 2 bad input (nothing is written), 130 interrupted (nothing is written)",
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="CSV or Parquet file")
-    parser.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")
+    ship_option(parser)
     parser.add_argument("--write", action="store_true", help="write it, as FILE.json")
     parser.add_argument("--overwrite", action="store_true", help="also over one that is there")
-    parser.add_argument(
-        "--anyway", action="store_true", help="though units or signs seem to be other ones than found"
-    )
+    anyway_option(parser)
     return parser
 
 

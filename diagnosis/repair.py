@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from cosim import InputError
 from cosim.command import command_parser, run_command
 
-from .commands.command_line import Done, run
+from .commands.command_line import Done, run, ship_option
 from .execution.progress import Advance
 from .execution.result_folder import together
 
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
 WINDOW = 8.0  # s, times the scale of the ship: of a prediction
 KINDS = (".csv", ".parquet")
-ALONE = (
-    "the pose is all that is measured: nothing says the same twice, so nothing can be held against it"
-)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def repair(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .predictors import ship_with
-    from .runs import examine, layout_beside, read, table_of  # only now: they take a second to import
+    from .runs import layout_beside, prepare, table_of  # only now: they take a second to import
 
     out = options.out
     if out.suffix not in KINDS:
@@ -47,59 +44,60 @@ def repair(options: argparse.Namespace, advance: Advance) -> Done:
     if out.exists() and not options.overwrite:
         raise InputError(f"'{out}' is there already; --overwrite replaces it")
     craft = ship_with((), options.ship)
-    advance("reading")
-    measured = read(options.run, of=craft)
-    advance("what channels say of each other")
-    found = examine(measured, craft.scale)
-    beside = f"{out.name}.json"
-    with together(out.parent, (out.name, beside)) as new:
-        table = table_of(found.run)
+    advance("reading, and comparing channels")
+    prepared = prepare(options.run, craft, anyway=True)  # what cannot be repaired is reported
+    repaired = prepared.sensors.run
+    side_car = f"{out.name}.json"
+    with together(out.parent, (out.name, side_car)) as new:
+        table = table_of(repaired)
         if out.suffix == ".csv":
             table.to_csv(new / out.name, index=False)
         else:
             table.to_parquet(new / out.name, index=False)
-        told = layout_beside(found.run)
-        (new / beside).write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    return Done(
-        0, [*_told(found), *_closed(measured, found.run, craft.scale), f"written: {out}, {out}.json"]
-    )
+        beside = layout_beside(repaired)
+        (new / side_car).write_text(json.dumps(beside, indent=2) + "\n", encoding="utf-8")
+    closed = _closed(prepared.raw, repaired, craft.scale)
+    return Done(0, [*_found(prepared.sensors), *closed, f"written: {out}, {out}.json"])
 
 
-def _told(found: "Examined") -> list[str]:
+def _found(sensors: "Examined") -> list[str]:
     """What was found and done, a line each."""
     from .runs import sensor_lines
 
-    beside = ", ".join(found.run.measured)
-    first = f"measured beside the pose: {beside}" if beside else ALONE
-    lines = [*sensor_lines(found.findings), *found.notes]
-    if beside and not found.findings:
-        lines.append("no fault: what says the same twice agrees")
-    return [first, *lines]
+    others = ", ".join(sensors.run.measured)
+    if not others:
+        return ["the pose is all that is measured: no other channel can be compared with it"]
+    lines = [*sensor_lines(sensors.findings), *sensors.notes]
+    if not sensors.findings:
+        lines.append("no fault: redundant channels agree")
+    return [f"measured in addition to the pose: {others}", *lines]
 
 
 def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
-    """What windows of the length of a prediction miss by, before and after."""
+    """Errors of windows of the length of a prediction, before and after."""
     from .runs import closure
 
     window = WINDOW * scale.time
     pairs = [closure(run, window, window) for run in (before, after)]
-    position, heading = zip(*pairs, strict=True)
+    names = {
+        "position by speed and heading": ("median", "m", 1.0),
+        "heading by yaw rate in turns": ("RMS", "°", degrees(1.0)),
+    }
     lines = []
-    if all(map(isfinite, position)):
-        shown = " -> ".join(f"{x:.3g}" for x in position)
-        lines.append(f"position by speed and heading over {window:.3g} s misses by (median): {shown} m")
-    if all(map(isfinite, heading)):
-        shown = " -> ".join(f"{degrees(x):.3g}" for x in heading)
-        lines.append(f"heading by yaw rate over {window:.3g} s in turns misses by (RMS): {shown}°")
+    for errors, (name, (kind, unit, factor)) in zip(
+        zip(*pairs, strict=True), names.items(), strict=True
+    ):
+        if all(map(isfinite, errors)):
+            shown = " -> ".join(f"{factor * error:.3g}" for error in errors)
+            lines.append(f"error of the {name} over {window:.3g} s ({kind}): {shown} {unit}")
     return lines
 
 
 def _parser() -> argparse.ArgumentParser:
     made = command_parser(
         "diagnosis.repair",
-        "Hold the channels of a measurement that say the same twice against each other, "
-        "and repair what they show to be wrong: clock, scale, offset, place, delay, wraps, units. "
-        "No model of the ship is used.",
+        "Compare the redundant channels of a measurement, and repair the faults that they show: clock, "
+        "scale, offset, place, delay, wraps, units. No model of the ship is used.",
         "examples:  %(prog)s trial.csv --ship my_ship.toml --out repaired.csv\n"
         "exit codes: 0 done, nothing may be wrong; 2 bad input; 130 interrupted (nothing written)",
     )
@@ -109,9 +107,9 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         required=True,
         metavar="FILE",
-        help="CSV or Parquet file; FILE.json beside it tells the noise",
+        help="CSV or Parquet file; FILE.json next to it has the noise",
     )
-    made.add_argument("--ship", metavar="NAME|FILE.toml", help="the ship that was measured (cse1)")
+    ship_option(made)
     made.add_argument("--overwrite", action="store_true", help="also over a file that is there")
     return made
 

@@ -31,7 +31,7 @@ def replay(options: argparse.Namespace, advance: Advance) -> Done:
 
     with together(options.out, FILES) as new:
         advance("reading")
-        source = gather_source(options.run)
+        source = gather_source(options.run, options.anyway)
         loop = loop_of(options.run, options.controller, options.observer, options.scenario)
         played = play(source, loop, advance)
         advance("spikes")

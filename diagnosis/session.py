@@ -2,50 +2,41 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import LinAlgError
+from typing_extensions import deprecated
 
 from cosim import InputError
-from fmus.ship import ship
-from fmus.ships.naming import DEFAULT as USUAL
 
 from .assessment.regions import ErrorRegions, find_regions
-from .assessment.remainder import Remainder
-from .assessment.stability import OperatingRegion, Stability, check_stability, drives_on
+from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import for_each
 from .execution.progress import Advance, silent
 from .predictors import (
-    Fmu,
+    DescribedShip,
+    Evaluation,
     Model,
-    Use,
+    ModelSource,
+    Predictor,
     WeakWindows,
-    as_model,
-    by_fmu,
-    evaluate_fmu,
-    omega,
+    evaluate_run,
+    nominal,
+    open_model,
     told_apart,
-    use_of,
 )
-from .predictors.bands import Bands
-from .predictors.evaluation import Evaluation, evaluate_run
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
-from .search.findings import Finding, Findings
-from .search.prediction_fit.disturbance_summary import Unrecorded
-from .search.prediction_fit.joint_posterior import Posterior
 from .search.prediction_fit.predicted_bands import prediction_bands
-from .search.prediction_fit.refit import to_predictions
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
-from .verdict.calibrated_model import calibrated
-from .verdict.decision import Verdict, believed, concluded, doubted, limited, remainder_of, verdict
-from .verdict.pruning import NOTHING, Unseen, Withdrawn, unique_shares, withdraw
-from .verdict.validation_data import harm
+from .verdict.judging import Verdict, judge
+from .verdict.pruning_criteria import USUAL, criterion
+from .verdict.validation_data import ValidationData
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
@@ -58,12 +49,17 @@ class Comparison:
     Attributes:
         evaluations: one for each run.
         omega_std: of each run the standard deviation (K, 3) of its model error [N, N, N m].
-        use: how an FMU predicts the runs; None: it is no FMU.
+        predictor: what predicts the runs; of two models the initial one.
     """
 
     evaluations: Sequence[Evaluation]
     omega_std: Sequence[np.ndarray]
-    use: Use | None = None
+    predictor: Predictor
+
+    @property
+    @deprecated("Use predictor.")
+    def use(self) -> Predictor | None:
+        return None if self.predictor.parametric else self.predictor
 
     @cached_property
     def before(self) -> ErrorRegions:
@@ -80,61 +76,32 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """What a model lacks, as learned from some runs.
+class Diagnosis(Verdict):
+    """A verdict, and what it rests on.
 
     Attributes:
-        learned: the findings, and the model with them.
-        withdrawn: effects that were accepted and taken back.
-        remainder: what the learned model leaves; where nothing was learned, the first one.
-        refitted: whether the learned model has other nominal coefficients and no effect.
-        dropped: effects that were accepted, where the learned model has other coefficients instead.
-        shares: for each finding the share of the error's sum of squares that it explains.
-        unique: for each the share that nothing else explains; None where that cannot be told.
-        comparison: errors before and after, on the training runs and then on those held out.
+        comparison: errors before and after, on training, validation and test runs, in this order.
         start: the initial model.
         stability: of the learned model.
         speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
-        posterior: of all fitted values; of none where nothing was learned.
-        unrecorded: what acts on the ship and is in no command and no effect.
     """
 
-    learned: Findings
-    withdrawn: Sequence[Withdrawn]
-    remainder: Remainder
-    refitted: bool
-    dropped: Sequence[Finding]
-    shares: Sequence[float]
-    unique: Sequence[float | None]
     comparison: Comparison
     start: Model
     stability: Stability
     speeds: tuple[float, float, float]
     prior: Prior
     seed: int
-    posterior: Posterior
-    unrecorded: Unrecorded
-
-    @property
-    def verdict(self) -> Verdict:
-        return verdict(self.learned, self.refitted, self.remainder)
-
-    @property
-    def calibrated(self) -> bool:
-        """Whether the learned model has other coefficients, and these are no explanation."""
-        return self.refitted and self.verdict == "unexplained"
-
-    @property
-    def believed(self) -> list[bool]:
-        """Of each effect of the learned model whether it is a finding, or a possibility."""
-        return [believed(f) for f in self.learned.effects]
 
     @property
     def sound(self) -> bool:
-        """Whether the learned model has a mass and stays bounded in closed loop; not asked of an FMU."""
-        return self.comparison.use is not None or bool(self.stability.safe)
+        """Whether the learned model has a mass and stays bounded in closed loop.
+
+        Of a predictor that is not a model of this project that is not judged.
+        """
+        return not self.comparison.predictor.parametric or bool(self.stability.safe)
 
 
 @contextmanager
@@ -150,23 +117,10 @@ def well_posed() -> Iterator[None]:
         raise InputError(f"these runs do not determine what is asked of them: {error}") from None
 
 
-def nominal(runs: Sequence[WeakWindows]) -> Model:
-    """The nominal model of the ship that runs are of.
-
-    Raises:
-        InputError: they are of several ships.
-    """
-    ships = dict.fromkeys(w.run.ship for w in runs)
-    if len(ships) > 1:
-        names = (USUAL if one is None else one.name for one in ships)
-        raise InputError(f"the runs are of several ships: {', '.join(names)}")
-    return Model(ship=ship(description=next(iter(ships), None)))
-
-
 @well_posed()
 def evaluate(
     runs: Sequence[WeakWindows],
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     after: Model | None = None,
     held_out: Sequence[WeakWindows] = (),
     advance: Advance = silent,
@@ -175,8 +129,8 @@ def evaluate(
 
     Args:
         runs: see :func:`diagnosis.gather`.
-        model: the nominal one of the runs' ship by default; an FMU, or the path of one, whose variables
-            are known by their names.
+        model: the nominal one of the runs' ship by default; an FMU, a Python function, or the path of
+            what ``--model`` takes.
         after: the learned model; None: nothing was learned.
         held_out: further runs, of which nothing was learned.
         advance: receives the name of each step when it begins.
@@ -185,24 +139,38 @@ def evaluate(
         InputError: the runs are so ill-conditioned that nothing can be computed of them; the FMU is not
             what it is taken for, or fails.
     """
+    every = told_apart([*runs, *held_out])
+    predictor = _source(model, every).on(every, advance)
+    return _compared(predictor, every[: len(runs)], after, every[len(runs) :], advance)
+
+
+def _source(model: Model | ModelSource | str | Path | None, runs: Sequence[WeakWindows]) -> ModelSource:
+    """The model of some runs as a source of predictions; the nominal one by default."""
+    if isinstance(model, (str, Path)):
+        return open_model(model)
+    return DescribedShip(model or nominal(runs)) if model is None or isinstance(model, Model) else model
+
+
+def _compared(
+    predictor: Predictor,
+    runs: Sequence[WeakWindows],
+    after: Model | None,
+    held_out: Sequence[WeakWindows],
+    advance: Advance,
+) -> Comparison:
+    """The errors of a predictor, and of it with additions, on runs and on those held out."""
     every = [*runs, *held_out]
     advance(f"predicting {', '.join(w.run.name for w in every)}")
-    if isinstance(model, (str, Path)):
-        model = Fmu(model)
-    if isinstance(model, Fmu):
-        every = told_apart(every)
-        use = use_of(model, [w.run for w in every])
-        beside = as_model(every, use, nominal(every))
-        predicted = [evaluate_fmu(w, use, beside) for w in every]
-        return Comparison(predicted, [omega_std(w, beside) for w in every], use)
-    before = model or nominal(every)
-    known = [before, after, *every, *(w.smoothed for w in every)]
 
     def of_run(k: int) -> Evaluation:
-        return evaluate_run(every[k], before, after, k >= len(runs))
+        return evaluate_run(every[k], predictor, after, k >= len(runs))
 
-    evaluations = for_each(of_run, range(len(every)), known)
-    return Comparison(evaluations, [omega_std(w, before) for w in every])
+    model = predictor.model
+    known = [predictor, model, after, *every, *(w.smoothed for w in every)]
+    each = range(len(every))
+    # What is not of this project may not outlive a fork.
+    evaluations = for_each(of_run, each, known) if predictor.parametric else [*map(of_run, each)]
+    return Comparison(evaluations, [omega_std(w, model) for w in every], predictor)
 
 
 @well_posed()
@@ -210,30 +178,68 @@ def diagnose(
     train: Sequence[WeakWindows],
     held_out: Sequence[WeakWindows] = (),
     prior: Prior = None,
-    model: Model | Fmu | str | Path | None = None,
+    model: Model | ModelSource | str | Path | None = None,
     advance: Advance = silent,
     seed: int = 0,
     by: str | Method = DEFAULT,
+    validate: Sequence[WeakWindows] = (),
+    pruning: str = USUAL,
 ) -> Diagnosis:
     """Learn what a model lacks.
 
     Args:
         train: runs to learn from, see :func:`diagnosis.gather`.
-        held_out: runs to test on only.
+        held_out: test runs: they are predicted, and decide nothing.
         prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
             or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, or the path of one,
-            beside which the effects of that ship are tried.
+        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
+            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
         advance: receives the name of each step when it begins.
         seed: of everything random.
         by: method of identification, or the name of one.
+        validate: validation runs: they decide what is kept; without any, training data left out in turn.
+        pruning: criterion of pruning, see :mod:`diagnosis.verdict.pruning_criteria`.
 
     Raises:
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
-    fmu = Fmu(model) if isinstance(model, (str, Path)) else model if isinstance(model, Fmu) else None
-    start = model if isinstance(model, Model) else nominal([*train, *held_out])
-    prior_shares(start.ship, prior)  # before any work
+    runs = told_apart([*train, *validate, *held_out])
+    source = _source(model, runs)
+    prior_shares((source.start or nominal(runs)).ship, prior)  # before any work
+    harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
+    _refuse_short(train)
+    train, validate = runs[: len(train)], runs[len(train) : len(runs) - len(held_out)]
+
+    predictor = source.on(runs, advance)
+    start = predictor.model
+    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
+    region = OperatingRegion.of(nu, start.ship.scale)
+    found = chosen.fit(train, start, prior, advance, seed)
+    data = ValidationData(train, validate, start, found.sigma)
+    known = NominalPrior.of(start, prior)
+    verdict = judge(found, data, known, harms, region, predictor.parametric, advance)
+    comparison = _predicted(verdict, predictor, runs, data, advance)
+    advance("stability")
+    stability = check_stability(verdict.learned.model, start, advance, region)
+
+    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
+    return Diagnosis(
+        **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
+        comparison=comparison,
+        start=start,
+        stability=stability,
+        speeds=(u, v, r),
+        prior=prior,
+        seed=seed,
+    )
+
+
+def _refuse_short(train: Sequence[WeakWindows]) -> None:
+    """Refuse training runs that are too short for folds.
+
+    Raises:
+        InputError: they are.
+    """
     blocks = sum(np.unique(w.block).size for w in train)
     if blocks < MIN_BLOCKS:
         block = BLOCK * train[0].scale.time
@@ -241,91 +247,24 @@ def diagnose(
             f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
             f"at least {MIN_BLOCKS * block:.3g} s are needed"
         )
-    runs = told_apart([*train, *held_out])
-    train, held_out = runs[: len(train)], runs[len(train) :]
-    use = None
-    if fmu is not None:
-        advance(f"what {fmu.name} does in measured states")
-        use = use_of(fmu, [w.run for w in runs])
-        start = as_model(runs, use, start)
-    chosen = method(by) if isinstance(by, str) else by
-    nu = np.concatenate([w.smoothed.nu[w.known] for w in train])
-    region = OperatingRegion.of(nu, start.ship.scale)
-    found = chosen.fit(train, start, prior, advance, seed)
-    advance("what unseen data say")
-    unseen = Unseen(train, held_out, start, found.sigma)
-    kept, withdrawn = withdraw(found, unseen, start, lambda a, b: drives_on(a, b, region))
-    kept = replace(kept, effects=[limited(f, start) for f in kept.effects])
-    belief = NominalPrior.of(start, prior)
-    learned, refitted, dropped = concluded(kept, [*train, *held_out], unseen, start, belief)
-    advance("fit to predictions")
-    something = bool(learned.effects) or refitted
-    fit = to_predictions(learned, train, belief, something)
-    if held_out and harm(*unseen.losses(fit.findings.model, start)):
-        # The fit by the model error was held against these runs already.
-        fit = fit.about(learned)
-    left = {f.id for f in fit.findings.effects}
-    withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
-    refitted = refitted or (something and not left)
-    if use is None and not any(believed(f) for f in fit.findings.effects):
-        advance("calibration")
-        alone = calibrated(fit.findings, train, held_out, start, belief)
-        if alone is not None:
-            dropped, refitted, something, fit = [*dropped, *fit.findings.effects], True, True, alone
-    learned = replace(fit.findings, effects=[limited(f, start) for f in fit.findings.effects])
-    final = learned.model if something else None
-    comparison = evaluate(train, start, final, held_out, advance)
-    if use is not None:
-        comparison = replace(comparison, evaluations=by_fmu(comparison.evaluations, use), use=use)
-
-    def bands(e: Evaluation) -> Bands | None:
-        return prediction_bands(e.smoothed, e.windows, learned.model, fit.posterior, fit.unrecorded.push)
-
-    every = comparison.evaluations
-    banded = [replace(e, bands=b) for e, b in zip(every, map(bands, every), strict=True)]
-    comparison = replace(comparison, evaluations=banded)
-    advance("what is left")
-    # What fails at times of its own in a run held out says nothing of what was learned of others.
-    judged = comparison.evaluations[: len(train) if learned.model.runs else None]
-    std = comparison.omega_std[: len(judged)]
-    remainder = remainder_of(judged, std, comparison.after.regions, learned)
-    learned = doubted(learned, remainder, start)
-    advance("stability")
-    stability = check_stability(learned.model, start, advance, region)
-    shares = _shares(learned, start, held_out)
-    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
-    return Diagnosis(
-        learned,
-        withdrawn,
-        remainder,
-        refitted,
-        dropped,
-        shares,
-        unique_shares(learned, start, comparison.evaluations),
-        comparison,
-        start,
-        stability,
-        (u, v, r),
-        prior,
-        seed,
-        fit.posterior,
-        fit.unrecorded,
-    )
 
 
-def _shares(learned: Findings, start: Model, held_out: Sequence[WeakWindows]) -> list[float]:
-    """Share of the initial sum of squares that each finding explains; axes weighted by noise.
-
-    Of runs held out; of times within a run, which no other run has, by cross-validation.
-    """
-    shares = [f.share for f in learned.effects]
-    if held_out:
-        models = [start, *(f.model for f in learned.effects)]
-        sums = np.array(
-            [sum(np.sum((omega(w, model) / learned.sigma) ** 2) for w in held_out) for model in models]
+def _predicted(
+    verdict: Verdict,
+    predictor: Predictor,
+    runs: Sequence[WeakWindows],
+    data: ValidationData,
+    advance: Advance,
+) -> Comparison:
+    """Errors of the initial and of the learned model, with bands about the predictions of the latter."""
+    learned, decide = verdict.learned.model, len(data.runs)
+    final = learned if verdict.changed else None
+    found = _compared(predictor.in_windows(), runs[:decide], final, runs[decide:], advance)
+    uses = ["train"] * len(data.train) + ["validate"] * len(data.validate) + ["test"] * len(runs)
+    evaluations = []
+    for e, use in zip(found.evaluations, uses, strict=False):
+        bands = prediction_bands(
+            e.smoothed, e.windows, learned, verdict.posterior, verdict.unrecorded.push
         )
-        unseen = (-np.diff(sums) / sums[0]).tolist()
-        shares = [
-            f.share if f.of_runs else share for f, share in zip(learned.effects, unseen, strict=True)
-        ]
-    return [min(1.0, max(0.0, share)) for share in shares]
+        evaluations.append(replace(e, bands=bands, use=use))
+    return replace(found, evaluations=evaluations, predictor=predictor)

@@ -35,7 +35,9 @@ def sysid(options: argparse.Namespace, advance: Advance) -> Done:
     if row is None and not options.runs:
         raise InputError("needs a run to learn from, or --recipe SYSID1 to SYSID4")
     with together(options.out, FILES) as new:
-        every = gather_samples([*options.runs, *options.test], options.estimates, advance)
+        every = gather_samples(
+            [*options.runs, *options.test], options.estimates, advance, anyway=options.anyway
+        )
         runs, others = every[: len(options.runs)], every[len(options.runs) :]
         advance("passes")
         found = result(runs, others, row, options.recipe or "identified")

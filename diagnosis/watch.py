@@ -30,7 +30,7 @@ def watch(options: argparse.Namespace, advance: Advance) -> Done:
 
     with together(options.out, FILES) as new:
         advance("reading")
-        source = gather_source(options.run)
+        source = gather_source(options.run, options.anyway)
         loop = watch_loop(options.run, WATCH, options.observer, options.scenario)
         played = play(source, loop, advance)
         write_json(new / FILES[0], content(played))

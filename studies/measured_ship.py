@@ -78,9 +78,8 @@ def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
     everything = diagnosis_content(last, None, [])
     ship_tables.write_findings(report, "Learned from all runs", everything)
     contents = {f"without {f.name}": f.content for f in folds} | {"all runs": everything}
-    report.result(
-        "diagnoses", {n: c.model_dump(mode="json", exclude=LEFT_OUT) for n, c in contents.items()}
-    )
+    kept = {n: {k: v for k, v in c.items() if k not in LEFT_OUT} for n, c in contents.items()}
+    report.result("diagnoses", kept)
     report.result("prior", prior)
     return report.write()
 

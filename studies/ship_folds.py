@@ -15,7 +15,7 @@ import pandas as pd
 
 import diagnosis
 from cosim import InputError
-from diagnosis import Diagnosis, DiagnosisContent, Model, WeakWindows, diagnosis_content
+from diagnosis import Content, Diagnosis, Model, WeakWindows, diagnosis_content
 from diagnosis.execution.progress import Advance
 from diagnosis.predictors import omega
 from diagnosis.runs import Run, read_frame
@@ -30,7 +30,7 @@ class Fold(NamedTuple):
 
     left_out: Sequence[str]
     found: Diagnosis
-    content: DiagnosisContent
+    content: Content
 
     @property
     def errors(self) -> list[Any]:

@@ -429,7 +429,7 @@ def test_rows_of_the_thesis_need_no_run(tmp_path):
         (pca, ["{}/short.csv"], "too few"),
         (pca, ["{}/a.csv", "--components", "9"], "1 to 8"),
         (pca, ["{}/nothing.csv"], "nothing.csv"),
-        (pca, ["{}/a.csv", "{}/a.csv"], "same measurement"),
+        (pca, ["{}/a.csv", "{}/a.csv"], "is given twice"),
         (pls, ["{}/a.csv", "--recipe", "PLS7"], "no recipe 'PLS7'"),
         (pls, ["{}/short.csv"], "too few"),
         (sysid, [], "needs a run"),

@@ -339,7 +339,7 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
 
 
 # Time and calibration of single parts of the diagnosis.
-MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.learning_time")
+MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.fit_drivers", "benchmarks.learning_time")
 
 
 @pytest.mark.parametrize("package", ["studies", "benchmarks"])
@@ -383,9 +383,9 @@ def test_file_names_are_unique(package):
     assert not set(names) & set(others) - ALSO_ELSEWHERE
 
 
-# cosim.command is a public path; studies.allocation and benchmarks.ellipse are commands, fmus has components of
-# these names.
-ALSO_ELSEWHERE = {"command", "allocation", "ellipse"}
+# cosim.command is a public path; studies.allocation, benchmarks.constants and benchmarks.ellipse are commands,
+# fmus and diagnosis have files of these names.
+ALSO_ELSEWHERE = {"command", "allocation", "constants", "ellipse"}
 
 
 @pytest.mark.parametrize(

@@ -10,17 +10,18 @@ from support.measured import sail, smoothed
 from diagnosis.predictors import Model, weak_windows
 from diagnosis.predictors.windows import Windows
 from diagnosis.search.findings import Findings
-from diagnosis.search.prediction_fit.fit import fit_to, shootings
-from diagnosis.search.prior import NominalPrior
-from diagnosis.search.refinement import Estimate
-from diagnosis.verdict.calibrated_model import (
+from diagnosis.search.prediction_fit.coefficient_calibration import (
     CONSTANTS,
     LEFT_OUT,
     LENGTH,
     Calibration,
     begin,
-    calibrated,
 )
+from diagnosis.search.prediction_fit.fit import fit_to, shootings
+from diagnosis.search.prior import NominalPrior
+from diagnosis.search.refinement import Estimate
+from diagnosis.verdict.coefficients import calibrated
+from diagnosis.verdict.validation_data import ValidationData
 
 DRAG = -2.0  # N s/m, hidden
 MOMENTS = (0.02, -0.02, 0.01, -0.01)  # N m, of each run, that nobody recorded
@@ -90,7 +91,7 @@ def test_a_constant_of_a_run_costs_less_than_what_it_does():
 
 @pytest.mark.slow
 def test_it_is_kept_where_runs_left_out_are_predicted_better():
-    out = calibrated(nothing_found(), runs(), [], Model(), PRIOR)
+    out = calibrated(nothing_found(), ValidationData(runs(), [], Model(), np.ones(3)), PRIOR)
     assert out is not None
     assert not out.findings.effects
     assert not out.findings.suspects
@@ -100,7 +101,9 @@ def test_it_is_kept_where_runs_left_out_are_predicted_better():
 
 @pytest.mark.slow
 def test_a_current_is_in_the_calibrated_model_where_runs_left_out_show_it():
-    out = calibrated(nothing_found(), runs(east=STREAM_EAST), [], Model(), PRIOR)
+    out = calibrated(
+        nothing_found(), ValidationData(runs(east=STREAM_EAST), [], Model(), np.ones(3)), PRIOR
+    )
     assert out is not None
     water = [out.findings.model.value(n) for n in ("V_n", "V_e")]
     assert water == pytest.approx([0.0, STREAM_EAST], abs=0.15 * STREAM_EAST)
@@ -108,5 +111,7 @@ def test_a_current_is_in_the_calibrated_model_where_runs_left_out_show_it():
 
 @pytest.mark.slow
 def test_nothing_is_calibrated_without_a_remainder_or_of_few_runs():
-    assert calibrated(nothing_found(), runs(0.0), [], Model(), PRIOR) is None
-    assert calibrated(nothing_found(), runs()[:3], [], Model(), PRIOR) is None
+    assert calibrated(nothing_found(), ValidationData(runs(0.0), [], Model(), np.ones(3)), PRIOR) is None
+    assert (
+        calibrated(nothing_found(), ValidationData(runs()[:3], [], Model(), np.ones(3)), PRIOR) is None
+    )

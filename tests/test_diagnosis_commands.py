@@ -28,7 +28,7 @@ from diagnosis import compare, learn, session
 from diagnosis.assessment.stability import OPERATING, least_dissipation
 from diagnosis.execution import result_folder
 from diagnosis.execution.result_folder import together
-from diagnosis.report import result_keys
+from diagnosis.report.formatting import finite
 from fmus.effects import STANDARD
 from fmus.ship import ship
 
@@ -125,17 +125,38 @@ def test_the_hidden_drag_is_found_and_the_error_falls(learned):
 
 def test_json_has_every_key_of_the_format(learned):
     content = strict(learned[0] / "diagnosis.json")
-    assert result_keys.DiagnosisContent.model_validate(content).model_dump(mode="json") == content
     assert {
         "verdict",
         "effects",
         "possibilities",
+        "withdrawn",
+        "remainder",
         "suspect_coefficients",
         "ranking",
         "data",
         "errors",
+        "where",
+        "where_after",
         "stability",
     } <= set(content)
+    assert [e["use"] for e in content["errors"]] == ["train", "test"]
+    region = {
+        "axis",
+        "by",
+        "unit",
+        "run",
+        "low",
+        "high",
+        "rms",
+        "elsewhere",
+        "share_of_time",
+        "sentence",
+    }
+    assert all(region == set(r) for r in content["where"]["regions"])
+    profile = {"axis", "by", "unit", "run", "ends", "rms", "uncertainty", "share_of_time"}
+    assert all(profile == set(p) for p in content["where_after"]["profiles"])
+    axis = {"rms", "uncertainty", "share"}
+    assert all(axis == set(a) for a in content["remainder"]["axes"].values())
     effect = {
         "id",
         "axis",
@@ -199,7 +220,8 @@ def test_the_files_agree_with_each_other_and_with_the_model(learned):
                 squares = [
                     n * (x or 0.0) ** 2 for n, x in zip(p["share_of_time"], p["rms"], strict=True)
                 ]
-                assert math.sqrt(sum(squares)) == pytest.approx(total)
+                # The profiles hold the test run, too; what remains is judged without it.
+                assert math.sqrt(sum(squares)) == pytest.approx(total, rel=0.05)
     for key, of in (("nominal", start), ("learned", last)):  # over the region of the data
         assert least_dissipation(of, OPERATING) < content["stability"][f"{key}_min_dissipation"] < 0.0
 
@@ -215,7 +237,7 @@ def test_terminal_tells_what_the_file_tells_within_80_columns(learned):
         *content["where"]["sentences"],
     ):
         assert " ".join(part.split()) in flat
-    assert "b (held out)" in flat
+    assert "b (seen only now)" in flat
     assert flat.endswith(f"report.html, coefficients.csv, coefficients.tex in {out}")
 
 
@@ -290,7 +312,7 @@ def test_compare_with_the_learned_model_gives_the_errors_after(names, learned, r
     assert sorted(p.name for p in (tmp_path / "1").iterdir()) == ["comparison.json", "report.html"]
     content = [e for e in strict(learned[0] / "diagnosis.json")["errors"] if e["run"] in names]
     first, last = (strict(tmp_path / k / "comparison.json") for k in "12")
-    assert result_keys.ComparisonContent.model_validate(first).model_dump(mode="json") == first
+    assert not [e for e in first["errors"] if "use" in e], "nothing is learned from any run"
     assert (first["model"], last["model"]) == (None, "model.ssv")
     for e, b, a in zip(content, first["errors"], last["errors"], strict=True):
         for key in ("window_position_rmse", "window_heading_rmse", "omega_rms"):
@@ -329,8 +351,7 @@ def test_a_model_that_is_not_sound_is_written_only_on_demand(options, code, runs
 
     def loose(*args, **kwargs):
         stability = check(*args, **kwargs)
-        values = {n: getattr(stability, n) for n in result_keys.StabilityResult.model_fields}
-        return SimpleNamespace(**values | {"bounded": False, "safe": False})
+        return SimpleNamespace(**vars(stability) | {"bounded": False, "safe": False})
 
     monkeypatch.setattr(session, "check_stability", loose)
     (tmp_path / "knowing.py").write_text(KNOWING)
@@ -422,7 +443,6 @@ def test_help_has_examples_and_exit_codes_on_lines_of_their_own(name):
 def written(monkeypatch, tmp_path):
     """The commands without their work: what is learned is given, and each file says what made it."""
     (tmp_path / "a.csv").write_text("time\n")
-    content = SimpleNamespace(model_dump_json=lambda indent: '{"verdict": "found"}')
     given = SimpleNamespace(
         sound=True,
         learned=SimpleNamespace(model=diagnosis.Model().plus({"delta_X_u": -1.0})),
@@ -431,22 +451,22 @@ def written(monkeypatch, tmp_path):
         files=None,
     )
 
-    def diagnosis_content(found, model, files):
+    def report_of(found, model, files):
         given.files = files
-        return content
+        return given
 
     def write_coefficients(made, csv, tex):
-        assert made is content
+        assert made is given
         csv.write_text("csv")
         tex.write_text("tex")
 
-    def write_report(path, made, evaluations, std, advance, origin):
-        assert made is content
+    def write_report(path, made, advance, origin):
+        assert made is given
         path.write_text("html")
 
     for name, stub in (
-        ("diagnosis_content", diagnosis_content),
-        ("comparison_content", diagnosis_content),
+        ("ReportData", SimpleNamespace(of=report_of)),
+        ("file_content", lambda made: {"verdict": "found"}),
         ("show_diagnosis", lambda made, out: [f"shown, in {out}"]),
         ("show_comparison", lambda made, out: [f"shown, in {out}"]),
         ("write_coefficients", write_coefficients),
@@ -623,5 +643,5 @@ def test_ctrl_c_leaves_nothing(runs, tmp_path):
 
 
 def test_numbers_that_are_none_are_null():
-    change = result_keys.Change(before=math.nan, after=math.inf)
-    assert change.model_dump_json() == '{"before":null,"after":null}'
+    found = finite({"a": math.nan, "b": [np.inf, np.float64(1.0)], "c": np.array([np.nan, 2.0])})
+    assert found == {"a": None, "b": [None, 1.0], "c": [None, 2.0]}

@@ -11,18 +11,20 @@ from diagnosis.assessment import remainder_text
 from diagnosis.assessment.recurrence import Recurrence
 from diagnosis.assessment.remainder import AxisRemainder
 from diagnosis.predictors import Model
-from diagnosis.predictors.bands import POINTS, Bands, quantile
+from diagnosis.predictors.evaluation import POINTS, Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
 from diagnosis.search.conclusion import interval, laplace_std, suspected
-from diagnosis.search.confidence import Evidence, confidence, evidence, variation
+from diagnosis.search.effect_evidence import Evidence, evidence, variation
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import Nuisance
 from diagnosis.search.nonlinear.multistart import Landscape, linear_ones, same
 from diagnosis.search.prior import NominalPrior
-from diagnosis.verdict import decision
-from diagnosis.verdict.decision import concluded
+from diagnosis.verdict import coefficients
+from diagnosis.verdict.coefficients import concluded
+from diagnosis.verdict.confidence import probability
 from fmus.declare import Range, Variable
+from fmus.ops import wrap
 from fmus.scale import Scale
 
 
@@ -34,10 +36,10 @@ def drawn(*shape, seed=0):
 
 
 def test_confidence_is_even_odds_where_a_third_is_left_or_the_size_varies_by_as_much():
-    assert confidence(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
+    assert probability(Evidence(1.0, 0.0, 0.0)) == pytest.approx(0.99, abs=1e-4)
     third = 4.6 / 14.0
     for left, varies in ((third, 0.0), (0.0, third), (0.5 * third, 0.5 * third)):
-        assert confidence(Evidence(0.8, left, varies)) == pytest.approx(0.4)
+        assert probability(Evidence(0.8, left, varies)) == pytest.approx(0.4)
 
 
 def test_what_is_left_counts_beyond_the_noise_and_by_how_far_the_effect_acts_on_an_axis():
@@ -136,15 +138,20 @@ def test_errors_of_windows_are_root_mean_squares_by_their_samples():
     assert np.isnan(none).all()
 
 
-def test_poses_between_steps_are_on_a_line_and_headings_on_the_short_way():
-    steps = np.zeros((3, 3, 2, 2))
-    steps[:, 0] = np.array([0.0, 2.0, 6.0])[:, None, None] * [[1.0, 10.0], [2.0, 20.0]]
-    steps[:, 2] = np.array([3.0, -3.0, -2.0])[:, None, None]
-    found = between_steps(steps, np.array([0, 1, 0, 1]), np.array([0.5, 1.25, 2.0, 3.0]))
+def test_poses_between_steps_are_on_a_cubic_and_headings_on_the_short_way():
+    t = np.arange(6.0)
+    steps = np.zeros((6, 3, 2, 2))
+    steps[:, 0] = (t**3 - 2.0 * t)[:, None, None] * [[1.0, 10.0], [2.0, 20.0]]
+    steps[:, 2] = wrap(3.0 + 0.2 * t)[:, None, None]
+    place = np.array([0.5, 1.25, 4.7, 6.0])
+    found = between_steps(steps, np.array([0, 1, 0, 1]), place)
     assert found.shape == (2, 4, 3)
-    assert found[0, :, 0] == pytest.approx([1.0, 30.0, 6.0, 100.0]), "beyond the last step goes on"
-    assert found[1, :, 0] == pytest.approx(2.0 * found[0, :, 0])
-    assert found[0, :2, 2] == pytest.approx([3.0 + 0.5 * (2.0 * np.pi - 6.0), -2.75])
+    exact = (place**3 - 2.0 * place) * [1.0, 10.0, 1.0, 10.0]
+    assert found[0, :, 0] == pytest.approx(exact), "beyond the last step goes on"
+    assert found[1, :, 0] == pytest.approx(2.0 * exact)
+    assert wrap(found[0, :, 2] - 3.0 - 0.2 * place) == pytest.approx(0.0, abs=1e-12)
+    two = between_steps(steps[:2], np.array([0]), np.array([0.5]))
+    assert two[0, 0, 0] == pytest.approx(-0.5), "two steps are on a line"
 
 
 # The remainder in words
@@ -237,18 +244,15 @@ def test_coefficients_alone_explain_what_was_missing_and_harm_nothing(monkeypatc
     effects = [Finding("X_u", {}, {}, 0.3, [], 0.5, 0.5, together=case["together"])]
     found = replace(alone, effects=effects if case["effects"] else [], refit=(lambda ids: alone) if case["refit"] else None)  # fmt: skip
     names = {id(found): "found", id(START): "first"}
-    monkeypatch.setattr(decision, "without", lambda f, ids, start: alone)
-    monkeypatch.setattr(decision, "harm", lambda now, each: each in case["harms"])
-    monkeypatch.setattr(
-        decision,
-        "something_left",
-        lambda runs, start, m: case["left_at_first" if m is START else "left_with"],
-    )
-    unseen = SimpleNamespace(
+    monkeypatch.setattr(coefficients, "without", lambda f, ids, start: alone)
+    monkeypatch.setattr(coefficients, "harm", lambda now, each: each in case["harms"])
+    data = SimpleNamespace(
+        start=START,
         judges=lambda f: case["judges"],
+        remains=lambda m: case["left_at_first" if m is START else "left_with"],
         losses=lambda now, *others: ["now", *(names[id(o)] for o in others)],
     )
-    c = concluded(found, [], unseen, START, NominalPrior.of(START))
+    c = concluded(found, data, NominalPrior.of(START))
     assert c.refitted == refitted
     if refitted:
         assert c.learned.model is OTHER

@@ -17,7 +17,7 @@ import diagnosis
 from diagnosis import propose_columns
 from diagnosis.runs import propose
 from diagnosis.runs.columns.columns import FIVE, POWER, TAU, THREE, Column, Layout
-from diagnosis.runs.files.csv_tables import csv_table
+from diagnosis.runs.files.tables import csv_table
 from fmus.ship import ship
 from fmus.thrusters.allocation import Allocation, thrust
 
@@ -139,7 +139,7 @@ def test_first_stamp_that_is_none_is_told(tmp_path):
     with_tau().assign(time=np.where(np.arange(N) == 7, "noon", stamps)).to_csv(
         tmp_path / "a.csv", index=False
     )
-    refused(tmp_path / "a.csv", "time = 'noon' is no date stamp of ISO 8601")
+    refused(tmp_path / "a.csv", "time = 'noon' is not a date stamp of ISO 8601")
 
 
 def test_unit_that_cannot_be_is_told_with_the_own_name_of_the_column(tmp_path):
@@ -214,10 +214,10 @@ def test_wrong_table_is_refused_with_one_line(tmp_path, edit, message):
 @pytest.mark.parametrize(
     ("layout", "message"),
     [
-        ({"columns": {"x": {"name": "x", "unit": "mn"}}}, "'mn' is no unit of x; did you mean 'm'?"),
+        ({"columns": {"x": {"name": "x", "unit": "mn"}}}, "'mn' is not a unit of x; did you mean 'm'?"),
         (
             {"columns": {"psi": {"name": "psi", "unit": "m"}}},
-            "'m' is no unit of psi; there are rad, deg",
+            "'m' is not a unit of psi; there are rad, deg",
         ),
         ({"columns": {"pzi": "psi"}}, "'pzi' is not a signal of a run; did you mean 'psi'?"),
         ({"columns": {"x": "North"}}, "no column 'North' (for x)"),
@@ -289,7 +289,7 @@ def test_number_with_a_comma_is_told_with_its_line(tmp_path):
 def test_unknown_encoding_is_refused(tmp_path, encoding):
     with_tau().to_csv(tmp_path / "a.csv", index=False)
     (tmp_path / "a.csv.json").write_text(json.dumps({"encoding": encoding}))
-    refused(tmp_path / "a.csv", f"encoding: '{encoding}' is no encoding")
+    refused(tmp_path / "a.csv", f"encoding: '{encoding}' is not an encoding")
 
 
 @pytest.mark.parametrize(
@@ -492,7 +492,7 @@ class TestColumns:
         with_tau().to_csv(tmp_path / "a.csv", index=False)
         assert propose(tmp_path / "a.csv").needed == {}
         done = command(propose_columns.main, tmp_path / "a.csv", "--write", "--anyway")
-        assert "nothing needs to be told" in done.stdout
+        assert "nothing needs to be stated" in done.stdout
         assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
     @pytest.mark.parametrize(
@@ -501,7 +501,7 @@ class TestColumns:
             ("time,north,east,speed\n0,0,0,1\n1,0,1,1\n", "has no commands"),
             (
                 "time,x [fathom],y,psi,tau_X\n0,0,0,0,1\n1,0,1,1,1\n",
-                "'fathom' in the column 'x [fathom]'",
+                "column 'x [fathom]': 'fathom' is not a unit of x",
             ),
             ("0,0,0,1\n1,0,1,1\n", "no table of numbers below a line of names"),
             ("a word\n", "no table of numbers below a line of names"),

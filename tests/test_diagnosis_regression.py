@@ -151,7 +151,8 @@ def test_folds_of_runs_and_of_the_stretches_of_one():
     def run(count):
         return SimpleNamespace(block=np.repeat(np.arange(count), 3))
 
-    assert [f.tolist() for f in block_folds([run(2), run(3)])] == [[0, 1], [2, 3, 4]]
+    assert [f.tolist() for f in block_folds([run(2), run(3), run(1)])] == [[0, 1], [2, 3, 4], [5]]
+    assert [f.tolist() for f in block_folds([run(2), run(3)])] == [[0], [1], [2, 3], [4]]
     assert [f.tolist() for f in block_folds([run(6)])] == [[0, 1], [2, 3], [4], [5]]
     assert [f.tolist() for f in block_folds([run(2)])] == [[0], [1]]
 

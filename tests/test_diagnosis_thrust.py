@@ -173,3 +173,12 @@ def test_a_long_gap_takes_neither_time_nor_memory():
     np.testing.assert_allclose(with_gap[before], without[before], atol=1e-9)
     after = base().time > 27.0  # twelve time constants later the gap is forgotten
     np.testing.assert_allclose(with_gap[after], without[after], atol=1e-4)
+
+
+@pytest.mark.parametrize("dynamics", [{"lag": 0.4}, {"delay": 0.37}, {"delay": 0.1, "lag": 0.7}])
+def test_linear_memories_are_the_filters_that_they_declare(dynamics):
+    response = Response(base(), Model(thrusters=dynamics))
+    commands = np.diff(response._commands(response.step * np.arange(response._steps + 1)), axis=0)
+    commands /= response.step
+    forgotten = np.exp(-12.0) * np.abs(commands).max()  # what the steps of a part begin without
+    np.testing.assert_allclose(response._filtered(commands), response._stepped(commands), atol=forgotten)

@@ -1,10 +1,10 @@
 """What a diagnosis says of what it does not know: remainder, verdict, withdrawal, confidence."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support import reported
 from support.measured import NOISE, commands, smoothed
 from support.planted import bank, dead_bow, gusts, voyages
 
@@ -21,15 +21,17 @@ from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.predictors.weak_form import commanded
 from diagnosis.report import diagnosis_content
 from diagnosis.report.headline import UNSURE, VERDICTS, verdict_title
-from diagnosis.search.confidence import confidence, credible, evidence
+from diagnosis.search.effect_evidence import credible, evidence
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import block_folds
 from diagnosis.search.map_regression import Scored, first_share
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.significance import lower_throughout, worse
-from diagnosis.verdict.decision import doubted, limited, verdict
-from diagnosis.verdict.pruning import Unseen, withdraw, without
-from diagnosis.verdict.validation_data import Losses, Part, harm
+from diagnosis.verdict.confidence import confidence_of, probability
+from diagnosis.verdict.judging import verdict_name, with_confidence
+from diagnosis.verdict.paired_errors import harm
+from diagnosis.verdict.pruning import prune, without
+from diagnosis.verdict.validation_data import Fold, Losses, ValidationData
 
 SHORT = {"count": 2, "seconds": 90.0}
 GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
@@ -40,10 +42,11 @@ GUSTS, BANK, DEAD = {"push": gusts}, {"push": bank}, {"dead": dead_bow}
 @pytest.mark.parametrize("said", VERDICTS)
 def test_heading_claims_no_more_than_the_findings(said, alone, possible):
     """Unsure are one cause without rivals that is not believed, and possibilities where none is found."""
-    effects = [SimpleNamespace(indistinguishable=[] if alone else ["X_u"])]
-    content = SimpleNamespace(verdict=said, effects=effects, possibilities=["X_u"] if possible else [])
+    effects = [reported.effect("lag", 0.5, indistinguishable=[] if alone else ["X_u"])]
+    possibilities = [reported.effect("X_u", 0.1)] if possible else []
+    r = reported.report_data(None, reported.diagnosis(verdict=said), effects, possibilities)
     unsure = (said == "ambiguous" and alone) or (said == "unexplained" and possible)
-    assert verdict_title(content) == (UNSURE if unsure else VERDICTS[said])
+    assert verdict_title(r) == (UNSURE if unsure else VERDICTS[said])
 
 
 def left(runs, model=None):
@@ -212,13 +215,13 @@ def test_effect_that_spoils_unseen_runs_is_withdrawn_and_another_kept():
     right, wrong = finding(start, delta_X_u=-3.0), finding(start, delta_N_r=1.0)
     model = start.plus({"delta_X_u": -3.0, "delta_N_r": 1.0})
     found = Findings([right, replace(wrong, model=model)], model=model, sigma=np.full(3, 0.01))
-    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
-    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    unseen = ValidationData(runs[:1], runs[1:], start, found.sigma)
+    kept, gone = prune(found, unseen, lambda a, b: False, harm)
     assert [w.id for w in gone] == ["N_r"]
-    assert "held-out" in gone[0].reason
+    assert "validation runs" in gone[0].reason
     assert [f.id for f in kept.effects] == ["X_u"]
     assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
-    assert withdraw(kept, unseen, start, lambda a, b: False) == (kept, [])
+    assert prune(kept, unseen, lambda a, b: False, harm) == (kept, [])
 
 
 @pytest.mark.parametrize(
@@ -234,8 +237,8 @@ def test_what_is_at_the_limit_of_what_was_looked_for_is_withdrawn_and_a_whole_sh
 ):
     runs, start = voyages(**SHORT, **hidden), Model()
     found = Findings([finding(start, **values)], model=start.plus(values), sigma=np.full(3, 0.01))
-    kept, gone = withdraw(
-        found, Unseen(runs[:1], runs[1:], start, found.sigma), start, lambda a, b: False
+    kept, gone = prune(
+        found, ValidationData(runs[:1], runs[1:], start, found.sigma), lambda a, b: False, harm
     )
     assert bool(kept.effects) == stays
     assert [w.id for w in gone] == ([] if stays else ["mass"])
@@ -246,17 +249,17 @@ def test_less_dissipation_needs_unseen_data_that_show_it():
     runs = voyages(**SHORT, ship={"delta_X_u": -3.0})
     start = Model()
     found = Findings([finding(start, delta_N_uv=1e-6)], model=start, sigma=np.full(3, 0.01))
-    unseen = Unseen([], runs, start, found.sigma)
-    assert withdraw(found, unseen, start, lambda a, b: False)[1] == []
-    assert [w.id for w in withdraw(found, unseen, start, lambda a, b: True)[1]] == ["N_uv"]
+    unseen = ValidationData([], runs, start, found.sigma)
+    assert prune(found, unseen, lambda a, b: False, harm)[1] == []
+    assert [w.id for w in prune(found, unseen, lambda a, b: True, harm)[1]] == ["N_uv"]
 
 
 def test_the_stretches_of_a_run_miss_together_what_it_misses():
     (w, *_), sigma = voyages(**SHORT), np.array([0.1, 0.2, 0.05])
     model = Model().plus({"delta_X_u": -1.0})
-    (whole,) = Part(w).losses([model], sigma)
+    (whole,) = Fold(w).losses([model], sigma)
     assert whole.omega.sum() == pytest.approx(np.sum((omega(w, model) / sigma) ** 2))
-    parts = [Part(w, blocks).losses([model], sigma)[0] for blocks in block_folds([w])]
+    parts = [Fold(w, blocks).losses([model], sigma)[0] for blocks in block_folds([w])]
     assert np.concatenate([p.omega for p in parts]) == pytest.approx(whole.omega)
     positions = np.concatenate([p.position for p in parts])
     assert 0 < positions.size < whole.position.size, (
@@ -288,7 +291,7 @@ def test_harm_is_by_the_model_error_or_by_predictions(its, harms):
     assert bool(harm(misses(**its), misses())) == harms
 
 
-class OnPredictions(Unseen):
+class OnPredictions(ValidationData):
     """Unseen data whose model errors are the same for every model, so that predictions alone decide."""
 
     def losses(self, *found):
@@ -308,10 +311,10 @@ def test_effect_that_spoils_predictions_alone_is_withdrawn_and_one_that_mends_th
         sigma=np.full(3, 0.01),
     )
     unseen = OnPredictions(runs[:1], runs[1:], start, found.sigma)
-    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    kept, gone = prune(found, unseen, lambda a, b: False, harm)
     assert [f.id for f in kept.effects] == ["X_u"]
     assert [w.id for w in gone] == ["N_r"]
-    assert "predictions of held-out runs are worse" in gone[0].reason
+    assert "predictions of validation runs are worse" in gone[0].reason
 
 
 def test_coefficients_beside_a_failure_of_one_run_are_held_against_unseen_runs():
@@ -321,8 +324,8 @@ def test_coefficients_beside_a_failure_of_one_run_are_held_against_unseen_runs()
     for drag, stays in ((-3.0, True), (3.0, False)):
         model = start.plus({**times, "delta_X_u": drag})
         found = Findings([replace(outage, model=model)], model=model, sigma=np.full(3, 0.01))
-        unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
-        kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+        unseen = ValidationData(runs[:1], runs[1:], start, found.sigma)
+        kept, gone = prune(found, unseen, lambda a, b: False, harm)
         assert [f.id for f in kept.effects] == ["bow_outage"]
         assert gone == []
         assert kept.model.values == (model if stays else start.plus(times)).values
@@ -334,11 +337,11 @@ def test_of_two_effects_that_stand_in_for_each_other_one_stays():
     first, second = finding(start, delta_X_u=-3.0), finding(start, delta_X_uuu=-200.0)
     model = start.plus(both)
     found = Findings([first, replace(second, model=model)], model=model, sigma=np.full(3, 0.01))
-    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+    unseen = ValidationData(runs[:1], runs[1:], start, found.sigma)
     alone = [without(found, [i], start) for i in ("X_u", "X_uuu")]
     full, *beside = unseen.losses(found, *alone)
     assert all(harm(full, other) for other in beside), "each is harmful beside the other"
-    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    kept, gone = prune(found, unseen, lambda a, b: False, harm)
     assert [w.id for w in gone] == ["X_uuu"]
     assert kept.model.values == start.plus({"delta_X_u": -3.0}).values
 
@@ -350,11 +353,11 @@ def test_coefficients_moved_beyond_belief_do_not_take_the_place_of_an_effect(mov
     rest = Findings(refitted=Model(vessel={"X_u": nominal - 3.0}), moved={"X_u": moved})
     almost = finding(start, delta_X_u=-2.5)
     found = Findings([almost], model=almost.model, sigma=np.full(3, 0.01), refit=lambda ids: rest)
-    unseen = Unseen(runs[:1], runs[1:], start, found.sigma)
+    unseen = ValidationData(runs[:1], runs[1:], start, found.sigma)
     full, other, first = unseen.losses(found, rest, start)
     assert harm(full, other)
     assert not harm(full, first)
-    kept, gone = withdraw(found, unseen, start, lambda a, b: False)
+    kept, gone = prune(found, unseen, lambda a, b: False, harm)
     assert [f.id for f in kept.effects] == (["X_u"] if stays else [])
     assert len(gone) == (not stays)
 
@@ -389,13 +392,13 @@ def told(confidence, together, ids=("X_u",), start=None):
     ],
 )
 def test_verdict_follows_the_confidence(found, refitted, remains, said):
-    assert verdict(found, refitted, left_on(X=remains)) == said
+    assert verdict_name(found, refitted, left_on(X=remains)) == said
 
 
 def test_verdict_goes_on_without_what_is_not_believed():
     unlikely, sure = told(0.1, 0.2, ["N_r"]), told(0.9, 0.9)
     both = replace(sure, effects=[*unlikely.effects, *sure.effects])
-    assert verdict(both, False, left_on()) == "found"
+    assert verdict_name(both, False, left_on()) == "found"
 
 
 @pytest.mark.parametrize(
@@ -412,11 +415,12 @@ def test_set_holds_95_percent_of_the_weights_that_confidence_comes_from(weights,
 
 def test_remainder_on_an_axis_of_an_effect_makes_it_even_odds_and_on_others_does_not():
     found = told(0.99, 0.99)
-    (there,) = doubted(found, left_on(X=True), Model()).effects
-    (beside,) = doubted(found, left_on(N=True), Model()).effects
+    (there,) = with_confidence(found, left_on(X=True), Model()).effects
+    (beside,) = with_confidence(found, left_on(N=True), Model()).effects
     assert there.confidence == there.together == 0.5
     assert "same axis" in there.doubt
-    assert beside == found.effects[0]
+    assert beside.confidence == beside.together == 0.99
+    assert not beside.doubt
 
 
 @pytest.mark.parametrize(("kilograms", "is_finding"), [(100.0, False), (96.0, False), (90.0, True)])
@@ -424,16 +428,16 @@ def test_value_at_the_limit_of_its_range_is_no_finding(kilograms, is_finding):
     start = Model()
     assert start.declared("mass").range.max == 100.0
     f = Finding("mass", {"mass": kilograms}, {}, 0.99, [], 0.9, 0.9, together=0.99)
-    seen = limited(f, start)
-    assert (seen.confidence == 0.99) == is_finding
+    seen = confidence_of(f, start)
+    assert (seen.own == 0.99) == is_finding
     assert ("limit of what was looked for" in seen.doubt) != is_finding
 
 
 @pytest.mark.parametrize(("interval", "sure"), [((-0.01, 0.05), False), ((0.01, 0.05), True)])
 def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
     f = Finding("lag", {"lag": 0.02}, {"lag": interval}, 0.94, [], 0.9, 0.9, together=0.94)
-    seen = limited(f, Model())
-    assert seen.confidence == (0.94 if sure else 0.5)
+    seen = confidence_of(f, Model())
+    assert seen.own == (0.94 if sure else 0.5)
     assert ("may be nothing" in seen.doubt) != sure
 
 
@@ -444,8 +448,8 @@ def test_a_value_that_may_be_nothing_is_no_sure_finding(interval, sure):
 def test_pose_younger_than_its_stamp_is_not_told_from_lags_that_are_too_long(name, offset, sure):
     start = Model(ship=ship_with((), name))
     f = Finding("clock_offset", {"clock_offset": offset}, {}, 0.99, [], 0.9, 0.9, together=0.99)
-    seen = limited(f, start)
-    assert seen.confidence == (0.99 if sure else 0.5)
+    seen = confidence_of(f, start)
+    assert seen.own == (0.99 if sure else 0.5)
     assert ("look the same" in seen.doubt) != sure
 
 
@@ -491,7 +495,7 @@ def test_candidates_that_are_the_same_share_their_probability():
     blocks = np.random.default_rng(0).exponential(10.0, 20)
     one = Scored(0, 0, blocks, blocks, 0.0, 5.0)
     far = replace(one, candidate=2, blocks=blocks + 10.0)
-    shares = first_share([one, replace(one, candidate=1), far], 200, np.random.default_rng(0))
+    shares = first_share([one, replace(one, candidate=1), far], np.random.default_rng(0))
     assert shares == pytest.approx([0.5, 0.5, 0.0], abs=1e-6)
 
 
@@ -504,11 +508,11 @@ def test_confidence_falls_with_what_is_left_and_where_the_size_varies():
     noise = std * rng.standard_normal((1200, 3))
     sure = evidence(1.0, force, noise, std, blocks)
     assert sure.left == sure.varies == 0.0
-    assert confidence(sure) > 0.95
+    assert probability(sure) > 0.95
     amplitude = (1.0 + 0.5 * rng.standard_normal(40))[blocks, None]
     unsteady = evidence(1.0, force, noise + (amplitude - 1.0) * force, std, blocks)
     assert unsteady.varies == pytest.approx(0.5, rel=0.3)
-    assert confidence(unsteady) < 0.1
+    assert probability(unsteady) < 0.1
 
 
 def test_correlation_is_that_of_an_autoregression(lap):

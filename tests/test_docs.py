@@ -3,7 +3,6 @@
 import ast
 import importlib
 import json
-import pkgutil
 import re
 import shlex
 import subprocess
@@ -15,12 +14,7 @@ import pytest
 from support.command import command
 
 import cosim
-import diagnosis.assessment
-import diagnosis.predictors
-import diagnosis.runs
-import diagnosis.search
-import diagnosis.verdict.calibrated_model
-import diagnosis.verdict.decision
+import diagnosis
 import fmus
 from fmus.build.finding import load
 
@@ -64,29 +58,6 @@ def test_symbols_are_where_the_page_says(names, files):
     assert set(names) <= there
     for file in files:
         assert defined(file) & set(names), f"none of them is in {file}"
-
-
-def constants():
-    """Names and values of the table of constants of the diagnosis."""
-    table = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8").partition("## Constants")[2]
-    for names, values in re.findall(r"^\| ([A-Z_0-9, ]+) \| ([^|]+) \|", table, re.MULTILINE):
-        yield from zip(names.split(", "), re.findall(r"[\d.]+", values), strict=True)
-
-
-def modules_with_constants():
-    """The modules of the diagnosis in which the constants of the table may stand."""
-    yield diagnosis.verdict.decision
-    yield diagnosis.verdict.calibrated_model
-    parts = (diagnosis.runs, diagnosis.predictors, diagnosis.assessment, diagnosis.search)
-    for part in parts:
-        for found in pkgutil.iter_modules(part.__path__, f"{part.__name__}."):
-            if not found.name.endswith(".peers"):
-                yield importlib.import_module(found.name)
-
-
-@pytest.mark.parametrize(("name", "value"), [*constants()])
-def test_constants_of_the_diagnosis_are_those_of_the_page(name, value):
-    assert float(value) in [getattr(module, name, None) for module in modules_with_constants()]
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda p: p.name)

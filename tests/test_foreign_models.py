@@ -17,7 +17,8 @@ import diagnosis
 from cosim import InputError, Unit
 from cosim.fmu import Variable
 from diagnosis import Fmu, Run, compare, learn
-from diagnosis.predictors import UnmatchedError, Use, as_model, use_of, write_wrapper
+from diagnosis.predictors import UnmatchedError
+from diagnosis.predictors.fmu.foreign_fmu import SignalUnits
 from diagnosis.predictors.fmu.variable_map import completed, propose
 from diagnosis.runs import to_si
 from fmus.build import build, native_targets
@@ -146,8 +147,8 @@ def test_our_vessel_as_a_foreign_one_misses_by_the_same(folder, runs, plain, nom
     assert errors(found) == pytest.approx(nominal, rel=1e-6)
     assert np.abs(lacking(found) - lacking(plain)).max() < 1e-6
     assert found.before.sentences == plain.before.sentences
-    assert not found.use.whole
-    assert not found.use.placed
+    assert not found.predictor.whole
+    assert not found.predictor.placed
 
 
 @pytest.mark.parametrize(("fmu", "outputs"), [("posed.fmu", POSE_MAP), ("moving.fmu", VELOCITY_MAP)])
@@ -157,7 +158,7 @@ def test_names_and_units_of_its_own_by_a_map(folder, runs, plain, nominal, tmp_p
     found = diagnosis.evaluate(runs, model)
     assert errors(found) == pytest.approx(nominal, rel=1e-3)
     assert np.abs(lacking(found) - lacking(plain)).max() < 3e-4
-    assert found.use.placed
+    assert found.predictor.placed
 
 
 def test_a_wrong_sign_in_the_map_shows(folder, runs, nominal, tmp_path):
@@ -171,8 +172,8 @@ def test_without_a_start_whole_runs_from_rest_or_after_a_run_in(folder, runs, no
     model = mapped(folder, "posed.fmu", tmp_path, inputs=INPUTS, outputs=POSE_MAP)
     whole = diagnosis.evaluate(runs, model)
     (e,) = whole.evaluations
-    assert whole.use.whole
-    assert whole.use.run_in(e.smoothed) == 0.0
+    assert whole.predictor.whole
+    assert whole.predictor.run_in(e.smoothed) == 0.0
     assert e.windows.run.size == 1
     assert e.windows.since[-1] == pytest.approx(40.0, abs=0.1)
     assert e.before.position < 0.5
@@ -295,7 +296,7 @@ def test_names_and_units_that_an_fmu_declares_are_matched():
     }  # fmt: skip
     found = completed(proposed, model, commands, "map")
     assert {s: c.name for s, c in found.told("start").items()} == {"u": "start_u"}
-    use = Use(None, proposed, found, {**commands, "x": "length", "psi": "angle", "u": "speed"})
+    units = SignalUnits(found, commands)
     for group, signal, own, si in (
         ("outputs", "psi", 90.0, np.pi / 2.0),
         ("outputs", "x", 1500.0, 1.5),
@@ -304,8 +305,8 @@ def test_names_and_units_that_an_fmu_declares_are_matched():
         ("inputs", "rudder.delta", -10.0, np.radians(-10.0)),
     ):
         column = found.told(group)[signal]
-        assert to_si(own, signal, column, use.quantity[signal]) == pytest.approx(si)
-        assert use.in_variable(signal, column, si) == pytest.approx(own)
+        assert to_si(own, signal, column, units.quantity[signal]) == pytest.approx(si)
+        assert units.in_variable(signal, column, si) == pytest.approx(own)
 
 
 # Of another ship than the one that is known: heavier, with another drag, and a moment of its own.
@@ -392,10 +393,8 @@ def test_learn_writes_an_fmu_with_what_was_found(vendor, tmp_path, capsys):
 
 def test_an_fmu_without_a_force_is_told_what_input_it_would_need(folder, runs, tmp_path):
     model = mapped(folder, "vessel.fmu", tmp_path, inputs={"tau_Y": "tau_Y"}, outputs=SAME, start=BEGUN)
-    use = use_of(model, [w.run for w in runs])
-    start = as_model(runs, use, diagnosis.Model())
-    told, none = write_wrapper(tmp_path / "found.fmu", use, start, start.plus({"delta_X_u": -2.0}), runs)
-    assert none is None
+    predictor = model.on(runs)
+    (told,) = predictor.write(tmp_path, predictor.model.plus({"delta_X_u": -2.0}), runs)
     assert "it needs tau_X or u_dot, which the map tells under 'beside'" in told
     assert not (tmp_path / "found.fmu").exists()
 
@@ -413,7 +412,7 @@ def test_a_system_is_held_against_a_run_as_one_fmu(runs, plain, nominal, tmp_pat
     found = diagnosis.compare(runs, model=tmp_path / "ship.json")
     assert np.abs(lacking(found) - lacking(plain)).max() < 1e-4
     assert errors(found) == pytest.approx(nominal, rel=0.1)
-    assert found.use.given.content()["start"]["u"] == "vessel.u_0"
+    assert found.predictor.given.content()["start"]["u"] == "vessel.u_0"
 
 
 DESCRIPTION = "modelDescription.xml"

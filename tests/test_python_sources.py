@@ -42,7 +42,7 @@ def test_units_stand_in_the_names_of_columns_or_in_attrs(run, tmp_path):
     for source in (named, given, tmp_path / "named.csv"):
         (found,) = diagnosis.load(source)
         np.testing.assert_allclose(found.run.pose, run.pose, rtol=1e-9, atol=1e-12)
-    with pytest.raises(diagnosis.InputError, match="'furlong' is no unit of y; there are m, mm"):
+    with pytest.raises(diagnosis.InputError, match="'furlong' is not a unit of y; there are m, mm"):
         diagnosis.load(table(run, y="y [furlong]"))
 
 

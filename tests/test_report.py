@@ -15,15 +15,17 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from support import reported
 from support.measured import sail, smoothed
 
-from diagnosis import Model, PredictionError, evaluate_run
+from diagnosis import Comparison, Model, PredictionError, evaluate_run
+from diagnosis.assessment.covariates import EAST, NORTH, SPEED, means_of_run
+from diagnosis.assessment.regions import Region
 from diagnosis.predictors import weak_windows
 from diagnosis.predictors.windows import free_runs
 from diagnosis.report import (
-    ComparisonContent,
     Curve,
-    DiagnosisContent,
+    ReportData,
     curves,
     page,
     tracks,
@@ -31,7 +33,7 @@ from diagnosis.report import (
     write_report,
 )
 from diagnosis.report.content import coefficients
-from diagnosis.report.profiles import QUANTITIES, binned_errors, heading
+from diagnosis.report.reported_effect import Coefficient
 from diagnosis.search.prediction_fit.joint_posterior import Posterior
 from fmus.effects import STANDARD
 from fmus.ship import ship
@@ -54,123 +56,45 @@ def evaluations(data):
     return [evaluate_run(w, Model(), after, held_out=k == 1) for k, w in enumerate(data)]
 
 
-def errors(evaluations):
-    listed = []
-    for e in evaluations:
-        models = {"before": e.before, "after": e.after}
-        listed.append(
-            {
-                "run": e.name,
-                "held_out": e.held_out,
-                "window_position_rmse": {side: s.position for side, s in models.items()},
-                "window_heading_rmse": {side: s.heading for side, s in models.items()},
-                "omega_rms": {side: s.omega_rms.tolist() for side, s in models.items()},
-            }
-        )
-    return listed
-
-
-COUNTS = {"samples": 4000, "frozen": 0, "dropped": 0, "spikes": 0, "used": 4000}
-NO_REGION = {"sentences": [], "regions": [], "profiles": []}
-
-
-def comparison(evaluations, where=NO_REGION):
-    """Content of comparison.json, as keywords."""
-    return {
-        "data": {**COUNTS, "runs": []},
-        "windows": {"prediction": 8.0, "model_error": 3.0},
-        "errors": errors(evaluations),
-        "where": where,
-        "runs": [e.name for e in evaluations],
-        "model": None,
-        "files": ["report.html"],
-        "versions": {"cybership": "0.1.0"},
-    }
-
-
-def nothing(evaluations):
-    """Content of diagnosis.json where nothing was found, as keywords."""
-    return comparison(evaluations) | {
-        "verdict": "none",
-        "sentence": "Nothing is missing that these data show.",
-        "effects": [],
-        "possibilities": [],
-        "withdrawn": [],
-        "remainder": {
-            "significant": False,
-            "axes": {a: {"rms": 0.01, "uncertainty": 0.01, "share": 1.0} for a in "XYN"},
-            "sentence": "Nothing that matters.",
-        },
-        "unrecorded": {
-            "size": [0.0] * 3,
-            "time": [1.0] * 3,
-            "values": {},
-            "stretches": [],
-            "sentence": "",
-        },
-        "correlation": {
-            "names": ["vessel.N_r", "vessel.Y_r"],
-            "matrix": [[1.0, 0.98], [0.98, 1.0]],
-            "together": [["vessel.N_r", "vessel.Y_r"]],
-        },
-        "suspect_coefficients": [],
-        "ranking": [],
-        "where_after": NO_REGION,
-        "stability": {
-            "nominal_min_dissipation": 0.6,
-            "learned_min_dissipation": None,
-            "bounded": True,
-            "region": "|u| < 0.3 m/s",
-            "mass_definite": True,
-            "closed_loop": True,
-            "notes": [],
-        },
-        "prior": 0.1,
-        "seed": 0,
-    }
-
-
-def ranked(name, score, q2, beyond, std):
-    """A candidate, 10 being the first one's score."""
-    behind = {"behind": score - 10.0, "behind_std": std}
-    return {"id": name, "score": score, "q2": q2, "beyond": beyond, **behind}
+def compared(evaluations, **before):
+    """The comparison of these runs; of where the model fails, something else than there is."""
+    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
+    c = Comparison(evaluations, std, evaluations[0].predicted_by)
+    vars(c)["before"] = replace(c.before, **before)
+    return c
 
 
 def found(evaluations):
-    """Content of diagnosis.json."""
-    values = {n: {"value": v, "unit": "1", "ci95": [v - 0.01, v + 0.01]} for n, v in HIDDEN.items()}
-    effect = {
-        "id": "thrust_curve",
-        "axis": "X",
-        "coefficients": values,
-        "confidence": 0.97,
-        "share_of_error": 0.9,
-        "indistinguishable": ["curve_vsp_x(c)"],
-        "advice": "run astern & <b>slowly</b>",
-        "sentence": "The propellers give less than they should.",
-        "equation": "f = k c",
-        "separation": "",
-    }
-    content = nothing(evaluations) | {
-        "verdict": "ambiguous",
-        "effects": [effect],
-        "suspect_coefficients": [{"name": "N_r", "z": -4.2, "value": -2.3}],
-        "ranking": [
-            ranked("thrust_curve", 10.0, 0.99, 0.9, 0.0),
-            ranked("curve_vsp_x(c)", 12.0, 0.98, 0.8, 3.0),
-            ranked("X_u", 900.0, -0.1, -0.2, 40.0),
-        ],
-        "sentence": f"The propellers of {EVIL} give too little.",
-    }
-    return DiagnosisContent(**content)
+    """A diagnosis with one effect."""
+    values = {n: Coefficient(v, "1", (v - 0.01, v + 0.01), None) for n, v in HIDDEN.items()}
+    effect = reported.effect(
+        "thrust_curve",
+        0.97,
+        coefficients=values,
+        indistinguishable=["curve_vsp_x(c)"],
+        advice="run astern & <b>slowly</b>",
+        sentence=f"The propellers of {EVIL} give too little.",
+        equation="f = k c",
+    )
+    names = ["vessel.N_r", "vessel.Y_r"]
+    ranking = [
+        reported.ranked("thrust_curve", 0.0, 0.0, beyond=0.9),
+        reported.ranked("curve_vsp_x(c)", 2.0, 3.0, beyond=0.8),
+        reported.ranked("X_u", 890.0, 40.0, q2=-0.1, beyond=-0.2),
+    ]
+    d = reported.diagnosis(
+        verdict="ambiguous",
+        learned=reported.learned(ranking, [("N_r", -4.2, -2.3)]),
+        posterior=SimpleNamespace(
+            names=names, correlation=np.array([[1.0, 0.98], [0.98, 1.0]]), together=[names], std={}
+        ),
+    )
+    return reported.report_data(compared(evaluations), d, [effect])
 
 
 @pytest.fixture(scope="module")
 def report(evaluations, tmp_path_factory):
-    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
-    return write_report(
-        tmp_path_factory.mktemp("report") / "report.html", found(evaluations), evaluations, std
-    )
+    return write_report(tmp_path_factory.mktemp("report") / "report.html", found(evaluations))
 
 
 class Page(HTMLParser):
@@ -271,17 +195,13 @@ def test_every_colour_follows_the_page(report):
 
 
 def test_same_input_gives_the_same_bytes(report, evaluations, tmp_path):
-    std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
-    again = write_report(tmp_path / "again.html", found(evaluations), evaluations, std)
+    again = write_report(tmp_path / "again.html", found(evaluations))
     assert again.read_bytes() == report.read_bytes()
 
 
 def test_comparison_has_no_after(data, tmp_path):
-    evaluations = [evaluate_run(w, Model()) for w in data[1:]]
-    where = NO_REGION | {"sentences": ["Surge is worst <astern>."]}
-    content = ComparisonContent(**comparison(evaluations, where))
-    path = write_report(tmp_path / "report.html", content, evaluations)
-    text = Page(path).text
+    c = compared([evaluate_run(w, Model()) for w in data[1:]], sentences=["Surge is worst <astern>."])
+    text = Page(write_report(tmp_path / "report.html", ReportData(c))).text
     assert "Surge is worst <astern>." in text
     assert "model error" in text  # in a legend
     assert "after" not in text
@@ -289,10 +209,10 @@ def test_comparison_has_no_after(data, tmp_path):
 
 def test_page_of_nothing_found_and_numbers_that_are_not_there(data, tmp_path):
     evaluations = [replace(evaluate_run(w, Model()), windows=None) for w in data[1:]]
-    result = nothing(evaluations)
-    result["errors"][0]["window_position_rmse"] = {"before": None, "after": None}
-    content = DiagnosisContent(**result)
-    text = " ".join(Page(write_report(tmp_path / "report.html", content, evaluations)).text)
+    e = evaluations[0]
+    evaluations = [replace(e, before=replace(e.before, errors=None), after=e.before)]
+    r = reported.report_data(compared(evaluations), reported.diagnosis())
+    text = " ".join(Page(write_report(tmp_path / "report.html", r)).text)
     assert "Nothing is missing" in text
     assert "None" not in text
     assert "nan" not in text
@@ -305,7 +225,7 @@ def test_nothing_half_written_stays(evaluations, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_report(tmp_path / "report.html", found(evaluations), evaluations[:1], advance=stop)
+        write_report(tmp_path / "report.html", found(evaluations), advance=stop)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "old"
 
@@ -317,26 +237,7 @@ def test_model_that_runs_away_is_drawn(evaluations, tmp_path):
     residuals = np.where(diverged, np.inf, e.before.residuals)
     before = PredictionError(e.before.omega, residuals, e.windows.summary(residuals))
     wild = replace(e, before=before)
-    content = ComparisonContent(**comparison([wild]))
-    assert Page(write_report(tmp_path / "report.html", content, [wild])).tags["svg"]
-
-
-def test_binned_errors_add_up(evaluations):
-    """The mean square of all bins, weighted by their windows, is that of the windows in them."""
-    for quantity in QUANTITIES:
-        values = np.concatenate([quantity.values(e.weak_windows) for e in evaluations])
-        columns = np.broadcast_to(values.reshape(len(values), -1), (len(values), 3))
-        omega = np.concatenate([e.before.omega for e in evaluations])
-        for axis, error in enumerate(binned_errors(quantity, evaluations, None)):
-            count, _ = np.histogram(columns[:, axis], error.edges)
-            known = np.isfinite(error.before)
-            assert known.any()
-            inside = np.digitize(columns[:, axis], error.edges) - 1
-            chosen = np.isin(inside, np.flatnonzero(known))
-            total = np.sum(omega[chosen, axis] ** 2)
-            last = columns[:, axis] == error.edges[-1]  # histogram counts it, bins do not
-            assert not last.any()
-            assert np.sum(count[known] * error.before[known] ** 2) == pytest.approx(total)
+    assert Page(write_report(tmp_path / "report.html", ReportData(compared([wild])))).tags["svg"]
 
 
 SHAPES = {
@@ -353,22 +254,22 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_is_that_of_the_effect(name, evaluations, tmp_path):
-    given = {n: {"value": v, "unit": "1", "ci95": [v - 0.1, v + 0.1]} for n, v in SHAPES[name].items()}
-    drawn = curves([{"id": name, "coefficients": given}], evaluations)
+    given = {n: Coefficient(v, "1", (v - 0.1, v + 0.1), None) for n, v in SHAPES[name].items()}
+    drawn = [*curves([reported.effect(name, 0.9, coefficients=given)], evaluations)]
     assert drawn
     for c in drawn:
         assert isinstance(c, Curve)
-        assert c.covered is not None
         assert c.covered[0] < c.covered[1]
         assert (c.sure is not None) == STANDARD[name].linear
         if c.sure is not None:
             assert (c.sure[0] <= c.learned + 1e-12).all()
             assert (c.learned <= c.sure[1] + 1e-12).all()
-    assert curves([{"id": name, "coefficients": {}}], evaluations) == []
+    assert not [*curves([reported.effect(name, 0.9)], evaluations)]
 
 
 def test_dead_band_is_seen_in_its_shape(evaluations):
-    (vsp, bow) = curves([{"id": "deadband", "coefficients": {"deadband": {"value": 0.05}}}], evaluations)
+    given = {"deadband": Coefficient(0.05, "1", None, None)}
+    (vsp, bow) = curves([reported.effect("deadband", 0.9, coefficients=given)], evaluations)
     for c in (vsp, bow):
         assert np.allclose(c.learned[np.abs(c.x) < 0.05], 0.0)
         assert np.interp(0.5, c.x, c.learned) == pytest.approx(0.45, abs=1e-9)
@@ -444,66 +345,67 @@ def test_browser_has_nothing_to_complain_of_and_prints(report, browser, tmp_path
     assert len(re.findall(rb"/Type\s*/Page\b", content)) >= 3
 
 
-def region(by):
-    return {
-        "axis": "X", "by": by, "unit": "m", "run": None, "low": 1.0, "high": None, "rms": 0.2,
-        "elsewhere": 0.1, "share_of_time": 0.3, "sentence": "somewhere",
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize(("by", "drawn"), [("east", True), ("north", True), ("speed", False)])
+@pytest.mark.parametrize(("by", "drawn"), [(EAST, True), (NORTH, True), (SPEED, False)])
 def test_what_is_found_at_a_place_has_a_picture_of_the_place(data, tmp_path, by, drawn):
-    evaluations = [evaluate_run(w, Model()) for w in data[1:]]
-    where = {"sentences": [], "regions": [region(by)], "profiles": []}
-    content = ComparisonContent(**comparison(evaluations, where))
-    page = Page(write_report(tmp_path / "report.html", content, evaluations))
+    region = Region("X", by, None, 1.0, None, 0.2, 0.1, 0.3, 0.0, 1.0)
+    c = compared([evaluate_run(w, Model()) for w in data[1:]], regions=[region])
+    page = Page(write_report(tmp_path / "report.html", ReportData(c)))
     assert ("place-0.svg" in page.values("download")) is drawn
     assert page.values("download").count("free.svg") == 1
+
+
+def test_runs_say_what_their_data_were_used_for(evaluations, tmp_path):
+    """In tables and below pictures; the main numbers are those of the runs that nothing has used."""
+    uses = [replace(evaluations[0], use=use) for use in ("train", "validate")]
+    r = found([*uses, evaluations[1]])
+    assert [r.use(e) for e in r.evaluations] == ["learned from", "decided by", "seen only now"]
+    text = " ".join("".join(Page(write_report(tmp_path / "report.html", r)).text).split())
+    for e in r.evaluations:
+        assert f"{e.name} {r.use(e)}" in text, "a row of a table"
+        assert f"{e.name} ({r.use(e)}): the worst window." in text
+        assert f"Error of prediction over time, runs {r.use(e)}" in text
+    assert [remark.partition(",")[0] for *_, remark in page._tiles(r)] == 2 * ["runs seen only now"]
 
 
 def test_pictures_of_a_run_name_their_lines(data):
     """The measured track below, the predictions of each window on it, from where the window begins."""
     e = evaluate_run(data[1], Model(), Model().plus(HIDDEN))
     track = tracks.track(e, True)
-    lines = {line.get_label(): line for line in track.axes[0].get_lines()}
-    assert {"measured", "before", "after"} <= set(lines)
-    assert {text.get_text() for text in track.legends[0].get_texts()} == {"measured", "before", "after"}
+    lines = track.legend
+    assert [*lines] == ["measured", "before", "after"]
     east = e.smoothed.eta[:, 1]
-    assert np.nanmax(lines["measured"].get_xdata()) == pytest.approx(np.nanmax(east), abs=1e-3)
-    assert lines["measured"].get_linewidth() > lines["before"].get_linewidth()
-    assert lines["before"].get_linewidth() == lines["after"].get_linewidth() == 1.0
-    worst = tracks.worst_window(e, True)
-    labels = {line.get_label() for line in worst.axes[0].get_lines()}
-    assert {"measured", "before", "after"} <= labels
+    assert np.nanmax(lines["measured"].x) == pytest.approx(np.nanmax(east), abs=1e-2)
+    assert lines["measured"].width > lines["before"].width == lines["after"].width == 1.0
+    assert {"measured", "before", "after"} <= set(tracks.worst_window(e, True).legend)
 
 
 @pytest.mark.parametrize(
     ("after", "shown", "remark"),
     [
-        ([0.01, 0.03], "50 → 22.4 mm", "training runs, 2.2× less"),
-        ([0.1, 0.0], "50 → 70.7 mm", "training runs, more than before"),
-        ([0.01, None], "50 mm", "training runs"),
+        ([0.01, 0.03], "50 → 22.4 mm", "runs seen only now, 2.2× less"),
+        ([0.1, 0.0], "50 → 70.7 mm", "runs seen only now, more than before"),
+        ([0.01, np.nan], "50 mm", "runs seen only now"),
     ],
 )
 def test_errors_of_runs_are_told_as_their_root_mean_square(after, shown, remark):
-    changes = [
-        SimpleNamespace(before=b, after=a) for b, a in zip((0.01, 0.07), after, strict=True)
-    ]  # sqrt((1 + 49) / 2) = 5
-    (tile,) = page._tile("error", changes, 1e3, "mm", "training", learned=True)
+    pairs = [*zip((0.01, 0.07), after, strict=True)]  # sqrt((1 + 49) / 2) = 5
+    (tile,) = page._tile("error", pairs, 1e3, "mm", "runs seen only now")
     assert tile == ("error", shown, remark)
-    assert not list(page._tile("error", [SimpleNamespace(before=None, after=None)], 1.0, "mm", "", True))
+    assert not list(page._tile("error", [(np.nan, np.nan)], 1.0, "mm", ""))
 
 
 def test_arrows_point_where_the_missing_force_does(data):
     """A force to the north and to the east by the heading of the ship, from its own axes."""
     e = evaluate_run(data[1], Model())
     north, east = 0.3, -0.2
-    c, s = np.cos(psi := np.radians(heading(e.weak_windows))), np.sin(psi)
+    psi = means_of_run(e.weak_windows)[3]
+    c, s = np.cos(psi), np.sin(psi)
     omega = np.column_stack([c * north + s * east, c * east - s * north, 0.0 * c])
     known = replace(e, before=replace(e.before, omega=omega))
-    (arrows,) = (a for a in tracks.place(known, False).axes[0].collections if hasattr(a, "U"))
-    assert np.allclose(arrows.U / arrows.V, east / north)
-    assert (arrows.V > 0.0).all()
+    arrows = tracks.place(known, False).legend["predicted"]
+    ends, tips = (np.column_stack([v[k :: len(tracks.ARROW_SHAPE)] for v in arrows[:2]]) for k in (0, 1))
+    assert np.allclose((tips - ends)[:, 0] / (tips - ends)[:, 1], east / north)
+    assert (tips > ends)[:, 1].all()
 
 
 def test_a_whole_run_is_predicted_from_its_first_state(data):
@@ -528,16 +430,14 @@ def test_all_coefficients_before_and_after_as_files(evaluations, tmp_path):
         np.diag([0.01, 1e-4]),
     )
     made = SimpleNamespace(start=Model(), learned=SimpleNamespace(model=learned), posterior=posterior)
-    rows = list(coefficients(made))
-    table = {row.name: row for row in rows}
+    table = {row.name: row for row in coefficients(made)}
     assert table["vessel.m"].before == table["vessel.m"].after
     assert table["vessel.m"].ci95 is None
     assert table["vessel.Y_r"].after - table["vessel.Y_r"].before == pytest.approx(-0.5)
     assert np.ptp(table["vessel.Y_r"].ci95) == pytest.approx(2 * 1.96 * 0.1)
     assert table["vessel.Y_r"].origin == Model().ship.coefficients["Y_r"].origin
     assert table["thrusters.thrust_curve_deadband"].origin == "learned"
-    content = found(evaluations).model_copy(update={"coefficients": rows})
-    write_coefficients(content, tmp_path / "a.csv", tmp_path / "a.tex")
+    write_coefficients(made, tmp_path / "a.csv", tmp_path / "a.tex")
     assert pd.read_csv(tmp_path / "a.csv")["name"].tolist() == list(table)
     text = (tmp_path / "a.tex").read_text()
     assert text.count(r"\\") == len(table) + 1
@@ -551,12 +451,11 @@ def test_ships_have_their_own_outline_where_it_fits(name):
     outline = np.array(craft.vessel.outline.corners)
     for lengths, fits in ((3.0, True), (0.3, False)):
         spread = lengths * craft.vessel.outline.length
-        _, panel = tracks._map(np.array([[0.0, 0.0], [spread, spread]]))
+        panel = tracks._map(np.array([[0.0, 0.0], [spread, spread]]))
         tracks._ships(panel, np.array([[1.0, 2.0, 0.5]]), craft)
-        drawn = [path for each in panel.collections for path in each.get_paths()]
-        assert bool(drawn) is fits
-        for path in drawn:
-            corners = path.vertices[:-1]  # closed
+        assert bool(panel.marks) is fits
+        for m in panel.marks:
+            corners = np.column_stack([m.x, m.y])[:-1]  # closed
             apart = [np.linalg.norm(c[:, None] - c, axis=2) for c in (corners, outline)]
             assert apart[0] == pytest.approx(apart[1])
 

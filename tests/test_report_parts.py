@@ -1,14 +1,15 @@
 """Numbers, sentences and figures of the report, of results that were made up."""
 
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from support.reported import diagnosis, effect, ranked, report_data
 
-from diagnosis.report import figures, finding_text, formatting, headline, tracks
-from diagnosis.report.panels import breaks
-from diagnosis.report.profiles import BinnedError, Quantity, binned_errors
-from diagnosis.report.result_keys import RankedResult
+from diagnosis.assessment.covariates import HEADING, SPEED
+from diagnosis.assessment.regions import Profile
+from diagnosis.report import chart, figures, finding_text, formatting, headline, tracks
 from diagnosis.report.shape import Curve
 from diagnosis.report.terminal import _number as terminal_number
 from diagnosis.report.terminal import _percent as terminal_percent
@@ -43,8 +44,9 @@ def test_numbers_have_their_digits_and_factor():
     assert formatting.number(1.2345, 2) == "1.2"
     assert formatting.unit("N.s2/m3") == "N·s²/m³"
     assert formatting.unit("1") == ""
-    assert (formatting.percent(0.256), formatting.percent(None)) == ("26 %", "–")
-    assert [terminal_number(x) for x in (None, 999.4, 1000.0, -12345.6, 0.12345)] == [
+    assert [formatting.percent(x) for x in (0.256, None, np.nan)] == ["26 %", "–", "–"]
+    assert [terminal_number(x) for x in (None, np.inf, 999.4, 1000.0, -12345.6, 0.12345)] == [
+        "-",
         "-",
         "999",
         "1000",
@@ -52,11 +54,7 @@ def test_numbers_have_their_digits_and_factor():
         "0.123",
     ]
     assert terminal_number(123.4, 2) == "123"
-    assert (terminal_percent(0.256), terminal_percent(0.256, 1), terminal_percent(None)) == (
-        "26 %",
-        "25.6 %",
-        "-",
-    )
+    assert [terminal_percent(x) for x in (0.256, None, np.nan)] == ["26 %", "-", "-"]
 
 
 @pytest.mark.parametrize(
@@ -90,42 +88,32 @@ def test_glossary_has_the_lengths_of_both_windows():
     assert not any("{" in meaning for meaning in words.values())
 
 
-def effect(name, confidence, alike=(), doubt=None):
-    return SimpleNamespace(
-        id=name,
-        confidence=confidence,
-        indistinguishable=list(alike),
-        doubt=doubt,
-        sentence=f"There is {name}.",
-    )
-
-
 def test_what_is_sure_is_a_fact_and_comes_first():
-    sure, unsure = (
-        effect("lag", headline.FOUND),
-        effect("delay", 0.5, ["lag", "deadband"], "it is at its limit"),
+    sure = effect("lag", headline.FOUND)
+    unsure = effect(
+        "delay", 0.5, indistinguishable=["lag", "deadband"], doubt="it is at its limit", in_model=False
     )
     assert headline.is_sure(sure)
     assert not headline.is_sure(effect("lag", headline.FOUND - 0.01))
-    assert not headline.is_sure(effect("lag", None))
+    assert not headline.is_sure(effect("lag", np.nan))
     assert headline.told(sure) == "There is lag."
-    assert (
-        headline.told(unsure)
-        == "Possibly delay or lag or deadband (50 % for delay): There is delay. But it is at its limit."
+    assert headline.told(unsure) == (
+        "Possibly delay or lag or deadband (50 % for delay): There is delay. But it is at its limit. "
+        "The learned model does not have it."
     )
-    assert headline.told(effect("lag", None)) == "Possibly lag: There is lag."
-    both = headline.headline("found", [unsure, sure], [], [], False, False)
-    assert both == f"{headline.told(sure)} {headline.told(unsure)}"
+    assert headline.told(effect("lag", np.nan)) == "Possibly lag: There is lag."
+    both = report_data(None, diagnosis(verdict="found"), [unsure, sure])
+    assert headline.headline(both) == f"{headline.told(sure)} {headline.told(unsure)}"
 
 
 def test_headline_of_each_verdict():
     def said(verdict, possibilities=(), suspects=(), something=False, calibrated=False):
-        return headline.headline(verdict, [], list(possibilities), list(suspects), something, calibrated)
+        d = diagnosis(
+            verdict=verdict, calibrated=calibrated, remainder=SimpleNamespace(beyond_chance=something)
+        )
+        return headline.headline(report_data(None, d, [], possibilities, suspects=dict(suspects)))
 
-    suspects = [
-        SimpleNamespace(name=n, description=d)
-        for n, d in zip("abcdef", ["mass", "", "", "", "", ""], strict=True)
-    ]
+    suspects = [(n, d) for n, d in zip("abcdef", ["mass", "", "", "", "", ""], strict=True)]
     assert said("none") == headline.NOTHING_FOUND
     assert said("none", something=True) == headline.TOO_LITTLE
     assert said("unexplained") == headline.UNEXPLAINED
@@ -160,11 +148,11 @@ def test_coefficients_have_the_digits_in_which_their_interval_differs(interval, 
     assert finding_text._coefficient("δ", 0.5, "1", None) == "δ = 0.5"
 
 
-# Figures
+# Charts
 
 
-def lines(panel):
-    return {line.get_label(): line for line in panel.get_lines()}
+def marks(panel):
+    return {m.label: m for m in panel.marks if m.label}
 
 
 def windows(time, measured, left, every=1.0):
@@ -179,113 +167,139 @@ def test_model_error_is_interrupted_at_gaps_and_has_what_is_explained():
     time = np.array([0.0, 1.0, 2.0, 10.0, 11.0])
     measured = np.arange(15.0).reshape(5, 3)
     left, std = 0.25 * measured, np.full((5, 3), 2.0)
-    figure = figures.model_error(windows(time, measured, left), std, True)
-    for axis, panel in enumerate(figure.axes):
-        drawn = lines(panel)
-        assert drawn["measured"].get_xdata() == pytest.approx(
-            [0.0, 1.0, 2.0, np.nan, 10.0, 11.0], nan_ok=True
-        )
-        assert drawn["measured"].get_ydata()[[0, 1, 2, 4, 5]] == pytest.approx(measured[:, axis])
-        assert drawn["explained"].get_ydata()[[0, 1, 2, 4, 5]] == pytest.approx(0.75 * measured[:, axis])
-        (band,) = panel.collections
-        first = band.get_paths()[0].vertices
-        assert np.ptp(first[first[:, 0] == 0.0][:, 1]) == pytest.approx(2.0 * 1.96 * 2.0, rel=1e-3)
-    assert [panel.get_ylabel() for panel in figure.axes] == ["ω X [N]", "ω Y [N]", "ω N [N·m]"]
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == [
-        "uncertainty, 95 %",
-        "measured",
-        "explained",
-    ]
+    made = figures.model_error(windows(time, measured, left), std, True)
+    for axis, panel in enumerate(made.panels):
+        drawn = marks(panel)
+        assert drawn["measured"].x == pytest.approx([0.0, 1.0, 2.0, np.nan, 10.0, 11.0], nan_ok=True)
+        assert drawn["measured"].y[[0, 1, 2, 4, 5]] == pytest.approx(measured[:, axis])
+        assert drawn["explained"].y[[0, 1, 2, 4, 5]] == pytest.approx(0.75 * measured[:, axis])
+        band = drawn["uncertainty, 95 %"]
+        assert np.ptp(band.y[band.x == 0.0]) == pytest.approx(2.0 * 1.96 * 2.0, rel=1e-3)
+        assert band.width == 0.0, "an area"
+    assert [panel.y.label for panel in made.panels] == ["ω X [N]", "ω Y [N]", "ω N [N·m]"]
+    assert [*made.legend] == ["uncertainty, 95 %", "measured", "explained"]
     plain = figures.model_error(windows(time, measured, left), None, False)
-    assert "explained" not in lines(plain.axes[0])
-    assert not plain.axes[0].collections
-    assert breaks(np.array([0, 0, 1, 1, 2])).tolist() == [2, 4]
+    assert [*plain.legend] == ["measured"]
 
 
-def test_profile_has_its_bins_before_and_after():
-    edges = np.array([0.0, 1.0, 3.0])
-    error = BinnedError(edges, np.array([2.0, 4.0]), np.array([1.0, 3.0]), np.array([0.5, 0.25]))
-    speed = Quantity("speed", ("u", "u", "u"), lambda w: w)
-    figure = figures.profile(speed, [error] * 3, True)
-    points = list(figure.axes[0].get_lines())
-    assert [line.get_ydata().tolist() for line in points] == [[2.0, 4.0], [1.0, 3.0]]
-    assert points[0].get_xdata().tolist() == [0.5, 2.0]
-    assert [panel.get_xlabel() for panel in figure.axes] == ["", "", "u"], "once, where it is the same"
-    assert all(panel.get_ylim()[0] == 0.0 for panel in figure.axes)
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["noise", "before", "after"]
-    own = Quantity("level", ("a", "b", "c"), lambda w: w, edges)
-    figure = figures.profile(own, [error] * 3, False)
-    assert [panel.get_xlabel() for panel in figure.axes] == ["a", "b", "c"]
-    assert figure.axes[2].get_xticks().tolist() == [0.0, 0.75, 1.5, 2.25, 3.0]
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["noise", "model error"]
+def profiles(rms, covariate=SPEED):
+    edges, noise = np.array([0.0, 1.0, 3.0]), np.array([0.5, 0.25])
+    every = zip("XYN", (1.0, 2.0, 3.0), strict=True)
+    return [Profile(a, covariate, None, edges, f * np.array(rms), noise, np.ones(2)) for a, f in every]
 
 
-def test_bins_with_few_windows_are_empty_and_noise_has_its_own_root_mean_square():
-    values = np.repeat([0.5, 1.5, 2.5, 9.0], [10, 4, 5, 3])
-    quantity = Quantity("q", ("q", "q", "q"), lambda w: values, np.array([0.0, 1.0, 2.0, 3.0]))
-    omega = np.column_stack([values, 2.0 * values, -values])
-    e = SimpleNamespace(
-        weak_windows=None, before=SimpleNamespace(omega=omega), after=SimpleNamespace(omega=0.5 * omega)
+def test_profile_has_its_bins_before_and_after_in_the_units_of_people():
+    others = profiles([9.0, 9.0])
+    made = figures.profile(
+        HEADING, [*others, *profiles([2.0, 4.0], HEADING)], profiles([1.0, 3.0], HEADING)
     )
-    X, Y, N = binned_errors(quantity, [e], [np.full(omega.shape, 0.1)])
-    assert X.before == pytest.approx([0.5, np.nan, 2.5], nan_ok=True)
-    assert Y.before == pytest.approx([1.0, np.nan, 5.0], nan_ok=True)
-    assert N.after == pytest.approx([0.25, np.nan, 1.25], nan_ok=True)
-    assert X.uncertainty == pytest.approx([0.1, np.nan, 0.1], nan_ok=True)
-    assert binned_errors(quantity, [e], None)[0].uncertainty is None
+    for k, panel in enumerate(made.panels, 1):
+        drawn = marks(panel)
+        assert drawn["before"].x == pytest.approx(np.degrees([0.0, 1.0, 1.0, 3.0]))
+        assert drawn["before"].y.tolist() == [2.0 * k, 2.0 * k, 4.0 * k, 4.0 * k]
+        assert drawn["after"].y.tolist() == [k, k, 3.0 * k, 3.0 * k]
+        assert panel.ends()[1][0] <= 0.0
+    assert [panel.x.shown for panel in made.panels] == [False, False, True], "once, as it is the same"
+    assert [*made.legend] == ["noise", "before", "after"]
+    own = figures.profile(figures.THRUST, profiles([1.0, 2.0], figures.THRUST))
+    assert [panel.x.shown for panel in own.panels] == [True, True, True]
+    assert [*own.legend] == ["noise", "model error"]
 
 
-def ranked(name, behind, std, beyond=None, q2=0.5, score=None):
-    return RankedResult(id=name, score=score, q2=q2, beyond=beyond, behind=behind, behind_std=std)
+def test_profile_over_what_never_changes_has_one_bin():
+    one = np.ones(1)
+    edge = [Profile(a, SPEED, None, np.array([0.2]), one, one, one) for a in "XYN"]
+    made = figures.profile(SPEED, edge, edge)
+    assert made.panels[0].x.limits == (0.2, 0.2)
+    assert "nan" not in made.svg("key", "label")
 
 
 def test_ranking_is_from_the_best_down_with_what_ties_hollow():
     made = [
-        ranked("a", 0.0, 0.0, 0.9),
-        ranked("b", 1.0, 1.0, -0.1),
-        ranked("c", 5.0, 1.0),
-        ranked("d", 6.0, 1.0, q2=None),
+        ranked("a", 0.0, 0.0, beyond=0.9),
+        ranked("b", 1.0, 1.0, beyond=-0.1),
+        ranked("c", 5.0, 1.0, q2=0.5),
+        ranked("d", 6.0, 1.0, q2=np.nan),
     ]
-    panel = figures.ranking(made).axes[0]
-    assert [text.get_text() for text in panel.get_yticklabels()] == ["a", "b", "c", "d"]
-    assert panel.get_ylim() == (3.5, -0.5), "the best is above"
-    assert [text.get_text() for text in panel.texts] == ["90 %", "< 0 %", "50 %", ""]
-    points = [bars.lines[0] for bars in panel.containers]
-    assert [point.get_xdata()[0] for point in points] == [0.0, 1.0, 5.0, 6.0]
-    assert [point.get_color() for point in points] == [figures.AFTER] * 2 + [figures.BAND] * 2
-    assert [point.get_markerfacecolor() for point in points] == [
-        figures.AFTER,
-        "none",
-        figures.BAND,
-        figures.BAND,
-    ]
-    assert panel.get_xscale() == "linear"
-    far = figures.ranking([*made, ranked("e", 20.1, 1.0)]).axes[0]
-    assert far.get_xscale() == "symlog"
-    many = figures.ranking([ranked(f"c{k}", float(k), 1.0) for k in range(40)]).axes[0]
-    assert len(many.containers) == figures.MAX_RANKED
-    scores = figures.ranking(
-        [ranked("a", None, None, score=2.0), ranked("b", None, None, score=3.5)]
-    ).axes[0]
-    assert [bars.lines[0].get_xdata()[0] for bars in scores.containers] == [0.0, 1.5]
+    (panel,) = figures.ranking(made).panels
+    assert panel.y.names == ["a", "b", "c", "d"]
+    assert panel.ends()[1] == (3.5, -0.5), "the best is above"
+    assert [*panel.notes.values()] == ["90 %", "< 0 %", "50 %", ""]
+    dots = [m for m in panel.marks if m.radius]
+    assert [m.x[0] for m in dots] == [0.0, 1.0, 5.0, 6.0]
+    assert [m.colour for m in dots] == [figures.AFTER] * 2 + [figures.BAND] * 2
+    assert [m.hollow for m in dots] == [False, True, False, False]
+    assert panel.x.scale is None
+    (far,) = figures.ranking([*made, ranked("e", 20.1, 1.0)]).panels
+    assert far.x.spaced(1e-3) / 1e-3 == pytest.approx(far.x.spaced(2e-3) / 2e-3, rel=1e-4), "linear"
+    assert far.x.spaced(1e6) - far.x.spaced(1e5) == pytest.approx(np.log(10.0)), "logarithmic"
+    (many,) = figures.ranking([ranked(f"c{k}", float(k), 1.0) for k in range(40)]).panels
+    assert len(many.y.names) == figures.MAX_RANKED
+    unpaired = [ranked(n, np.nan, np.nan, score=x) for n, x in (("a", 2.0), ("b", 3.5))]
+    assert [m.x[0] for m in figures.ranking(unpaired).panels[0].marks if m.radius] == [0.0, 1.5]
 
 
 def test_a_curve_is_grey_where_no_data_are():
     x = np.linspace(0.0, 1.0, 11)
-    c = Curve(
-        "id", "over", "what", x, x, 2.0 * x, (1.5 * x, 2.5 * x), (0.2, 1.0), {"pulls": (x[:2], x[:2])}
-    )
-    figure = figures.curve(c)
-    (panel,) = figure.axes
-    drawn = lines(panel)
-    assert drawn["before"].get_ydata() == pytest.approx(x)
-    assert drawn["learned"].get_ydata() == pytest.approx(2.0 * x)
-    assert drawn["pulls"].get_xdata().size == 2
-    (span,) = panel.patches
-    assert span.get_extents().transformed(panel.transData.inverted()).x1 == pytest.approx(0.2)
-    assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_xlim()) == ("over", "what", (0.0, 1.0))
-    assert len(panel.collections) == 1
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["before", "learned", "pulls"]
+    c = Curve("id", "over", "what", x, x, 2.0 * x, (1.5 * x, 2.5 * x), (0.2, 1.0))
+    (panel,) = figures.curve(c).panels
+    drawn = marks(panel)
+    assert drawn["before"].y == pytest.approx(x)
+    assert drawn["learned"].y == pytest.approx(2.0 * x)
+    (grey,) = (m for m in panel.marks if m.colour == figures.BAND)
+    assert np.nanmax(grey.x) == pytest.approx(0.2)
+    assert (panel.x.label, panel.y.label, panel.ends()[0]) == ("over", "what", (0.0, 1.0))
+    assert [*figures.curve(c).legend] == ["before", "learned"]
+
+
+@pytest.mark.parametrize(
+    ("ends", "texts"),
+    [
+        ((-1.0, 203.0), ["0", "50", "100", "150", "200"]),
+        ((-0.26, 0.26), ["−0.2", "−0.1", "0", "0.1", "0.2"]),
+        ((0.0, 4.5e-6), ["0", "1e−06", "2e−06", "3e−06", "4e−06"]),
+        ((1e7, 1.1e7), ["1e+07", "1.02e+07", "1.04e+07", "1.06e+07", "1.08e+07", "1.1e+07"]),
+    ],
+)
+def test_ticks_are_round_and_differ(ends, texts):
+    found = chart.Axis().ticks(ends, 6.0 * chart.PT.apart)
+    assert [text for _, text in found] == texts
+    assert all(ends[0] <= x <= ends[1] for x, _ in found)
+
+
+def test_ticks_of_a_logarithmic_axis_are_the_roundest_that_have_room():
+    axis = chart.Axis(scale=np.log10)
+    ends = axis.ends([np.array([1.0, 1000.0])])
+    assert {t for _, t in axis.ticks(ends, 5.0 * chart.PT.apart)} == {"1", "10", "100", "1000"}
+    within = axis.ticks((np.log10(1.5), np.log10(8.0)), 5.0 * chart.PT.apart)
+    assert {t for _, t in within} == {"2", "5"}
+
+
+def test_a_chart_is_the_same_in_each_format():
+    """Points at the same places by SVG and by matplotlib; what is interrupted has two parts."""
+    panel = chart.Panel(chart.Axis("x", (0.0, 10.0)), chart.Axis("y <1>", (0.0, 1.0)))
+    x = np.array([0.0, 5.0, np.nan, 6.0, 10.0])
+    panel.draw(x, 0.1 * x, chart.AFTER, "line")
+    panel.fill(x, 0.0 * x, 0.1 * x, chart.BAND, "area")
+    panel.draw(x, 0.1 * x, chart.THIRD, "dots", radius=2.0, hollow=True)
+    made = chart.Chart(150.0, [panel])
+    (b,) = made.boxes()
+    root = ElementTree.fromstring(made.svg("key", "<label>"))
+    assert root.get("aria-label") == "<label>"
+    paths = [e.get("d") for e in root.iter() if e.get("stroke") == chart.AFTER and e.get("clip-path")]
+    (line,) = paths
+    assert line.count("M") == 2
+    first = [float(v) for v in line[1:].split(" ")[0].split(",")]
+    assert first == pytest.approx([b.left, b.top + b.height], abs=0.06)
+    circles = [e for e in root.iter() if e.tag.endswith("circle")]
+    assert len(circles) == 4 + 1, "one in the legend"
+    texts = [e.text for e in root.iter() if e.tag.endswith("text")]
+    assert {"x", "y <1>", "line", "area", "dots", "10"} <= set(texts)
+    (axes,) = made.figure().axes
+    shown = {line.get_color(): line for line in axes.get_lines() if np.size(line.get_xdata()) == 5}
+    assert shown[chart.AFTER].get_xdata()[0] == pytest.approx(first[0], abs=0.06)
+    assert {t.get_text() for t in axes.texts} >= set(texts)
+    assert [chart.PALETTE[c] for c in chart.PALETTE if c in chart.themed(made.svg("k", ""))] == []
 
 
 def prediction(n=64, windows=4, growth=1.0):
@@ -308,19 +322,18 @@ def test_errors_grow_by_their_quartiles_in_millimetres_and_degrees():
         after=SimpleNamespace(residuals=0.5 * residuals),
     )
     none = SimpleNamespace(windows=None)
-    figure = tracks.error_growth([none, e], True)
-    position, heading = figure.axes
+    position, heading = tracks.error_growth([none, e], True).panels
     for panel, scale in ((position, 10.0), (heading, 1.0)):
-        drawn = lines(panel)
-        middle = drawn["before"].get_xdata()
+        drawn = marks(panel)
+        middle = drawn["before"].x
         assert middle.size == tracks.BINS
         assert middle[0] == pytest.approx(0.125)
-        assert drawn["before"].get_ydata() == pytest.approx(scale * middle, abs=0.13 * scale)
-        assert drawn["after"].get_ydata() == pytest.approx(0.5 * drawn["before"].get_ydata())
-        assert panel.get_yscale() == "log"
-    assert (position.get_ylabel(), heading.get_ylabel()) == ("position [mm]", "heading [°]")
-    assert heading.get_xlim() == (0.0, 8.0)
-    assert not tracks.error_growth([e], False).legends
+        assert drawn["before"].y == pytest.approx(scale * middle, abs=0.13 * scale)
+        assert drawn["after"].y == pytest.approx(0.5 * drawn["before"].y)
+        assert panel.y.scale is np.log10
+    assert (position.y.label, heading.y.label) == ("position [mm]", "heading [°]")
+    assert heading.ends()[0] == (0.0, 8.0)
+    assert not tracks.error_growth([e], False).legend
 
 
 def test_the_worst_window_is_that_with_the_largest_error_that_is_finite():
@@ -341,20 +354,22 @@ def test_worst_window_is_drawn_from_its_start_with_both_predictions():
         before=SimpleNamespace(residuals=residuals, errors=errors),
         after=SimpleNamespace(residuals=0.0 * residuals),
     )
-    (panel,) = tracks.worst_window(e, True).axes
-    drawn = lines(panel)
+    drawn = tracks.worst_window(e, True).legend
     inside = of.sample_window == 2
-    assert drawn["measured"].get_xdata() == pytest.approx(of.measured[inside, 1])
-    assert drawn["before"].get_xdata() == pytest.approx((of.measured - residuals)[inside, 1])
-    assert drawn["before"].get_ydata() == pytest.approx((of.measured - residuals)[inside, 0])
-    assert drawn["after"].get_ydata() == pytest.approx(of.measured[inside, 0])
+    assert drawn["measured"].x == pytest.approx(of.measured[inside, 1])
+    assert drawn["before"].x == pytest.approx((of.measured - residuals)[inside, 1])
+    assert drawn["before"].y == pytest.approx((of.measured - residuals)[inside, 0])
+    assert drawn["after"].y == pytest.approx(of.measured[inside, 0])
     assert tracks.heading_bands(e) is None
     assert tracks.worst_window(SimpleNamespace(windows=None), True) is None
 
 
 def test_a_map_holds_all_places_in_one_scale_with_room_around():
     places = np.array([[0.0, -1.0], [10.0, 1.0]])
-    _, panel = tracks._map(places)
-    assert panel.get_ylim() == pytest.approx((5.0 - 5.301, 5.0 + 5.301), abs=1e-9)
-    assert panel.get_xlim() == pytest.approx((-2.001, 2.001)), "no narrower than two fifths"
-    assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_aspect()) == ("east [m]", "north [m]", 1.0)
+    panel = tracks._map(places)
+    east, north = panel.ends()
+    assert north == pytest.approx((5.0 - 5.301, 5.0 + 5.301), abs=1e-9)
+    assert east == pytest.approx((-2.001, 2.001)), "no narrower than two fifths"
+    assert (panel.x.label, panel.y.label) == ("east [m]", "north [m]")
+    (box,) = tracks._chart(panel).boxes()
+    assert box.width / np.ptp(east) == pytest.approx(box.height / np.ptp(north))

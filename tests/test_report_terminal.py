@@ -3,84 +3,90 @@
 from io import StringIO
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from rich.console import Console
+from support.reported import STABILITY, diagnosis, effect, learned, ranked, report_data
 
 from cosim import InputError
-from diagnosis.report import ComparisonContent, DiagnosisContent, figures, notebook, tracks
-from diagnosis.report.profiles import QUANTITIES
-from diagnosis.report.terminal import has_learned, show_comparison, show_diagnosis, summary
+from diagnosis import Counts
+from diagnosis.assessment.covariates import SPEED
+from diagnosis.report import figures, notebook, tracks
+from diagnosis.report.chart import Chart, Panel
+from diagnosis.report.headline import NOTHING_FOUND
+from diagnosis.report.terminal import show_comparison, show_diagnosis, summary
+from diagnosis.runs.sensors.sensor_finding import SensorFinding
 
-COUNTS = {"samples": 100, "frozen": 1, "dropped": 2, "spikes": 3, "used": 94}
 
+def run(name, use, size=1.0, notes=(), faults=(), learned=True):
+    """Evaluation of a run, as far as the terminal asks."""
 
-def errors(run, held_out, size=1.0, **others):
-    return {
-        "run": run,
-        "held_out": held_out,
-        "window_position_rmse": {"before": 0.126 * size, "after": 0.00073 * size},
-        "window_heading_rmse": {"before": 0.0047 * size, "after": None},
-        "omega_rms": {"before": [0.24, 0.005 * size, 0.001], "after": [0.0029, 0.0049, 0.0012]},
-        **others,
-    }
+    def errors(position, heading, omega_rms):
+        return SimpleNamespace(position=position, heading=heading, omega_rms=omega_rms)
+
+    before = errors(0.126 * size, 0.0047 * size, [0.24, 0.005 * size, 0.001])
+    after = errors(0.00073 * size, np.nan, [0.0029, 0.0049, 0.0012])
+    seconds = 48.0 * (1 + (name == "a"))
+    smoothed = SimpleNamespace(
+        time=np.array([0.0, seconds]),
+        track=SimpleNamespace(period=0.04 * (name == "a")),
+        counts=Counts(100, 1, 2, 3, 94),
+        notes=notes,
+        sensors=SimpleNamespace(findings=faults),
+    )
+    return SimpleNamespace(
+        name=name,
+        use=use,
+        held_out=use == "test",
+        before=before,
+        after=after if learned else before,
+        smoothed=smoothed,
+        windows=SimpleNamespace(length=8.0),
+        weak_windows=SimpleNamespace(horizon=8.0, width=3.0),
+    )
 
 
 TRIAL = {"tactical_diameter": [3.4, 3.0, 3.35], "overshoot": [[0.2, 0.1, 0.19], [0.3, None, 0.31]]}
-FAULT = {"run": "a", "channel": "r", "kind": "scale", "value": 1.05, "unit": "1", "ci95": [1.0, 1.1], "start": 0.0, "end": 9.0, "sentence": "r reads too much", "alike": [], "repaired": False}  # fmt: skip
-RATE = FAULT | {
-    "channel": "time",
-    "kind": "clock_rate",
-    "sentence": "its clock is fast",
-    "repaired": True,
-}
-COMPARED = {
-    "data": {**COUNTS, "runs": [{**COUNTS, "run": "a", "held_out": False, "seconds": 96.04, "notes": ["a gap"]},
-                                {**COUNTS, "run": "b", "held_out": True, "seconds": 48.0, "notes": []}]},
-    "windows": {"prediction": 8.0, "model_error": 3.0},
-    "sensors": [FAULT, RATE, FAULT | {"run": "b"}],
-    "errors": [errors("a", False), errors("b", True, 2.0, trial=TRIAL, measured={"port.thrust": {"rms_before": 12.0, "rms_after": 3.0}})],
-    "where": {"sentences": ["Surge: worst when fast."], "regions": [], "profiles": []},
-    "runs": ["a", "b"],
-    "model": None,
-    "files": ["one.json", "two.html"],
-    "versions": {},
-}  # fmt: skip
+FAULT = SensorFinding("r", "scale", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "r reads too much", (), False)
+RATE = SensorFinding("time", "clock_rate", 1.05, "1", (1.0, 1.1), 0.0, 9.0, "its clock is fast")
+OURS = SimpleNamespace(parametric=True, description=lambda: None)
+DERIVED = {"trials": [None, TRIAL], "measured": [{}, {"port.thrust": (12.0, 3.0)}]}
 
 
-def effect(name, confidence, **others):
-    made = {"id": name, "axis": "X", "coefficients": {}, "confidence": confidence, "share_of_error": 0.904, "indistinguishable": [], "advice": "", "sentence": f"There is {name}.", "equation": f"X = {name}", "separation": ""}  # fmt: skip
-    return made | others
+def compared(learned, faults=(FAULT, RATE), notes=("a gap",)):
+    runs = [
+        run("a", "train", notes=notes, faults=faults, learned=learned),
+        run("b", "test", 2.0, faults=faults[:1], learned=learned),
+    ]
+    where = SimpleNamespace(sentences=["Surge: worst when fast."])
+    return SimpleNamespace(evaluations=runs, omega_std=["of a", "of b"], predictor=OURS, before=where)
 
 
-def ranked(name, behind):
-    return {
-        "id": name,
-        "score": 10.0 + behind,
-        "q2": 0.9,
-        "beyond": 0.5,
-        "behind": behind,
-        "behind_std": 3.14159,
-    }
-
-
-FOUND = COMPARED | {
+EFFECTS = [
+    effect("doubtful", 0.6, indistinguishable=["other"], share_unique=0.25),
+    effect("sure", 0.99, separation="They differ.", advice="Run astern."),
+]
+POSSIBILITIES = [effect("unlikely", 0.2, in_model=False, doubt="something acts")]
+RANKING = [ranked(name, 12.3456 * k) for k, name in enumerate(("sure", "b", "c", "d", "e", "f"))]
+FOUND = {
     "verdict": "ambiguous",
-    "sentence": "In short.",
-    "effects": [effect("doubtful", 0.6, indistinguishable=["other"], share_unique=0.25), effect("sure", 0.99, separation="They differ.", advice="Run astern.")],
-    "possibilities": [effect("unlikely", 0.2, in_model=False, doubt="something acts")],
-    "withdrawn": [{"id": "gone", "reason": "worse on held-out runs"}],
-    "remainder": {"significant": False, "axes": {}, "sentence": "Little is left."},
-    "unrecorded": {"size": [], "time": [], "values": {}, "stretches": [], "sentence": "No unrecorded force."},
-    "correlation": {"names": [], "matrix": [], "together": [["N_r", "Y_r"], ["m", "X_u"]]},
-    "inseparable": ["One shaft speed."],
-    "suspect_coefficients": [{"name": "N_r", "z": -4.234, "value": -2.3456}],
-    "ranking": [ranked(name, 12.3456 * k) for k, name in enumerate(("sure", "b", "c", "d", "e", "f"))],
-    "where_after": COMPARED["where"],
-    "stability": {"nominal_min_dissipation": 0.6, "learned_min_dissipation": None, "bounded": True, "region": None, "mass_definite": True, "closed_loop": True, "notes": ["a note"]},
-    "prior": None,
-    "seed": 0,
-}  # fmt: skip
+    "learned": learned(RANKING, [("N_r", -4.234, -2.3456)]),
+    "withdrawn": [SimpleNamespace(id="gone", reason="worse on held-out runs")],
+    "posterior": SimpleNamespace(together=[["N_r", "Y_r"], ["m", "X_u"]]),
+}
+
+
+def found(comparison=None, effects=EFFECTS, **changes):
+    """The report of a diagnosis with three effects, of which one is only possible."""
+    derived = {"inseparable": ["One shaft speed."], **DERIVED}
+    given = compared(True) if comparison is None else comparison
+    return report_data(given, diagnosis(**FOUND | changes), effects, POSSIBILITIES, **derived)
+
+
+def nothing(comparison=None):
+    """The report of a diagnosis in which nothing was found."""
+    given = compared(False) if comparison is None else comparison
+    return report_data(given, diagnosis(), **DERIVED)
 
 
 def lines(shown):
@@ -96,7 +102,7 @@ def lines(shown):
 DATA = """Data
 run time samples frozen dropped spikes used
 a 96.04 s 100 1 2 3 94
-b (held out) 48 s 100 1 2 3 94
+b 48 s 100 1 2 3 94
 Found in the data
 a: a gap
 What channels say of each other
@@ -109,19 +115,19 @@ Surge: worst when fast."""
 COMPARISON = """Predictions over 8 s miss by
 run position [mm] heading [°]
 a 126 0.27
-b (held out) 252 0.54
+b 252 0.54
 Force that the model lacks
 run X [N] Y [N] N [N m]
 a 0.24 0.005 0.001
-b (held out) 0.24 0.01 0.001
+b 0.24 0.01 0.001
 Measured outputs of actuators and the model's
 run what is measured off by [SI]
-b (held out) port.thrust 12
+b port.thrust 12
 Manoeuvring trials, from just before the first execute
 run measure measured predicted unit
-b (held out) tactical_diameter 3.4 3 m
-b (held out) overshoot_1 11.5 5.7 °
-b (held out) overshoot_2 17.2 - °
+b tactical_diameter 3.4 3 m
+b overshoot_1 11.5 5.7 °
+b overshoot_2 17.2 - °
 one.json, two.html in out/folder"""
 
 DIAGNOSIS = """What is left without an explanation
@@ -155,20 +161,20 @@ Best candidates, by how much worse than the first
 sure, b +12.3 (± 3.1), c +24.7 (± 3.1), d +37 (± 3.1), e +49.4 (± 3.1)
 Predictions over 8 s miss by, before -> after
 run position [mm] heading [°]
-a 126 -> 0.73 0.27 -> -
-b (held out) 252 -> 1.5 0.54 -> -
+a (learned from) 126 -> 0.73 0.27 -> -
+b (seen only now) 252 -> 1.5 0.54 -> -
 Force that the model lacks, before -> after
 run X [N] Y [N] N [N m]
-a 0.24 -> 0.0029 0.005 -> 0.0049 0.001 -> 0.0012
-b (held out) 0.24 -> 0.0029 0.01 -> 0.0049 0.001 -> 0.0012
+a (learned from) 0.24 -> 0.0029 0.005 -> 0.0049 0.001 -> 0.0012
+b (seen only now) 0.24 -> 0.0029 0.01 -> 0.0049 0.001 -> 0.0012
 Measured outputs of actuators and the model's, before -> after
 run what is measured off by [SI]
-b (held out) port.thrust 12 -> 3
+b (seen only now) port.thrust 12 -> 3
 Manoeuvring trials, from just before the first execute, before -> after
 run measure measured predicted unit
-b (held out) tactical_diameter 3.4 3 -> 3.4 m
-b (held out) overshoot_1 11.5 5.7 -> 11 °
-b (held out) overshoot_2 17.2 - -> 18 °
+b (seen only now) tactical_diameter 3.4 3 -> 3.4 m
+b (seen only now) overshoot_1 11.5 5.7 -> 11 °
+b (seen only now) overshoot_2 17.2 - -> 18 °
 Stability
 In closed loop the learned model stays bounded on the reference paths.
 smallest dissipation - 1/s, of the model at first 0.6 1/s
@@ -177,42 +183,23 @@ one.json, two.html in out/folder"""
 
 
 def test_a_comparison_has_its_data_and_errors_before():
-    shown = lines(show_comparison(ComparisonContent(**COMPARED), "out/folder"))
+    shown = lines(show_comparison(report_data(compared(False), **DERIVED), "out/folder"))
     assert shown == f"{DATA}\n{COMPARISON}".splitlines()
 
 
 def test_a_diagnosis_has_what_is_sure_first_and_errors_before_and_after():
-    shown = lines(show_diagnosis(DiagnosisContent(**FOUND), "out/folder"))
-    assert shown == f"{DATA}\n{DIAGNOSIS}".splitlines()
-
-
-NOTHING = FOUND | {
-    "verdict": "none",
-    "effects": [],
-    "possibilities": [],
-    "withdrawn": [],
-    "suspect_coefficients": [],
-}
+    shown = lines(show_diagnosis(found(), "out/folder"))
+    of_uses = DATA.replace("a 96.04", "a (learned from) 96.04").replace("b 48", "b (seen only now) 48")
+    assert shown == f"{of_uses}\n{DIAGNOSIS}".splitlines()
 
 
 def test_where_nothing_is_found_the_sentence_is_the_finding():
-    data = COMPARED["data"] | {"runs": [r | {"notes": []} for r in COMPARED["data"]["runs"]]}
-    none = DiagnosisContent(**NOTHING | {"sensors": [], "data": data, "errors": [errors("a", False)]})
-    shown = lines(show_diagnosis(none, "out"))
-    assert shown[shown.index("Finding") + 1] == "In short."
-    absent = (
-        "Found in the data",
-        "What channels say",
-        "Withdrawn",
-        "Suspect",
-        "Best",
-        "Measured",
-        "Manoeuvring",
-    )
+    shown = lines(show_diagnosis(nothing(compared(False, (), ())), "out"))
+    assert shown[shown.index("Finding") + 1] == NOTHING_FOUND
+    absent = ("Found in the data", "What channels say", "Withdrawn", "Suspect", "Best")
     assert not [line for line in shown if line.startswith(absent)]
     assert "Predictions over 8 s miss by" in shown
-    one = FOUND | {"effects": FOUND["effects"][1:]}
-    assert "Finding" in lines(show_diagnosis(DiagnosisContent(**one), "out"))
+    assert "Finding" in lines(show_diagnosis(found(effects=EFFECTS[1:]), "out"))
 
 
 @pytest.mark.parametrize(
@@ -232,47 +219,33 @@ def test_where_nothing_is_found_the_sentence_is_the_finding():
     ],
 )
 def test_stability_in_words(changes, told):
-    made = FOUND | {"stability": FOUND["stability"] | changes}
-    assert told in lines(show_diagnosis(DiagnosisContent(**made), "out"))
-    assert told not in lines(show_diagnosis(DiagnosisContent(**FOUND), "out"))
-
-
-@pytest.mark.parametrize(
-    ("changes", "learned"),
-    [
-        ({}, False),
-        ({"calibrated": True}, True),
-        ({"verdict": "coefficients"}, True),
-        ({"possibilities": FOUND["possibilities"]}, False),
-        ({"possibilities": [FOUND["possibilities"][0] | {"in_model": True}]}, True),
-        ({"effects": FOUND["effects"]}, True),
-    ],
-)
-def test_what_has_been_learned(changes, learned):
-    assert has_learned(DiagnosisContent(**NOTHING | changes)) == learned
+    made = found(stability=SimpleNamespace(**vars(STABILITY) | changes))
+    assert told in lines(show_diagnosis(made, "out"))
+    assert told not in lines(show_diagnosis(found(), "out"))
 
 
 def test_a_summary_has_ten_lines_at_the_most():
-    title, *rest = summary(DiagnosisContent(**FOUND)).splitlines()
+    title, *rest = summary(found()).splitlines()
     assert title == "ambiguous: Something is missing, and more than one cause fits"
     assert rest[0] == "  There is sure. [99 %]"
     assert rest[1].startswith("  Possibly doubtful or other")
     assert rest[2].endswith("[20 %]")
     assert rest[3:] == [
         "  Little is left.",
-        "  a: predictions over 8 s miss by 126 -> 0.73 mm",
-        "  b (held out): predictions over 8 s miss by 252 -> 1.5 mm",
+        "  a (learned from): predictions over 8 s miss by 126 -> 0.73 mm",
+        "  b (seen only now): predictions over 8 s miss by 252 -> 1.5 mm",
     ]
-    many = FOUND | {"effects": 3 * FOUND["effects"], "errors": [errors(n, False) for n in "abcde"]}
-    text = summary(DiagnosisContent(**many)).splitlines()
+    many = compared(True)
+    many.evaluations = [run(n, "train") for n in "abcde"]
+    text = summary(found(many, 3 * EFFECTS)).splitlines()
     assert len(text) == 9
     assert text[-1] == "  and 2 more runs"
-    assert summary(DiagnosisContent(**NOTHING)).splitlines()[1] == "  In short."
+    assert summary(nothing()).splitlines()[1] == f"  {NOTHING_FOUND}"
 
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Names and arguments of the figures that are made, in place of these."""
+    """Names and arguments of the charts that are made, in place of these."""
     made = []
     for module, name in (
         (figures, "profile"),
@@ -280,32 +253,33 @@ def drawn(monkeypatch):
         (tracks, "track"),
         (figures, "ranking"),
     ):
+        chart = Chart(100.0, [Panel()])
         monkeypatch.setattr(
-            module, name, lambda *given, name=name: made.append((name, *given)) or Figure()
+            module, name, lambda *given, name=name, chart=chart: made.append((name, *given)) or chart
         )
-    monkeypatch.setattr(notebook, "binned_errors", lambda *given: given)
     return made
 
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_pictures_of_a_notebook_are_those_of_their_run(drawn, learned):
-    a, b = (SimpleNamespace(before=0, after=k if learned else 0) for k in range(2))
-    compared = SimpleNamespace(evaluations=[a, b], omega_std=["of a", "of b"])
-    plots = notebook.Plots(DiagnosisContent(**FOUND), compared)
-    last = QUANTITIES[-1]
+    given = compared(learned)
+    a, b = given.evaluations
+    given.before, given.after = (SimpleNamespace(profiles=p) for p in ("first", "last"))
+    plots = notebook.Plots(found(given))
+    *_, last = figures.LABELS
     shown = [
         plots.where(),
-        plots.where(last.name),
+        plots.where("heading"),
         plots.omega(),
         plots.omega(1),
         plots.track(),
         plots.track(1),
     ]
     assert all("<svg" in picture._repr_svg_() for picture in shown)
-    errors = [a, b], ["of a", "of b"]
+    after = "last" if learned else None
     assert drawn == [
-        ("profile", QUANTITIES[0], (QUANTITIES[0], *errors), learned),
-        ("profile", last, (last, *errors), learned),
+        ("profile", SPEED, "first", after),
+        ("profile", last, "first", after),
         ("model_error", a, "of a", learned),
         ("model_error", b, "of b", learned),
         ("track", a, learned),
@@ -313,25 +287,27 @@ def test_pictures_of_a_notebook_are_those_of_their_run(drawn, learned):
     ]
     plots.ranking()
     assert [r.id for r in drawn[-1][1]] == ["sure", "b", "c", "d", "e", "f"]
-    with pytest.raises(InputError, match=f"no quantity 'x'; there are {QUANTITIES[0].name}, "):
+    with pytest.raises(InputError, match="no quantity 'x'; there are surge speed, yaw rate, "):
         plots.where("x")
     with pytest.raises(InputError, match="no candidates"):
-        notebook.Plots(DiagnosisContent(**FOUND | {"ranking": []}), compared).ranking()
+        notebook.Plots(nothing(given)).ranking()
+
+
+def test_a_picture_can_be_saved_in_each_format(tmp_path):
+    picture = notebook.Picture(Chart(100.0, [Panel()]))
+    for name in ("a.png", "a.svg", "a.pdf"):
+        assert picture.save(tmp_path / name).stat().st_size > 1000
 
 
 def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
-    compared = SimpleNamespace(evaluations=[SimpleNamespace(before=0, after=0)], omega_std=["of a"])
-    content = DiagnosisContent(**FOUND | {"sentence": "1 < 2."})
-    text = notebook.as_html(content, notebook.Plots(content, compared))
-    assert (
-        "<b>Something is missing, and more than one cause fits</b></p><p>1 &lt; 2.</p><p>Little is left.</p>"
-        in text
-    )
-    assert (
-        "<tr><td>doubtful</td><td>X = doubtful</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text
-    )
+    given = compared(True)
+    given.before.profiles, given.after = "first", SimpleNamespace(profiles="last")
+    text = notebook.as_html(found(given, [effect("a<b", 0.6), EFFECTS[1]]))
+    assert "<b>Something is missing, and what it is, is not sure</b></p><p>There is sure." in text
+    assert "There is a&lt;b.</p><p>Little is left.</p>" in text
+    assert "<tr><td>a&lt;b</td><td>X = a&lt;b</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text
     assert "<th>position over 8 s [mm]</th><th>heading over 8 s [°]</th>" in text
-    assert "<tr><td>a</td><td>126 → 0.73</td>" in text
-    assert "<tr><td>b (held out)</td><td>252 → 1.46</td>" in text
+    assert "<tr><td>a (learned from)</td><td>126 → 0.73</td>" in text
+    assert "<tr><td>b (seen only now)</td><td>252 → 1.46</td>" in text
     assert [name for name, *_ in drawn] == ["profile", "model_error"]
     assert text.count("<svg") == 2

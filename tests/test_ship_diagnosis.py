@@ -64,7 +64,7 @@ def test_force_of_the_commands_is_that_of_the_two_propellers(ship, run):
     [
         ({"port.n": "prot.n"}, "no column 'port.n'; did you mean 'prot.n'"),
         ({"port.n": "a", "starboard.n": "b"}, "no commands: port.n, starboard.n"),
-        ({"port.n": "port.n [kg]"}, "'kg' is no unit of port.n"),
+        ({"port.n": "port.n [kg]"}, "'kg' is not a unit of port.n"),
     ],
 )
 def test_a_wrong_column_is_told_in_one_line(ship, run, columns, told):

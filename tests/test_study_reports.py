@@ -816,7 +816,7 @@ def test_windows_are_told_with_those_that_are_worse_or_run_away(tmp_path):
 def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
     """What each table gets is checked against what it takes; their content is tested elsewhere."""
     run = SimpleNamespace(run=SimpleNamespace(name="a"))
-    content = SimpleNamespace(model_dump=lambda mode, exclude: {"verdict": "found"})
+    content = {"verdict": "found", "where": "long"}
     fold = SimpleNamespace(name="a", content=content, evaluation=None)
     last = SimpleNamespace(learned=SimpleNamespace(model="learned"))
     parts = {}
@@ -842,7 +842,7 @@ def test_report_of_the_real_ship_has_every_part(tmp_path, monkeypatch, figures):
     assert [a["name"] for a in parts["findings"]] == ["Learned without a", "Learned from all runs"]
     assert [len(parts[name]) for name in ("falls", "windows", "expected")] == [1, 1, 1]
     assert figures["omega_a"][0] == "drawn"
-    assert set(results["diagnoses"]) == {"without a", "all runs"}
+    assert results["diagnoses"] == {"without a": {"verdict": "found"}, "all runs": {"verdict": "found"}}
     assert "`python -m diagnosis.learn --prior 0.1`" in text
 
 

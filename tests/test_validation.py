@@ -57,7 +57,7 @@ def comparison(runs):
 
 @pytest.fixture(scope="module")
 def predictions(comparison):
-    return Predictions(comparison.evaluations[0], None, 4.0)
+    return Predictions(comparison.evaluations[0], 4.0)
 
 
 @pytest.fixture
@@ -199,7 +199,7 @@ def with_std(predictions, **std):
 
 def test_the_initial_state_in_closed_form(comparison):
     """A shift moves the end by as much; of a velocity, for a short while, what it covers in that time."""
-    p = Predictions(comparison.evaluations[0], None, 1.0)
+    p = Predictions(comparison.evaluations[0], 1.0)
     shifted = sources_of(with_std(p, eta_std=[3e-3, 4e-3, 0.0]), None).initial_state
     assert shifted["position"] == pytest.approx(np.full(p.rows.size, 25e-6), rel=1e-6)
     assert shifted["heading"] == pytest.approx(0.0)

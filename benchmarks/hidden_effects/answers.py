@@ -51,7 +51,7 @@ def answer(problem: Problem, peers: bool) -> Answer:
     *train, last = (weak_windows(smooth(clean(run))) for run in problem.runs)
     try:
         diagnosis = diagnose(train, [last], problem.prior)
-        content = diagnosis_content(diagnosis, None, []).model_dump(mode="json")
+        content = diagnosis_content(diagnosis, None, [])
     except InputError as error:
         return {"note": str(error)}
     seconds = time.process_time() - begun

@@ -176,8 +176,10 @@ def _measurement(p: Predictions) -> Variances:
 
 def _initial(p: Predictions, base: np.ndarray) -> Variances:
     """By the smoother's standard deviation of each part of pose and rates, as if independent."""
-    if p.use is not None and p.use.whole:
-        raise InputError("the FMU's velocity cannot be set: its own start is part of what is judged")
+    if p.predictor.whole:
+        raise InputError(
+            f"the velocity of {p.predictor.name} cannot be set: its own start is part of what is judged"
+        )
     s, states = p.smoothed, []
     for name in ("eta", "eta_dot"):
         value, std = getattr(s, name), np.nan_to_num(getattr(s, f"{name}_std"))
@@ -195,8 +197,8 @@ def _in_body(s: Smoothed) -> Smoothed:
 
 
 def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Variances:
-    if p.use is not None:
-        raise InputError("nobody told how uncertain the parameters inside the FMU are")
+    if not p.predictor.parametric:
+        raise InputError(f"how uncertain the parameters inside {p.predictor.name} are is not known")
     if learned is None or learned.posterior is None:
         raise InputError("no posterior was given (--learned)")
     names = [name.partition(".")[2] for name in learned.posterior.names]
@@ -207,9 +209,9 @@ def _parameters(p: Predictions, base: np.ndarray, learned: Learned | None) -> Va
 
 
 def _process_noise(p: Predictions, learned: Learned | None) -> Variances:
-    """By the unrecorded force; a model that moves as an FMU does stands for that."""
-    if p.use is not None and p.use.whole:
-        raise InputError("the FMU's velocity cannot be set")
+    """By the unrecorded force, about the motion of the predictor's model."""
+    if p.predictor.whole:
+        raise InputError(f"the velocity of {p.predictor.name} cannot be set")
     if learned is None:
         raise InputError("no diagnosis says which unrecorded force is left (--learned)")
     shots = Shooting([p.smoothed], p.windows.length)

@@ -1,34 +1,27 @@
 """The errors of a criterion's windows beside its tolerance."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..report.panels import legend, panels_of
-from ..report.svg import AFTER, BAND, BEFORE
+from ..report.chart import AFTER, BAND, BEFORE, PT, Axis, Chart, Panel
 from .judged_criterion import EXPANDED, Judgement
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+HEIGHT = 173.0  # pt
 
 
-def error_figure(j: Judgement) -> "Figure":
+def error_figure(j: Judgement) -> Chart:
     """Size of the error in each window, by runs and time; the tolerance, and 2 u_val from zero."""
-    figure, (panel,) = panels_of(2.4)
     c = j.criterion
     size = np.abs(j.errors) / c.factor
-    inside = size <= c.tolerance
-    number = np.arange(1, size.size + 1)
-    panel.plot(number[inside], size[inside], "o", ms=3.0, color=AFTER, label="within")
-    panel.plot(number[~inside], size[~inside], "x", ms=4.0, color=BEFORE, label="beyond")
-    panel.axhline(c.tolerance, color=BEFORE, lw=1.0, label="tolerance")
+    number, inside = np.arange(1, size.size + 1), size <= c.tolerance
+    reach = 0.0 if j.budget is None else EXPANDED * j.budget.u_val / c.factor
+    most = 1.05 * float(np.max([*size[np.isfinite(size)], c.tolerance, reach]))
+    ends = (0.5, size.size + 0.5)
+    panel = Panel(Axis("window", ends), Axis(f"{c.quantity} [{c.unit}]", (0.0, most)))
     if j.budget is not None:
-        reach = EXPANDED * j.budget.u_val / c.factor
-        panel.axhspan(0.0, reach, color=BAND, alpha=0.3, lw=0.0, label="2 u_val")
+        panel.fill(np.array(ends), 0.0, reach, BAND, "2 u_val", opacity=0.3)
     for k in np.flatnonzero(np.diff(j.run)):
-        panel.axvline(k + 1.5, color=BAND, lw=0.6)
-    panel.set_ylim(bottom=0.0)
-    panel.set_xlabel("window")
-    panel.set_ylabel(f"{c.quantity} [{c.unit}]")
-    legend(figure, panel, 4)
-    return figure
+        panel.draw([k + 1.5, k + 1.5], [0.0, most], BAND, width=PT.thin)
+    panel.draw(ends, [c.tolerance, c.tolerance], BEFORE, "tolerance")
+    panel.draw(number[inside], size[inside], AFTER, "within", radius=PT.dot)
+    panel.draw(number[~inside], size[~inside], BEFORE, "beyond", radius=PT.dot, hollow=True)
+    return Chart(HEIGHT, [panel])

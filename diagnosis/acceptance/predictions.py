@@ -1,7 +1,6 @@
-"""Motion some seconds ahead as a model or an FMU predicts it, in windows, and as it was measured."""
+"""The windows that criteria judge: the motion at their horizon, predicted and measured."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +9,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.ops import wrap
 
-from ..predictors import Model, Use, WeakWindows, predicted_windows, window_residuals
+from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..predictors.windows import Windows
 from ..runs import Smoothed
@@ -24,12 +23,11 @@ class Predictions:
     """Predictions of a run in windows of one length.
 
     Args:
-        e: the run with what predicts it.
-        use: how an FMU predicts it; None: the learned model of ``e`` does, or the initial one.
+        e: the run with what predicts it: the learned model, or the initial one.
         horizon: of the predictions [s].
 
     Attributes:
-        windows: of that length; of an FMU whose velocity cannot be set one, the whole run.
+        windows: of that length; of a predictor whose velocity cannot be set one, the whole run.
         rows: (w,), row of the last sample of each, near the horizon.
         measured: (w, 6), the sample of the pose there, and the smoothed velocity.
 
@@ -37,10 +35,15 @@ class Predictions:
         InputError: no window has enough samples.
     """
 
-    def __init__(self, e: Evaluation, use: Use | None, horizon: float) -> None:
-        self.smoothed, self.use = e.smoothed, use
+    def __init__(self, e: Evaluation, horizon: float) -> None:
+        self.smoothed, self.predictor = e.smoothed, e.predicted_by
+        self._learned = [] if e.learned is None else [e.learned]
         self.model = (e.learned or e.model).during(e.name)
-        self.windows, begin = self._windows(replace(e.weak_windows, horizon=horizon), horizon)
+        none = InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")
+        windows = self.predictor.windows([self.smoothed], horizon)
+        if windows is None:
+            raise none
+        self.windows, begin = windows, self.predictor.run_in(self.smoothed)
         until = begin + horizon
         place = np.flatnonzero(self.windows.since <= until + 1e-9)
         window = self.windows.sample_window[place]
@@ -51,22 +54,13 @@ class Predictions:
         last = last[last >= 2]
         self._last = last[self.windows.sample_window[last - 2] == self.windows.sample_window[last]]
         if not self._last.size:
-            raise InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")
+            raise none
         window = self.windows.sample_window[self._last]
         self._since = self.windows.since
         time = self.windows.start[window] + self._since[self._last]
         self.first = np.searchsorted(self.smoothed.time, self.windows.start[window] + begin - 1e-6)
         self.rows = np.searchsorted(self.smoothed.time, time - 1e-6)
         self.measured = np.hstack([self.windows.measured[self._last], self.smoothed.nu[self.rows]])
-
-    def _windows(self, w: WeakWindows, horizon: float) -> tuple[Windows, float]:
-        """The windows, and the time in each from which on it counts [s]."""
-        if self.use is None:
-            return Windows([self.smoothed], horizon), 0.0
-        windows = predicted_windows(w, self.use)
-        if windows is None:
-            raise InputError(f"run '{self.smoothed.track.run.name}' has no window of {horizon:g} s")
-        return windows, self.use.run_in(self.smoothed)
 
     @property
     def start(self) -> np.ndarray:
@@ -76,26 +70,25 @@ class Predictions:
     @cached_property
     def motion(self) -> np.ndarray:
         """(w, 6), the predicted motion at the horizon."""
-        if self.use is not None:
-            return self._at_end(window_residuals(self.smoothed, self.use, self.windows))
-        return self._at_end(self.windows.residuals(self.model))
+        return self._predicted(self.windows)
 
     def finer(self, parts: int) -> np.ndarray:
         """The predicted motion (w, 6) where each step is divided into some parts."""
-        if self.use is not None:
-            return self._at_end(window_residuals(self.smoothed, self.use, self.windows, parts))
-        return self._at_end(self.windows.finer(parts).residuals(self.model))
+        return self._predicted(self.windows.finer(parts))
 
     def from_others(self, states: Sequence[Smoothed]) -> list[np.ndarray]:
         """The predicted motion (w, 6) from each of some other states of the run on."""
-        if self.use is not None:
-            return [self._at_end(window_residuals(s, self.use, self.windows)) for s in states]
-        together = Windows(states, self.windows.length).residuals(self.model)
-        return [self._at_end(r) for r in np.split(together, len(states))]
+        windows = self.predictor.windows(states, self.windows.length)
+        assert windows is not None  # as of the run itself
+        residuals = self.predictor.residuals(windows, self._learned)[-1]
+        return [self._at_end(r) for r in np.split(residuals, len(states))]
 
     def motions(self, models: Sequence[Model]) -> list[np.ndarray]:
         """The predicted motion (w, 6) of each of some models of this project."""
         return [self._at_end(r) for r in self.windows.residuals_of_each(models)]
+
+    def _predicted(self, windows: Windows) -> np.ndarray:
+        return self._at_end(self.predictor.residuals(windows, self._learned)[-1])
 
     def _at_end(self, residuals: np.ndarray) -> np.ndarray:
         """The last pose, and the slope of the parabola through the last three as velocity."""

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
-from fmus.ships.naming import DEFAULT as USUAL
 
 from ..execution.result_folder import sha256, together
+from ..predictors import ship_name
 from ..report.content import fmu_result, sensor_results, versions
-from ..report.result_keys import FmuResult
 from ..session import Comparison
 from .budget import Learned, read_learned, sources_of
 from .criterion import Criterion, ReadCriteria, now, read_criteria
@@ -104,14 +103,13 @@ def validate(
     given = [e.name for e in comparison.evaluations]
     judgements = [judge(c, given, predicted[c.horizon]) for c in read.content.criteria]
     every = {**(files or {}), "learned": () if known is None else known.files}
-    described = comparison.evaluations[0].model.ship.description
     fmu = fmu_result(comparison)
     content = RecordContent(
         made=now(),
         command=command or " ".join(sys.argv),
         versions=versions(),
         model=fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
-        ship=USUAL if described is None else described.name,
+        ship=ship_name(comparison.evaluations[0].model.ship),
         fmu=fmu,
         files=[*_data(comparison), *_files(every)],
         criteria=CriteriaResult(
@@ -130,7 +128,7 @@ def validate(
         ],
         sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
         notes=list(dict.fromkeys(notes)),
-        not_covered=list(_not_covered(comparison, judgements, fmu)),
+        not_covered=list(_not_covered(comparison, judgements)),
     )
     return Validation(content, judgements)
 
@@ -141,7 +139,7 @@ def _predicted(
     """The runs in windows of a length; of others, and of sources that are not known, a note."""
     for e in comparison.evaluations:
         try:
-            p = Predictions(e, comparison.use, horizon)
+            p = Predictions(e, horizon)
         except InputError as error:
             notes.append(str(error))
             continue
@@ -215,9 +213,7 @@ def _budget(j: Judgement, c: Criterion) -> BudgetResult | None:
     )
 
 
-def _not_covered(
-    comparison: Comparison, judgements: Sequence[Judgement], fmu: FmuResult | None
-) -> Iterator[str]:
+def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:
     """What nobody may conclude from the record."""
     yield "Speeds, drift angles, yaw rates and commands outside the validity range."
     horizons = sorted({j.criterion.horizon for j in judgements})
@@ -230,8 +226,9 @@ def _not_covered(
         unknown = [] if j.budget is None else j.budget.unknown
         if unknown:
             yield f"{j.criterion.title}: u_val is without {', '.join(unknown)}, which are not known."
-    if fmu is not None and fmu.whole_runs:
-        yield "Predictions from a measured state: the velocity of the FMU cannot be set."
+    predictor = comparison.predictor
+    if predictor.whole:
+        yield f"Predictions from a measured state: the velocity of {predictor.name} cannot be set."
     yield "Systematic errors of sensors that no other channel shows."
     if all(e.weak_windows.run.trial is None for e in comparison.evaluations):
         yield "Measures of manoeuvring trials: no run is one."

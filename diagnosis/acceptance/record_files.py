@@ -1,12 +1,12 @@
 """The files of a record: the report as HTML and PDF, the record, its signature."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from ..execution.result_folder import sha256
 from ..report.document import Document, Plot, write_document
-from ..report.svg import style
+from ..report.formatting import as_json
 from .error_figure import error_figure
 from .judged_criterion import Judgement
 from .pdf import write_pdf
@@ -30,27 +30,18 @@ def write_record(
         InputError: no such key.
     """
     if key is not None:
-        content = content.model_copy(update={"public_key": public_key(key)})
+        content = replace(content, public_key=public_key(key))
     parts = [*sections(content)]
-    with style():
-        plots = _plots(judgements)
-        write_pdf(folder / PDF, TITLE, parts, [p.figure for p in plots])
-        write_document(
-            folder / PAGE, Document(TITLE, sections=[replace(parts[0], plots=plots), *parts[1:]])
-        )
+    figures = [(error_figure(j), j) for j in judgements if j.errors.size]
+    plots = [
+        Plot(f, f"{j.criterion.title}: error of each window, and the tolerance.") for f, j in figures
+    ]
+    write_pdf(folder / PDF, TITLE, parts, [f.figure() for f, _ in figures])
+    write_document(folder / PAGE, Document(TITLE, sections=[replace(parts[0], plots=plots), *parts[1:]]))
     reports = [FileResult(role="report", path=name, sha256=sha256(folder / name)) for name in FILES[1:3]]
-    text = content.model_copy(update={"reports": tuple(reports)}).model_dump_json(indent=2) + "\n"
+    text = as_json(asdict(replace(content, reports=tuple(reports)))) + "\n"
     (folder / RECORD).write_bytes(text.encode())
     if key is None:
         return [*FILES[:3]]
     (folder / SIGNATURE).write_bytes(sign(text.encode(), key))
     return [*FILES]
-
-
-def _plots(judgements: Sequence[Judgement]) -> list[Plot]:
-    """The errors of each criterion's windows."""
-    return [
-        Plot(error_figure(j), f"{j.criterion.title}: error of each window, and the tolerance.")
-        for j in judgements
-        if j.errors.size
-    ]

@@ -1,8 +1,10 @@
-"""Schema of ``validation.json``: numbers in SI, but those of a criterion in its unit."""
+"""The content of ``validation.json``: numbers in SI, but those of a criterion in its unit.
 
-from typing import Literal
+A number that is not finite, or not known, is null in the file.
+"""
 
-from ..report.result_keys import FmuResult, Number, Part, SensorResult
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
 
 FORM = "cybership validation record 1"
 STANDING = (
@@ -21,6 +23,13 @@ REFERENCES = (
 )
 
 
+class Part:
+    """A part of the record; a file that is read must have no other keys."""
+
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+
+@dataclass(frozen=True, kw_only=True)
 class FileResult(Part):
     """A file: what it was for, its path as it was given, its SHA-256 (of a log's folder: of the log)."""
 
@@ -29,6 +38,7 @@ class FileResult(Part):
     sha256: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class CriteriaResult(Part):
     """The file of the criteria, when it was last changed and when it was read (UTC), and its content."""
 
@@ -39,18 +49,20 @@ class CriteriaResult(Part):
     purpose: str | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class RangeResult(Part):
     """What the data cover of a signal."""
 
     signal: str
     unit: str
-    least: Number
-    q05: Number
-    median: Number
-    q95: Number
-    greatest: Number
+    least: float | None
+    q05: float | None
+    median: float | None
+    q95: float | None
+    greatest: float | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class BudgetResult(Part):
     """Standard uncertainties of the error at the horizon, in the criterion's unit; null: unknown.
 
@@ -58,16 +70,17 @@ class BudgetResult(Part):
     of u_num, u_input and u_D (the measurement).
     """
 
-    u_D: Number
-    initial_state: Number
-    parameters: Number
-    process_noise: Number
-    u_input: Number
-    u_num: Number
-    u_val: Number
+    u_D: float | None
+    initial_state: float | None
+    parameters: float | None
+    process_noise: float | None
+    u_input: float | None
+    u_num: float | None
+    u_val: float | None
     unknown: list[str]
 
 
+@dataclass(frozen=True, kw_only=True)
 class JudgementResult(Part):
     """A criterion and what the data say of it; errors in the criterion's unit.
 
@@ -81,18 +94,19 @@ class JudgementResult(Part):
     reason: str
     runs: list[str]
     unit: str
-    tolerance: Number
+    tolerance: float | None
     windows: int
-    independent: Number
-    E: Number
-    rms: Number
-    largest: Number
-    estimate: Number
-    low: Number
-    high: Number
+    independent: float | None
+    E: float | None
+    rms: float | None
+    largest: float | None
+    estimate: float | None
+    low: float | None
+    high: float | None
     budget: BudgetResult | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class RecordContent(Part):
     """The content of ``validation.json``."""
 
@@ -104,12 +118,12 @@ class RecordContent(Part):
     versions: dict[str, str]
     model: str
     ship: str
-    fmu: FmuResult | None
+    fmu: dict[str, Any] | None
     files: list[FileResult]
     criteria: CriteriaResult
     judgements: list[JudgementResult]
     validity: list[RangeResult]
-    sensors: list[SensorResult]
+    sensors: list[dict[str, Any]]
     notes: list[str]
     not_covered: list[str]
     reports: tuple[FileResult, ...] = ()

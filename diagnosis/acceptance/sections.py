@@ -27,7 +27,7 @@ def sections(r: RecordContent) -> Iterator[Section]:
             )
         ],
     )
-    faults = [f"{s.run}: {s.sentence}" for s in r.sensors]
+    faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
     yield Section("Faults of sensors", faults or ["The channels do not contradict each other."])
     yield Section("What is not covered", r.not_covered)
     if r.notes:
@@ -67,8 +67,7 @@ def _uncertainty(r: RecordContent) -> Section:
     judged = [j for j in r.judgements if j.budget is not None]
     rows = []
     for j in judged:
-        told = j.budget.model_dump() if j.budget else {}
-        rows.append((j.criterion, j.unit, *(_known(told[name]) for name in BUDGET)))
+        rows.append((j.criterion, j.unit, *(_known(getattr(j.budget, name)) for name in BUDGET)))
     told = (
         "Standard uncertainties of the judged quantity at the horizon; u_input² is that of initial "
         "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."
@@ -94,5 +93,5 @@ def _origin(r: RecordContent) -> Section:
         ("signed", "no" if r.public_key is None else r.public_key),
     ]
     purpose = [f"Purpose: {c.purpose}."] if c.purpose else []
-    told = r.fmu.sentences if r.fmu else []
+    told = r.fmu["sentences"] if r.fmu else []
     return Section("Made with", [*purpose, *told], [Table(("", ""), rows, words=True)])

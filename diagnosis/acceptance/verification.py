@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from cosim import InputError
 
@@ -47,7 +47,7 @@ def verify_record(record: str | Path, key: str | Path | None = None) -> list[Che
 def _read(path: Path) -> tuple[bytes, RecordContent]:
     try:
         raw = path.read_bytes()
-        content = RecordContent.model_validate_json(raw)
+        content = TypeAdapter(RecordContent).validate_json(raw)
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:

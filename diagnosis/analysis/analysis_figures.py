@@ -2,15 +2,11 @@
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..report.panels import figure_of
-from ..report.svg import AFTER, BAND, BEFORE, THIRD
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..report.chart import AFTER, BAND, BEFORE, THIRD
+from .page_figure import PageFigure, figure_of
 
 POINTS = 1500  # at most in a cloud or a line, so that the page stays small (chosen)
 COLOURS = (AFTER, BEFORE, THIRD, "black")
@@ -23,7 +19,7 @@ def thinned(n: int) -> np.ndarray:
 
 def share_of_variance(
     explained: np.ndarray, validated: np.ndarray, kept: int, label: str = "components"
-) -> "Figure":
+) -> PageFigure:
     """Explained and cross-validated variance over the number of components or factors (Fig. 7.6a)."""
     figure = figure_of(2.4)
     panel = figure.subplots()
@@ -36,7 +32,7 @@ def share_of_variance(
     return figure
 
 
-def against_limit(values: np.ndarray, limit: float, label: str) -> "Figure":
+def against_limit(values: np.ndarray, limit: float, label: str) -> PageFigure:
     """A statistic of each sample with its limit, logarithmic."""
     figure = figure_of(2.2)
     panel = figure.subplots()
@@ -50,7 +46,7 @@ def against_limit(values: np.ndarray, limit: float, label: str) -> "Figure":
     return figure
 
 
-def before_and_after(nu: np.ndarray, kept: np.ndarray) -> "Figure":
+def before_and_after(nu: np.ndarray, kept: np.ndarray) -> PageFigure:
     """The velocity before and after removal of outliers (Fig. 7.5)."""
     figure = figure_of(4.2)
     panels = figure.subplots(3, 1, sharex=True)
@@ -66,7 +62,7 @@ def before_and_after(nu: np.ndarray, kept: np.ndarray) -> "Figure":
     return figure
 
 
-def cloud(a: np.ndarray, b: np.ndarray, labels: tuple[str, str]) -> "Figure":
+def cloud(a: np.ndarray, b: np.ndarray, labels: tuple[str, str]) -> PageFigure:
     """Two scores against each other."""
     figure = figure_of(3.0)
     panel = figure.subplots()
@@ -76,7 +72,7 @@ def cloud(a: np.ndarray, b: np.ndarray, labels: tuple[str, str]) -> "Figure":
     return figure
 
 
-def loadings(points: np.ndarray, names: Sequence[str], label: str) -> "Figure":
+def loadings(points: np.ndarray, names: Sequence[str], label: str) -> PageFigure:
     """Variables in the plane of the first two components or factors (Figs. 7.6b, 7.8b)."""
     figure = figure_of(3.4)
     panel = figure.subplots()
@@ -92,7 +88,7 @@ def loadings(points: np.ndarray, names: Sequence[str], label: str) -> "Figure":
 
 def coefficient_bars(
     values: np.ndarray, spread: np.ndarray, names: Sequence[str], axis: str
-) -> "Figure":
+) -> PageFigure:
     """Coefficients of standardised variables with their spread over the folds (Fig. 7.7)."""
     figure = figure_of(2.6)
     panel = figure.subplots()
@@ -106,7 +102,7 @@ def coefficient_bars(
 
 def model_error_over_time(
     measured: np.ndarray, models: dict[str, np.ndarray], time: np.ndarray
-) -> "Figure":
+) -> PageFigure:
     """The model error of each axis and what models make of it (Figs. 7.2, 7.10)."""
     figure = figure_of(4.4)
     panels = figure.subplots(3, 1)

@@ -20,7 +20,7 @@ from fmus.vessel.vessel import State, disturbed
 
 from ..execution.progress import Advance, silent
 from ..predictors import Model
-from ..runs import Run, Track, clean, read, smooth
+from ..runs import PreparedRun, prepare, read_each
 from .principal_components import fit_components, outliers
 
 NU = ("u", "v", "r")
@@ -116,8 +116,9 @@ def gather_samples(
     estimates: str = "smoothed",
     advance: Advance = silent,
     of: Ship | None = None,
+    anyway: bool = False,
 ) -> list[Samples]:
-    """Read measured runs and estimate velocity and acceleration.
+    """Read and prepare measured runs, and estimate velocity and acceleration.
 
     Args:
         paths: files or folders of logs, see :func:`diagnosis.read`.
@@ -125,6 +126,7 @@ def gather_samples(
             ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
         advance: progress callback.
         of: the ship that was measured; None: CyberShip Enterprise 1.
+        anyway: see :func:`.runs.prepare`.
 
     Returns:
         The samples of each run.
@@ -134,25 +136,22 @@ def gather_samples(
     """
     advance("reading")
     of = of or ship()
-    runs = [read(path, of=of) for path in paths]
-    known: dict[bytes, str | Path] = {}
-    for run, path in zip(runs, paths, strict=True):
-        same = known.setdefault(np.column_stack([run.time, run.pose]).tobytes(), path)
-        if same is not path:
-            raise InputError(f"'{path}' holds the same measurement as '{same}'")
     found = []
-    for run in runs:
+    for run in read_each(paths, of):
         advance(f"{estimates} states of {run.name}")
-        track = clean(run, scale=of.scale)
-        s = _smoothed(track, of) if estimates == "smoothed" else _filtered(track, of)
+        prepared = prepare(run, of, anyway)
+        s = _smoothed(prepared, of) if estimates == "smoothed" else _filtered(prepared, of)
         if s.time.size < FEWEST:
             raise InputError(f"run '{run.name}': {s.time.size} samples are too few, {FEWEST} are needed")
         found.append(s)
     return found
 
 
-def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray, of: Ship) -> Samples:
+def _samples(
+    prepared: PreparedRun, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray, of: Ship
+) -> Samples:
     """The rows to keep, with their forces."""
+    run = prepared.track.run
     before = np.vstack([run.tau_cmd[:1], run.tau_cmd[:-1]])
     tau = 0.5 * (before + run.tau_cmd)
     good = keep & np.isfinite(nu).all(axis=1) & np.isfinite(nu_dot).all(axis=1)
@@ -162,19 +161,19 @@ def _samples(run: Run, keep: np.ndarray, nu: np.ndarray, nu_dot: np.ndarray, of:
     return Samples(names, run.time[good], nu, nu_dot, tau, model_error(nu, nu_dot, tau, of))
 
 
-def _smoothed(track: Track, of: Ship) -> Samples:
-    """By the smoother, at all measured samples that are no spikes."""
-    s = smooth(track)
+def _smoothed(prepared: PreparedRun, of: Ship) -> Samples:
+    """By the smoother, at all samples."""
+    s = prepared.smoothed
     ahead, aside = rotate_to_body(s.eta[:, 2], s.eta_ddot[:, 0], s.eta_ddot[:, 1])
     u, v, r = s.nu.T
     # The body-fixed axes turn at the yaw rate.
     nu_dot = np.column_stack([ahead + r * v, aside - r * u, s.eta_ddot[:, 2]])
-    return _samples(track.run, s.used, s.nu, nu_dot, of)
+    return _samples(prepared, prepared.samples, s.nu, nu_dot, of)
 
 
-def _filtered(track: Track, of: Ship) -> Samples:
-    """By the modified derivative filter of 4.3.2, sample by sample."""
-    run, observer = track.run, of.serving(mdf.COMPONENT)
+def _filtered(prepared: PreparedRun, of: Ship) -> Samples:
+    """By the modified derivative filter of 4.3.2, row by row: it copes with spikes and frozen rows."""
+    run, observer = prepared.track.run, of.serving(mdf.COMPONENT)
     p: Any = observer.params()
     pose = run.pose.tolist()
     inputs = [Inputs(Measurement(*row)) for row in pose]
@@ -184,5 +183,5 @@ def _filtered(track: Track, of: Ship) -> Samples:
         state, e = observer.step(state, i, p, h)
         rows.append((e.u_hat, e.v_hat, e.r_hat, e.u_dot_hat, e.v_dot_hat, e.r_dot_hat))
     found = np.array(rows)
-    settled = (run.time >= run.time[0] + SETTLED * of.scale.time) & ~track.between
-    return _samples(run, settled, found[:, :3], found[:, 3:], of)
+    settled = (run.time >= run.time[0] + SETTLED * of.scale.time) & ~prepared.track.between
+    return _samples(prepared, settled, found[:, :3], found[:, 3:], of)

@@ -25,12 +25,7 @@ LONG = 20  # windows without any command: the ship has forgotten the thrust befo
 
 
 def beyond_thrusters(run: Run, model: Model) -> str | None:
-    """A clause about commands that the thrusters cannot give, where these matter.
-
-    Args:
-        run: with its commands.
-        model: its thrusters.
-    """
+    """A clause about commands of a run that a model's thrusters cannot give, where these matter."""
     if run.commands is not None:
         return _beyond_limits(run, model)
     full, size = full_thrust(model), np.abs(run.tau_cmd)
@@ -70,12 +65,7 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
 
 
 def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
-    """A clause about commands that are constant, or absent, while the motion shows that others acted.
-
-    Args:
-        w: windows of the run.
-        model: its inertia and hull.
-    """
+    """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
     varies = np.ptp(tau, axis=0) > SILENT * largest

@@ -134,7 +134,7 @@ def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues
     counts = [w.middle.size for w in data]
     every = np.arange(sum(counts))
     first = np.cumsum([0, *counts])
-    speed, turn, level, heading, place = map(np.concatenate, zip(*map(_of_run, data), strict=True))
+    speed, turn, level, heading, place = map(np.concatenate, zip(*map(means_of_run, data), strict=True))
     shared = [
         CovariateValues(SPEED, every, speed),
         CovariateValues(YAW_RATE, every, turn),
@@ -154,7 +154,7 @@ def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues
     return [[*shared, CovariateValues(THRUST, every, level[:, k] / most[k]), *times] for k in range(3)]
 
 
-def _of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:
+def means_of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:
     """Means over the windows of a run.
 
     Returns:

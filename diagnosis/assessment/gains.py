@@ -67,11 +67,6 @@ class Gains:
         return float(np.exp(np.average(np.log(self.value[known]), weights=weights)))
 
     @property
-    def sound(self) -> bool:
-        """Whether no axis is wrong."""
-        return not self.wrong.any()
-
-    @property
     def close(self) -> bool:
         """Whether all that are told are within a factor of MOST_GAIN of one."""
         near = (self.value * MOST_GAIN > 1.0) & (self.value < MOST_GAIN)
@@ -79,12 +74,7 @@ class Gains:
 
 
 def gains(w: WeakWindows, model: Model) -> Gains:
-    """The acceleration that the commands of a run give, as shares of what they should give.
-
-    Args:
-        w: windows of the run.
-        model: its inertia and damping.
-    """
+    """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed(w, model), w.held @ commanded_force(w, model)
     moves = T.std(axis=0) > SILENT * np.abs(T).max()
     psi = w.smoothed.eta[:, 2]

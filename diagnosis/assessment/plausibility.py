@@ -17,7 +17,7 @@ offset of the heading does not do as well. A mistake in the pose needs commands 
 alone is explained by another ship's hull as well.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -72,22 +72,20 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
             found = _refusal(w, model)
         if found:
             seen, changes, name = found
-            told = line_beside(w.run.file, changes, name)
-            raise InputError(f"run '{w.run.name}': {seen}{told}; {GO_ON}")
+            remedy = line_beside(w.run.file, changes, name)
+            raise InputError(f"run '{w.run.name}': {seen}{remedy}; {GO_ON}")
 
 
 def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
-    twice = same_columns(w.run)
+    twice, still = same_columns(w.run), still_column(w.run)
     if twice:
         seen = f"{twice[0]} and {twice[1]} are the same numbers"
         return seen, {twice[1]: Change(twice[1])}, "the name of its column"
-    still = still_column(w.run)
     if still:
         seen = f"{still} is the same number in all rows, while the rest of the pose changes"
         return seen, {still: Change(still)}, "the name of its column"
-    beyond = beyond_thrusters(w.run, model)
-    silent = contradicted_commands(w, model)
+    beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return silent, {}, None
     found = likeliest_mistake(w, model)
@@ -98,10 +96,11 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
         )
         return seen, found.reading.changes, None
     given = gains(w, model)
-    if beyond is None and given.sound:
+    wrong = [f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong)]
+    reading = likeliest_unit(w, model, given) if wrong else None
+    if beyond is None and not wrong:
         return None
-    seen = beyond or _of_gains(given)
-    reading = likeliest_unit(w, model, given) if beyond is None or not given.sound else None
+    seen = beyond or f"its accelerations follow {', '.join(wrong)}"
     return (
         (f"{seen}; it seems that {reading.mistake}", reading.changes, None)
         if reading
@@ -109,44 +108,32 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     )
 
 
-def _of_gains(given: Gains) -> str:
-    """A clause with the gains that no ship has."""
-    shown = (f"{given.value[k]:.3g} times {TAU[k]}" for k in np.flatnonzero(given.wrong))
-    return f"its accelerations follow {', '.join(shown)}"
-
-
 def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:
     """The reading in which the commands give the accelerations that they should, if there is any.
+
+    Of several that in which the model's error is the least part of the commands: the median of the axes
+    counts, as what is hidden in the ship is mostly on one. Units without a name come last.
 
     Args:
         w: windows of the run.
         model: its inertia, hull and thrusters.
         given: its gains as it was read.
     """
-    named = _of_least_error(w, model, given, units(w.run, model))
-    if named is not None or given.mean is None:
-        return named
-    return _of_least_error(w, model, given, other_factors(w.run, given.mean))
-
-
-def _of_least_error(
-    w: WeakWindows, model: Model, given: Gains, readings: Iterable[Reading]
-) -> Reading | None:
-    """Of the readings with plausible commands that in which the model's error is the least part of them.
-
-    The median of the axes counts: what is hidden in the ship is mostly on one.
-    """
-    found = []
-    for reading in readings:
-        meant = reread(w, reading)
-        then = gains(meant, model)
-        told = (then.told | ~given.told).all()
-        if not (told and then.close) or beyond_thrusters(meant.run, model):
-            continue
-        T = meant.held @ commanded_force(meant, model)
-        off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
-        found.append((float(np.median(np.nan_to_num(off, nan=np.inf))), reading))
-    return min(found, key=lambda each: each[0])[1] if found else None
+    k = given.mean
+    for readings in (units(w.run, model), () if k is None else other_factors(w.run, k)):
+        found = []
+        for reading in readings:
+            meant = reread(w, reading)
+            then = gains(meant, model)
+            known = (then.told | ~given.told).all()
+            if not (known and then.close) or beyond_thrusters(meant.run, model):
+                continue
+            T = meant.held @ commanded_force(meant, model)
+            off = ((needed(meant, model) - T) ** 2).sum(axis=0) / (T**2).sum(axis=0)
+            found.append((float(np.median(np.nan_to_num(off, nan=np.inf))), reading))
+        if found:
+            return min(found, key=lambda each: each[0])[1]
+    return None
 
 
 def same_columns(run: Run) -> tuple[str, str] | None:
@@ -187,9 +174,7 @@ class Mistake(NamedTuple):
 def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     """The mistake without which the commands of a run are explained far better, if there is any.
 
-    Args:
-        w: windows of the run.
-        model: whose inertia and hull tell which force a motion needs.
+    A model's inertia and hull give the force that a motion needs.
     """
     commands = w.held @ commanded_force(w, model)
     commands = commands - commands.mean(axis=0)
@@ -197,11 +182,11 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     heard = size > SILENT * size.max()
     if not heard.any():
         return None
-    as_read = _varying(w, model, AS_READ)
 
     def shares(z: np.ndarray, T: np.ndarray = commands) -> np.ndarray:
         return np.maximum(_unexplained(T, z)[heard] / (T**2).sum(axis=0)[heard], LEAST_SHARE)
 
+    as_read = _varying(w, model, AS_READ)
     now = shares(as_read)
     if now.max() < MISSING:
         return None

@@ -47,14 +47,17 @@ AS_READ = Reading("nothing")
 
 def of_pose(mistake: str, factors: Sequence[float]) -> Reading:
     """A pose with factors (3,) on its channels."""
-    changes = {s: Change(s, np.sign(f), abs(f)) for s, f in zip(POSE, factors, strict=True) if f != 1.0}
-    return Reading(mistake, changes, motion=np.diag(factors))
+    return Reading(mistake, _scaled(POSE, factors), motion=np.diag(factors))
 
 
 def of_commands(mistake: str, factors: Sequence[float]) -> Reading:
     """A commanded force with factors (3,)."""
-    changes = {s: Change(s, np.sign(f), abs(f)) for s, f in zip(TAU, factors, strict=True) if f != 1.0}
-    return Reading(mistake, changes, commands=np.diag(factors))
+    return Reading(mistake, _scaled(TAU, factors), commands=np.diag(factors))
+
+
+def _scaled(signals: Sequence[str], factors: Sequence[float]) -> dict[str, Change]:
+    pairs = zip(signals, factors, strict=True)
+    return {s: Change(s, np.sign(f), abs(f)) for s, f in pairs if f != 1.0}
 
 
 def swapped(signals: Sequence[str], i: int, k: int) -> Reading:
@@ -91,12 +94,7 @@ def directions(run: Run, model: Model) -> Iterator[Reading]:
 
 
 def units(run: Run, model: Model) -> Iterator[Reading]:
-    """Readings in which the pose or the commands are in other units.
-
-    Args:
-        run: with its commands.
-        model: whose thrusters' full force is a percentage's whole.
-    """
+    """Readings in which the pose or the commands are in other units, or percent of the full thrust."""
     for unit, size in UNITS["length"].items():
         yield of_pose(f"its position is in {unit}", (size, size, 1.0))
         yield of_pose(f"x is in {unit}", (size, 1.0, 1.0))
@@ -126,21 +124,14 @@ def _shares(run: Run, commands: np.ndarray, model: Model) -> Iterator[Reading]:
     for whole, name in ((1.0, "shares"), (100.0, "percent")):
         meant = (np.abs(commands).max(axis=0) <= whole) & (limits > 1.0)
         factor = np.where(meant, limits / whole, 1.0)
-        changes = {
-            s: Change(s, factor=f) for s, f in zip(run.signals, factor.tolist(), strict=True) if f != 1.0
-        }
+        changes = _scaled(run.signals, factor.tolist())
         if changes:
             force = model.ship.commanded_force(commands * factor)
             yield Reading(f"{' and '.join(changes)} are {name} of their limits", changes, force=force)
 
 
 def other_factors(run: Run, k: float) -> Iterator[Reading]:
-    """Readings in a unit that has no name here, or of a clock that runs at another pace.
-
-    Args:
-        run: its commands.
-        k: how many times what the commands should give the ship accelerates.
-    """
+    """Readings in a unit without a name, or of another clock: the ship accelerates k times too much."""
     yield of_pose(f"its position is in units of {1.0 / k:.3g} m", (1.0 / k, 1.0 / k, 1.0))
     if run.commands is None:
         yield of_commands(f"its commands are in units of {k:.3g} N and N m", (k, k, k))
@@ -163,16 +154,10 @@ def reread(w: WeakWindows, reading: Reading) -> WeakWindows:
 
 
 def needed(w: WeakWindows, model: Model) -> np.ndarray:
-    """Force (K, 3) that the motion of a run needs [N, N, N m].
-
-    Args:
-        w: windows of the run.
-        model: its inertia and hull.
-    """
-    idle = replace(w.run, tau_cmd=0.0 * w.run.tau_cmd, commands=None, power=None)
-    s = replace(w.smoothed, track=replace(w.smoothed.track, run=idle))
+    """Force (K, 3) that the motion of a run needs by a model's inertia and hull [N, N, N m]."""
+    idle = reread(w, Reading("", force=0.0 * w.run.tau_cmd))
     with np.errstate(all="ignore"):  # in a wrong unit forces may be beyond all numbers
-        return np.nan_to_num(omega(replace(w, smoothed=s, memory={}), model), posinf=0.0, neginf=0.0)
+        return np.nan_to_num(omega(idle, model), posinf=0.0, neginf=0.0)
 
 
 def inertial(w: WeakWindows, model: Model) -> np.ndarray:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from ..predictors import Model, WeakWindows
-from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
 from ..predictors.weak_form import OVERLAP, commanded
 from .covariates import AXES
 
@@ -56,6 +56,17 @@ class AxisRemainder:
     def beyond_chance(self) -> bool:
         """Whether more is left than noise gives, be it so little that it does not matter."""
         return self.p_value < CHANCE / TESTS
+
+
+def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
+    """The residual of a model on each axis of some runs, compared with that of the first one."""
+    before, after = ([omega(w, m) for w in runs] for m in (start, model))
+    return axis_remainders(runs, before, after, [omega_std(w, start) for w in runs], start)
+
+
+def any_significant(runs: Sequence[WeakWindows], start: Model, model: Model) -> bool:
+    """Whether a model leaves a significant residual on some axis."""
+    return any(axis.significant for axis in remaining(runs, start, model).values())
 
 
 def axis_remainders(

@@ -21,9 +21,8 @@ from ..execution.result_folder import default_folder, keep_inputs, sha256
 from ..search import Prior
 
 # Options that name files which decide a result.
-INPUTS = ("train", "test", "runs", "run", "model", "map", "effects", "criteria")
-MAP = "map.json"  # what an FMU's variables are, proposed or beside a result
-RUNS = ("train", "test", "runs", "run")  # of these, those that are measured runs
+INPUTS = ("train", "validate", "test", "runs", "run", "model", "map", "effects", "criteria")
+RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are measured runs
 
 
 def prior(text: str) -> Prior:
@@ -67,8 +66,8 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         "--model",
         type=Path,
         metavar="FILE",
-        help="model to begin with: a parameter set .ssv, an .fmu, or a system, .ssp or scenario .json "
-        "(the nominal one)",
+        help="model to begin with: a parameter set .ssv, an .fmu, a system, .ssp or scenario .json, or "
+        "a Python function .py (the nominal one)",
     )
     made.add_argument(
         "--effects",
@@ -79,11 +78,7 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
         help="a file of model effects of your own; may be repeated",
     )
     ship_option(made)
-    made.add_argument(
-        "--anyway",
-        action="store_true",
-        help="go on though a run's units, signs or columns seem to be other ones than said",
-    )
+    anyway_option(made)
     made.add_argument(
         "--horizon",
         type=float,
@@ -110,6 +105,16 @@ def ship_option(made: argparse.ArgumentParser) -> None:
         metavar="NAME|FILE.toml",
         help="the ship that was measured: a shipped one, or a description of your own (as the logs "
         "of runs say, else cse1)",
+    )
+
+
+def anyway_option(made: argparse.ArgumentParser) -> None:
+    """Add ``--anyway``, which means the same in all commands."""
+    made.add_argument(
+        "--anyway",
+        action="store_true",
+        help="use a run whose units, signs or columns seem to be other ones than stated, or whose "
+        "channels have faults that they cannot repair",
     )
 
 
@@ -140,6 +145,7 @@ def analysis_parser(
         help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
         f"derivative filter ({estimates})",
     )
+    anyway_option(made)
     out_options(made, Path("results", name))
     return made
 
@@ -161,6 +167,7 @@ def open_loop_parser(name: str, description: str, epilog: str) -> argparse.Argum
         metavar="FILE",
         help="observer, guidance and controller's parameters, in place of the run's own scenario",
     )
+    anyway_option(made)
     out_options(made, Path("results", name))
     return made
 
@@ -191,7 +198,7 @@ def inputs_of(options: argparse.Namespace) -> dict[str, str]:
 
 def import_later_parts() -> None:
     """Import what is needed once runs are smoothed; it takes a second."""
-    for name in ("diagnosis.session", "diagnosis.report.page", "matplotlib.figure"):
+    for name in ("diagnosis.session", "diagnosis.report.page"):
         import_module(name)
 
 

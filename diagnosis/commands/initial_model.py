@@ -1,6 +1,5 @@
-"""The model that ``--model`` names: a parameter set, or an FMU with a map of its variables."""
+"""The model that ``--model`` names, and a proposal where the variables of an FMU are not known."""
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,26 +8,28 @@ from typing import Any
 from cosim import InputError
 from fmus.ship import Ship
 
-from ..predictors import SUFFIXES, Fmu, Model, UnmatchedError, read_model
-from .command_line import MAP
+from ..predictors import (
+    MAP,
+    DescribedShip,
+    Model,
+    ModelSource,
+    UnmatchedError,
+    open_model,
+    refuse_map,
+    write_map,
+)
 
 
-def initial_model(
-    path: str | Path | None,
-    map: str | Path | None,  # noqa: A002
-    craft: Ship,
-) -> tuple[Model, Fmu | None]:
-    """The model of a ship by ``--model`` and ``--map``; with an FMU the nominal one, and the FMU.
+def initial_model(path: Path | None, map: Path | None, craft: Ship) -> ModelSource:  # noqa: A002
+    """The model of a ship by ``--model`` and ``--map``; by default the nominal one.
 
     Raises:
         InputError: no such file, or not what its name says.
     """
-    path = None if path is None else Path(path)
-    if path is not None and path.suffix in SUFFIXES:
-        return Model(ship=craft), Fmu(path, map)
-    if map is not None:
-        raise InputError(f"--map tells the variables of an FMU: --model NAME{SUFFIXES[0]} is missing")
-    return Model(ship=craft) if path is None else read_model(path, craft), None
+    if path is None:
+        refuse_map(map)
+        return DescribedShip(Model(ship=craft))
+    return open_model(path, map, craft)
 
 
 @contextmanager
@@ -42,11 +43,6 @@ def proposing() -> Iterator[None]:
         yield
     except UnmatchedError as error:
         raise InputError(f"{error}{_proposed(error.proposal)}") from None
-
-
-def write_map(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a map as JSON."""
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def _proposed(content: Mapping[str, Any]) -> str:

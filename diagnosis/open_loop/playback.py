@@ -156,7 +156,7 @@ def play(source: Source, loop: Loop, advance: Advance = silent) -> Played:
     loop = replace(loop, observer=_paced(loop, source))
     with scratch_folder() as folder:
         recording = folder / "recording.csv"
-        columns = _columns(source, loop)
+        columns = fed(source, loop)
         _write(recording, source.time, columns)
         content = _scenario(source, loop, str(recording), columns, notes)
         advance(f"replay of {source.name}")
@@ -193,7 +193,7 @@ def _held(values: np.ndarray) -> np.ndarray:
     return pd.DataFrame(values).ffill().fillna(0.0).to_numpy()
 
 
-def _columns(source: Source, loop: Loop) -> dict[str, np.ndarray]:
+def fed(source: Source, loop: Loop) -> dict[str, np.ndarray]:
     """What is fed, by the input's name; the force is that of the step before each row."""
     tau = source.tau if loop.thrusters is not None else _held(source.tau)
     before = np.vstack([tau[:1], tau[:-1]])

@@ -3,19 +3,16 @@
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..analysis.page_figure import PageFigure, figure_of
+from ..report.chart import AFTER, BAND, BEFORE
 from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number, percent
-from ..report.panels import figure_of
-from ..report.svg import AFTER, BAND, BEFORE
 from .replayed import Replay, stretches
 from .run_source import ASKED, COMMAND, ERRORS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 POINTS = 1500  # of a line, so that the page stays small (chosen)
 PANELS = 8  # most coefficients that are drawn; more are in the files
@@ -142,7 +139,7 @@ def _rows(r: Replay) -> list[list[Any]]:
     ]
 
 
-def _signals(r: Replay, names: tuple[str, ...]) -> "Figure":
+def _signals(r: Replay, names: tuple[str, ...]) -> PageFigure:
     """Signals over time, with what the run has of those that it lost in part."""
     figure = figure_of(1.3 * len(names))
     panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
@@ -160,7 +157,7 @@ def _signals(r: Replay, names: tuple[str, ...]) -> "Figure":
     return figure
 
 
-def _over_time(r: Replay, names: "list[str] | tuple[str, ...]") -> "Figure":
+def _over_time(r: Replay, names: "list[str] | tuple[str, ...]") -> PageFigure:
     """Signals of the controller over time, blocked stretches shaded, stored samples marked."""
     figure = figure_of(0.6 + 1.0 * len(names))
     panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..runs import smooth
 from .playback import Played
 from .run_source import COMMAND
 
@@ -76,7 +75,7 @@ def replayed(played: Played) -> Replay:
     """
     log, source = played.log, played.source
     track = source.track
-    spikes = smooth(track).spikes & track.valid
+    spikes = source.prepared.smoothed.spikes & track.valid
     gone = track.frozen | track.dropped
     after = np.flatnonzero(gone[:-1] & ~gone[1:]) + 1
     rows = np.union1d(np.flatnonzero(spikes), after).astype(int)

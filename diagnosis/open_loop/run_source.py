@@ -8,7 +8,7 @@ import numpy as np
 from fmus.controller.backstepping import Errors
 from fmus.signals import Force, Target
 
-from ..runs import Track, clean, in_order, other_columns, read
+from ..runs import PreparedRun, Track, prepare
 
 TARGET = Target._fields
 ERRORS = Errors._fields
@@ -26,7 +26,7 @@ class Source:
     """A measured run as a source of signals.
 
     Attributes:
-        track: the run with its samples judged.
+        prepared: the run.
         step: of the replay [s].
         time: of the rows, from zero [s].
         tau: (n, 3), commanded force [N, N, N m]; NaN where it was lost.
@@ -34,12 +34,17 @@ class Source:
         compared: what the run has of the controller's signals, NaN where lost: name -> (n,).
     """
 
-    track: Track
+    prepared: PreparedRun
     step: float
     time: np.ndarray
     tau: np.ndarray
     target: np.ndarray | None
     compared: dict[str, np.ndarray]
+
+    @property
+    def track(self) -> Track:
+        """The run with its samples judged."""
+        return self.prepared.track
 
     @property
     def name(self) -> str:
@@ -53,44 +58,36 @@ class Source:
         return {name: gap for name, gap in gaps.items() if gap.any()}
 
 
-def gather_source(path: str | Path) -> Source:
-    """Read a run as a source of signals.
+def gather_source(path: str | Path, anyway: bool = False) -> Source:
+    """Read a run as a source of signals: at the rows of its track, as all commands use it.
 
     Args:
         path: as :func:`diagnosis.read` takes it.
+        anyway: see :func:`.runs.prepare`.
 
     Raises:
         InputError: it cannot be used.
     """
-    run = read(path)
-    names = {signal: (f"{where}.{signal}", signal) for signal, where in FOUND_IN.items()}
-    is_log = Path(path).is_dir() or Path(path).name.startswith("log.")
-    # In a plain file tau_X is the force after clipping, which is a signal of its own.
-    found = other_columns(path, [n[0] if is_log else n[1] for s, n in names.items()])
-    track = clean(run)
-    kept = in_order(run.time)
-
-    def column(signal: str) -> np.ndarray | None:
-        values = found.get(names[signal][0], found.get(names[signal][1]))
-        return None if values is None else values[kept]
-
-    tau = track.run.tau_cmd.copy()
-    if track.run.held is not None:
-        tau[track.run.held] = np.nan
-    time = track.run.time - track.run.time[0]
+    if Path(path).is_dir() or Path(path).name.startswith("log."):
+        names = {signal: f"{instance}.{signal}" for signal, instance in FOUND_IN.items()}
+    else:  # there tau_X is the force after clipping
+        names = {signal: signal for signal in FOUND_IN if signal not in ASKED}
+    prepared = prepare(path, anyway=anyway, also=names.values())
+    run = prepared.track.run
+    found = {s: run.measured[name] for s, name in names.items() if name in run.measured}
+    tau = run.tau_cmd.copy()
+    if run.held is not None:
+        tau[run.held] = np.nan
+    time = run.time - run.time[0]
     regular = float(np.round((time[-1] - time[0]) / (time.size - 1), 9))
     grid = np.arange(time.size) * regular
     on_grid = bool((np.abs(time - grid) <= JITTER * regular).all())
-    columns = [column(s) for s in TARGET]
-    there = [c for c in columns if c is not None]
-    asked = ASKED if is_log else ()
-    compared = {s: c for s in (*ERRORS, *asked) if (c := column(s)) is not None}
-    compared |= dict(zip(COMMAND, tau.T, strict=True))
+    target = [found.pop(s) for s in TARGET if s in found]
     return Source(
-        track,
+        prepared,
         regular if on_grid else LAB_STEP,
         np.round(grid, 12) if on_grid else time,
         tau,
-        np.column_stack(there) if len(there) == len(TARGET) else None,
-        compared,
+        np.column_stack(target) if len(target) == len(TARGET) else None,
+        found | dict(zip(COMMAND, tau.T, strict=True)),
     )

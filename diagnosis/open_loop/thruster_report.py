@@ -2,19 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..analysis.page_figure import PageFigure, figure_of
+from ..report.chart import AFTER, BAND, BEFORE
 from ..report.document import Document, Plot, Section, Table, numbers
 from ..report.formatting import number
-from ..report.panels import figure_of
-from ..report.svg import AFTER, BAND, BEFORE
 from .playback import Played
 from .replayed import stretches
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 WATCH = "watch_thrusters.fmu"
 THRUSTERS = {"vsp": "the VSP", "bow": "the bow thruster"}
@@ -127,7 +124,7 @@ def document(played: Played) -> Document:
     return Document("Thrusters", first, sections, made)
 
 
-def _lines(played: Played, what: str, label: str) -> "Figure":
+def _lines(played: Played, what: str, label: str) -> PageFigure:
     figure = figure_of(2.2)
     panel = figure.subplots()
     time = played.log["time"] + played.source.track.run.time[0]

@@ -1,17 +1,84 @@
 """Evaluation of a model on a measured run, before and after something was learned."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-
-from cosim import InputError
+from scipy.special import gammaincinv
 
 from ..runs import Smoothed
-from .bands import Bands
+from .described_ship import DescribedShip
+from .predictor import Predictor
 from .ship_model import Model
 from .weak_form import WeakWindows, omega
-from .windows import WindowErrors, Windows, free_runs
+from .windows import WindowErrors, Windows
+
+LEVELS = (0.5, 0.9)
+POINTS = 41  # of an ellipse that is drawn; chosen
+
+
+def quantile(level: float, dof: int) -> float:
+    """Quantile of the chi-squared distribution; `scipy.stats` takes a while to import."""
+    return 2.0 * float(gammaincinv(0.5 * dof, level))
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """The covariance of predictions in the windows of a run.
+
+    Attributes:
+        windows: of the run.
+        since: (T,), time from a window's start [s], zero included.
+        predicted: (w, T, 3), pose [m, m, rad].
+        covariance: (w, T, 3, 3), of measured minus predicted pose.
+    """
+
+    windows: Windows
+    since: np.ndarray
+    predicted: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def at_samples(self) -> np.ndarray:
+        """(samples, 3, 3), covariance at each sample that is used, see :class:`Windows`."""
+        place = self.windows.since / (self.since[1] - self.since[0])
+        k = np.clip(np.floor(place).astype(int), 0, self.since.size - 2)
+        share = (place - k)[:, None, None]
+        window = self.windows.sample_window
+        return (1.0 - share) * self.covariance[window, k] + share * self.covariance[window, k + 1]
+
+    def inside(self, residuals: np.ndarray, level: float) -> np.ndarray:
+        """(samples, 2), whether position and heading lie within a band.
+
+        Args:
+            residuals: (samples, 3), measured minus predicted pose, see :meth:`Windows.residuals`.
+            level: probability of the band: of an ellipse about the position, an interval of heading.
+        """
+        V = self.at_samples
+        place = residuals[:, :2, None]
+        squares = np.swapaxes(place, 1, 2) @ np.linalg.solve(V[:, :2, :2], place)
+        position = squares[:, 0, 0] <= quantile(level, 2)
+        heading = residuals[:, 2] ** 2 <= quantile(level, 1) * V[:, 2, 2]
+        return np.column_stack([position, heading])
+
+    def ellipses(self, window: int, level: float) -> np.ndarray:
+        """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
+        around = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
+        factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
+        return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
+
+    def headings(self, window: int, level: float) -> np.ndarray:
+        """(2, T), lower and upper end of the band about the predicted heading of a window [rad]."""
+        reach = np.sqrt(quantile(level, 1) * self.covariance[window, :, 2, 2])
+        return np.stack([-reach, reach]) + self.predicted[window, :, 2]
+
+    def coverage(self, residuals: np.ndarray, level: float = LEVELS[1]) -> float:
+        """Share of the samples, positions and headings alike, within a band; arguments as above."""
+        return float(np.mean(self.inside(residuals, level)))
+
+
+DataUse = Literal["train", "validate", "test"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +117,16 @@ class Evaluation:
     """One run with the errors of the initial and of the learned model on it.
 
     Attributes:
-        model: the initial model.
+        model: the initial model, or one that moves as the predictor does.
         weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
-        held_out: whether nothing was learned from it.
+        held_out: whether nothing was learned from it, and nothing decided by it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
-        foreign: how an FMU predicts the run from a time on, in place of the model; None: it is no FMU.
+        predictor: what predicts the run; None: ``model`` does.
+        use: what the data were used for.
     """
 
     model: Model
@@ -69,7 +137,8 @@ class Evaluation:
     after: PredictionError
     bands: Bands | None = None
     learned: Model | None = None
-    foreign: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None
+    predictor: Predictor | None = None
+    use: DataUse = "train"
 
     @property
     def smoothed(self) -> Smoothed:
@@ -79,52 +148,52 @@ class Evaluation:
     def name(self) -> str:
         return self.weak_windows.run.name
 
+    @property
+    def predicted_by(self) -> Predictor:
+        """The predictor of the run."""
+        return self.predictor or DescribedShip(self.model)
+
     def free_runs(self, begin: float = -np.inf) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The run as it is predicted from one state, see :func:`.windows.free_runs`.
-
-        Args:
-            begin: the state is that of the last sample before [s], else of the first there is.
-
-        Returns:
-            Times (n,) [s], and the pose (n, 3) [m, m, rad] by the initial and by the learned model.
-        """
-        if self.foreign is not None:
-            time, pose = self.foreign(begin)
-            return time, [pose, pose]
-        models = [self.model, self.learned or self.model]
-        return free_runs(self.smoothed, models, begin)
+        """The run as it is predicted from one state, see :meth:`.predictor.Predictor.free_runs`."""
+        return self.predicted_by.free_runs(self.smoothed, self.learned, begin)
 
 
 def evaluate_run(
-    w: WeakWindows, before: Model, after: Model | None = None, held_out: bool = False
+    w: WeakWindows,
+    before: Model | Predictor,
+    after: Model | None = None,
+    held_out: bool = False,
 ) -> Evaluation:
     """Evaluate one model, or two, on a run.
 
     Args:
         w: windows of the run.
-        before: the initial model.
+        before: the initial model, or what else predicts the run.
         after: the learned model; None: nothing was learned.
         held_out: whether nothing was learned from the run.
+
+    Raises:
+        InputError: the predictor fails, or the run is shorter than its run-in.
     """
-    windows = _windows([w.smoothed], w.horizon)
-    models = [before] if after is None else [before, after]
-    errors = _prediction_errors(w, windows, [m.during(w.run.name) for m in models])
-    return Evaluation(before, w, windows, held_out, errors[0], errors[-1], learned=after)
-
-
-def _windows(runs: Sequence[Smoothed], length: float) -> Windows | None:
-    try:
-        return Windows(runs, length)
-    except InputError:
-        return None
-
-
-def _prediction_errors(
-    w: WeakWindows, windows: Windows | None, models: Sequence[Model]
-) -> list[PredictionError]:
+    predictor = DescribedShip(before) if isinstance(before, Model) else before
+    windows = predictor.windows([w.smoothed], w.horizon)
+    learned = [] if after is None else [after]
+    lacking = [omega(w, model) for model in (predictor.model, *learned)]
     if windows is None:
-        return [PredictionError(omega(w, model), np.zeros((0, 3)), None) for model in models]
-    return [
-        PredictionError(omega(w, model), residuals, windows.summary(residuals))
-        for model, residuals in zip(models, windows.residuals_of_each(models), strict=True)
-    ]
+        errors = [PredictionError(force, np.zeros((0, 3)), None) for force in lacking]
+    else:
+        errors = [
+            PredictionError(force, residuals, windows.summary(residuals))
+            for force, residuals in zip(lacking, predictor.residuals(windows, learned), strict=True)
+        ]
+    return Evaluation(
+        predictor.model,
+        w,
+        windows,
+        held_out,
+        errors[0],
+        errors[-1],
+        learned=after,
+        predictor=predictor,
+        use="test" if held_out else "train",
+    )

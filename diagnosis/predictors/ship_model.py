@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,13 +63,20 @@ def parameters(component: Component, values: Values) -> Any:
     Raises:
         InputError: a name that the component does not have.
     """
-    declared = variables(component.params)
-    names = [v.name for v in declared]
-    for name in values:
-        if name not in names:
-            raise InputError(f"{component.name} has no parameter '{name}'{nearest(name, names)}")
-    flat = [values.get(v.name, v.start) for v in declared]
-    return packer(component.params)([v if isinstance(v, np.ndarray) else float(v) for v in flat])
+    places, starts = _declared(component.params)
+    flat: list[Any] = [*starts]
+    for name, value in values.items():
+        if name not in places:
+            raise InputError(f"{component.name} has no parameter '{name}'{nearest(name, places)}")
+        flat[places[name]] = value if isinstance(value, np.ndarray) else float(value)
+    return packer(component.params)(flat)
+
+
+@cache
+def _declared(params: type[Any]) -> tuple[dict[str, int], list[float]]:
+    """Place of each parameter by its name, and the nominal values, of a component."""
+    declared = variables(params)
+    return {v.name: k for k, v in enumerate(declared)}, [float(v.start) for v in declared]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

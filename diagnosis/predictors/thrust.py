@@ -1,16 +1,17 @@
 """The force of the thrusters along a measured run, by the very functions of the thrusters' FMU.
 
 What lies between a command and the share of full force that acts (delay, limited rate, lag, and a user's
-effects with a memory) is computed by :mod:`fmus.actuators.response` in short steps of a regular grid. A
-memory lasts only so long: the grid is cut into parts that are stepped side by side, each from the time
-before it that still matters. Weak form and predictions use the same result, :class:`Response`.
+effects with a memory) is computed by :mod:`fmus.actuators.response` in short steps of a regular grid, or
+by the linear filters that they declare to be. A memory lasts only so long: the grid is cut into parts
+that are stepped side by side, each from the time before it that still matters. Weak form and predictions
+use the same result, :class:`Response`.
 """
 
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 from fmus.actuators.response import Prepared, at_rest, command_response, force_response
 from fmus.effects import Memory
@@ -99,10 +100,10 @@ class Response:
         self.run, self.model, self.moving = run, model, moving
         self.drive = drive = drive_of(run, model)
         self._memories = [
-            (acts, member, memory)
+            (member, memory)
             for of in ("command", "force")
             for k, member, memory in drive.effects.remembering[of]
-            if (acts := drive.slow[k])
+            if drive.slow[k]
         ]
         self.slow = bool(self._memories) or any(rate > 0.0 for rate in drive.params.rate)
 
@@ -123,27 +124,28 @@ class Response:
             means = np.array([commanded_shares(self.run, self.model)])
         else:
             ends = np.append(self.run.time, self.run.time[-1] + self._period)
-            means = np.array(self.mean(ends[:-1], ends[1:]))
-            if self.slow and self.drive.effects.layout.curved:
-                middle = 0.5 * (ends[:-1] + ends[1:])
-                halves = (self.mean(a, b)[1] for a, b in ((ends[:-1], middle), (middle, ends[1:])))
-                off = np.subtract(*halves) / np.sqrt(3.0)
-                means = np.array([means[0], means[1] + off, means[1] - off])
+            curved = self.slow and self.drive.effects.layout.curved
+            edges = np.sort(np.append(ends, 0.5 * (ends[:-1] + ends[1:]))) if curved else ends
+            means = np.array(self.means(edges))
+            if curved:
+                given, acting = 0.5 * (means[:, ::2] + means[:, 1::2])
+                off = (means[1, ::2] - means[1, 1::2]) / np.sqrt(3.0)
+                means = np.array([given, acting + off, acting - off])
         lasting = means[:1] if (means[0] == means[-1]).all() else means
         return np.ascontiguousarray(np.moveaxis(lasting, 1, -1))
 
-    def mean(self, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Means over intervals of the run's time: commands that arrive, and shares that act.
+    def means(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Means from each of some times to the next: commands that arrive, and shares that act.
 
         Args:
-            start, end: (...) [s].
+            edges: (m + 1, ...), times of the run [s].
 
         Returns:
-            Two arrays (..., k).
+            Two arrays (m, ..., k).
         """
-        a, b = self._elapsed(start), self._elapsed(end)
-        given, acting = ((at(b) - at(a)) / like(b - a, 1) for at in self._integrals)
-        return given, acting
+        time = self._elapsed(edges)
+        both = np.diff(self._integral(time), axis=0) / like(np.diff(time, axis=0), 2)
+        return both[..., 0, :], both[..., 1, :]
 
     @cached_property
     def _period(self) -> float:
@@ -170,10 +172,19 @@ class Response:
         return Integral(edges, shares, before)
 
     @cached_property
-    def _integrals(self) -> tuple["Integral", "Integral"]:
+    def _integral(self) -> "Integral":
+        """Of the commands that arrive and the shares that act, (..., 2, k)."""
+        c = self._commands
         if not self.slow:
-            return self._commands, self._commands
-        return self._of_steps(*stepped(self.drive, self.commanded, self.step))
+            return Integral(c.edges, np.stack([c.values] * 2, axis=1), np.stack([c.before] * 2))
+        edges = self.step * np.arange(self._steps + 1)
+        commands = np.diff(c(edges), axis=0) / self.step
+        linear = not any(rate > 0.0 for rate in self.drive.params.rate)
+        if linear and all(memory.filter for _, memory in self._memories):
+            values = self._filtered(commands)
+        else:
+            values = self._stepped(commands)
+        return Integral(edges, values, np.stack([c.before] * 2))
 
     @property
     def step(self) -> float:
@@ -181,7 +192,7 @@ class Response:
         fine = self._period / np.ceil(self._period / (STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
             self._lasts(member, memory) / (memory.keeps - 1)
-            for _, member, memory in self._memories
+            for member, memory in self._memories
             if memory.keeps
         ]
         return float(max([fine, *kept]))
@@ -193,74 +204,40 @@ class Response:
     def _steps(self) -> int:
         return int(np.ceil(self._clock[-1] / self.step + 1.0)) + 1
 
-    @property
-    def _part(self) -> int:
-        """Steps of a part."""
-        return int(np.ceil(PART * self.model.ship.scale.time / self.step)) + 1
+    def _filtered(self, commands: np.ndarray) -> np.ndarray:
+        """(m, 2, k), what linear memories make of commands (m, k) in steps of the grid."""
+        found, signal = [], commands - self._commands.before
+        for of in ("command", "force"):
+            for member, memory in self._memories:
+                if memory.of == of and memory.filter is not None:
+                    law = memory.filter(self.step, *self.drive.params.dynamics[member.parameters])
+                    signal = signal.copy()
+                    signal[:, memory.own] = lfilter(*law, signal[:, memory.own], axis=0)
+            found.append(signal + self._commands.before)
+        return np.stack(found, axis=1)
 
-    @cached_property
-    def commanded(self) -> np.ndarray:
-        """(m, parts, k), mean commands in each step; before each part those that it remembers."""
-        drive, h, part = self.drive, self.step, self._part
-        memory = sum(self._lasts(member, m) for _, member, m in self._memories)
+    def _stepped(self, commands: np.ndarray) -> np.ndarray:
+        """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid, in parts."""
+        drive, h, scale = self.drive, self.step, self.model.ship.scale
+        part = int(np.ceil(PART * scale.time / h)) + 1
+        memory = np.zeros(commands.shape[1])  # of each command
+        for member, of in self._memories:
+            memory[of.own] += self._lasts(member, of)
+        rates = np.broadcast_to(drive.params.rate, memory.shape)
         largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
-        rates = np.broadcast_to(drive.params.rate, largest.shape)
-        memory += max((2.0 * c / x for c, x in zip(largest, rates, strict=True) if x > 0.0), default=0.0)
-        longest = LONGEST_MEMORY * self.model.ship.scale.time
-        before = int(np.ceil(min(memory, longest) / h)) + 1
-        rows = np.arange(-before, part)[:, None] + part * np.arange(-(-self._steps // part))
-        commands = np.diff(self._commands(h * np.arange(self._steps + 2)), axis=0) / h
-        return np.where(
-            like(rows < 0, 1), self._commands.before, commands[np.clip(rows, 0, self._steps)]
-        )
-
-    def _of_steps(self, given: np.ndarray, acting: np.ndarray) -> tuple["Integral", "Integral"]:
-        """Integrals of what becomes of :attr:`commanded` in its steps."""
-        edges = self.step * np.arange(self._steps + 1)
-        found = []
-        for signal in (given, acting):
-            parts = np.moveaxis(signal[-self._part :], 1, 0)
-            values = parts.reshape(-1, *signal.shape[2:])[: self._steps]
-            found.append(Integral(edges, values, self._commands.before))
-        return found[0], found[1]
-
-    def take(self, given: np.ndarray, acting: np.ndarray) -> None:
-        """Know what becomes of :attr:`commanded`, as :func:`stepped` beside other runs."""
-        self._integrals = self._of_steps(given, acting)
-
-
-def stepped(drive: Prepared, commanded: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """What becomes of commands in steps of h [s]: those that arrive, and the shares that act.
-
-    Args:
-        drive: thrusters, at rest at first.
-        commanded: (m, parts, k), parts side by side.
-        h: step.
-    """
-    past = at_rest(drive.effects)
-    given = np.empty_like(commanded)
-    acting = np.empty_like(commanded)
-    for k, each in enumerate(np.moveaxis(commanded, -1, 1)):
-        past, arriving = command_response(past, tuple(each), drive, h)
-        past, shares = force_response(past, arriving, drive, h)
-        for one in range(commanded.shape[-1]):
-            given[k, ..., one], acting[k, ..., one] = arriving[one], shares[one]
-    return given, acting
-
-
-def step_together(responses: Sequence[Response]) -> None:
-    """Step the same thrusters in several runs side by side, which takes hardly longer than in one."""
-    groups: dict[tuple[float, int, int, int], list[Response]] = {}
-    for r in responses:
-        if r.slow:
-            m, _, k = r.commanded.shape
-            groups.setdefault((r.step, m, k, id(r.drive.effects.layout)), []).append(r)
-    for (h, *_), group in groups.items():
-        commanded = np.concatenate([r.commanded for r in group], axis=1)
-        last = np.cumsum([r.commanded.shape[1] for r in group])[:-1]
-        parts = (np.split(x, last, axis=1) for x in stepped(group[0].drive, commanded, h))
-        for r, given, acting in zip(group, *parts, strict=True):
-            r.take(given, acting)
+        memory += np.divide(2.0 * largest, rates, out=np.zeros_like(memory), where=rates > 0.0)
+        before = int(np.ceil(min(memory.max(), LONGEST_MEMORY * scale.time) / h)) + 1
+        rows = np.arange(-before, part)[:, None] + part * np.arange(-(-len(commands) // part))
+        wanted = commands[np.clip(rows, 0, len(commands) - 1)]
+        wanted = np.where(like(rows < 0, 1), self._commands.before, wanted)  # (m, parts, k)
+        past = at_rest(drive.effects)
+        found = np.empty((len(wanted), wanted.shape[1], 2, wanted.shape[2]))
+        for k, each in enumerate(np.moveaxis(wanted, -1, 1)):
+            past, arriving = command_response(past, tuple(each), drive, h)
+            past, shares = force_response(past, arriving, drive, h)
+            for one in range(len(each)):
+                found[k, :, 0, one], found[k, :, 1, one] = arriving[one], shares[one]
+        return np.moveaxis(found[-part:], 1, 0).reshape(-1, *found.shape[2:])[: len(commands)]
 
 
 class Integral:

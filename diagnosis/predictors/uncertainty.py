@@ -14,6 +14,8 @@ mass M and the slope F of the force by nu make of an error of the pose at the fr
 (-w^2 M B + i w (M A - F B) - F A) of it; the last term is counted as if it were independent.
 """
 
+from functools import cache
+
 import numpy as np
 
 from .ship_model import Model
@@ -38,18 +40,18 @@ SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
 LEAST_STEP = 1e-4  # m/s, m/s, rad/s: the step of a slope by the velocity, where that is known better
 
 
-def _noise_gain(order: int) -> np.ndarray:
-    """For each corner frequency: integral of w^order |kernel|^2 H over frequency [s^-(order + 1)]."""
+ORDERS = (4, 2, 0)  # of the acceleration, the velocity, the pose
+
+
+@cache
+def noise_gain() -> dict[int, np.ndarray]:
+    """Order -> for each corner frequency the integral of w^order |kernel|^2 H [s^-(order + 1)]."""
     t = np.linspace(-WIDTH / 2, WIDTH / 2, KERNEL_POINTS)
     w = kernel(t / (WIDTH / 2)) / (WIDTH / 2)
     transform = np.trapezoid(w * np.cos(FREQUENCIES[:, None] * t), t, axis=1)
-    density = FREQUENCIES**order * transform**2 / np.pi
     H = 1.0 / (1.0 + (FREQUENCIES / CORNERS[:, None]) ** 6)
-    return np.asarray(np.trapezoid(density * H, FREQUENCIES, axis=1))
-
-
-ORDERS = (4, 2, 0)  # of the acceleration, the velocity, the pose
-NOISE_GAIN = {order: _noise_gain(order) for order in ORDERS}
+    densities = {order: FREQUENCIES**order * transform**2 / np.pi for order in ORDERS}
+    return {order: np.asarray(np.trapezoid(d * H, FREQUENCIES)) for order, d in densities.items()}
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
@@ -79,7 +81,7 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
 
     def in_axes(order: int) -> np.ndarray:
         """(K, 3), variance of that derivative of the pose in the ship's axes, averaged over windows."""
-        gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(NOISE_GAIN[order])))
+        gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(noise_gain()[order])))
         x, y, psi = (density * gain / time ** (order + 1)).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 

@@ -18,13 +18,12 @@ from fmus.scale import REFERENCE, Scale
 from fmus.signals import Force
 from fmus.vessel import vessel
 
-from ..execution.parallel import for_each
 from ..runs import Smoothed
 from ..runs.files.reading import Run
 from ..runs.smoothing.smoother import breaks
 from .prediction import at_rest, true_motion
 from .ship_model import Model
-from .thrust import Response, inflow, step_together, thrust
+from .thrust import Response, inflow, thrust
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 WIDTH = 3.0  # s
@@ -326,8 +325,10 @@ def arriving(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def _response(w: WeakWindows, model: Model) -> np.ndarray:
-    key = Response.key(model)
-    return w.recall("response", key, lambda: _response_to(w, model).between_samples, MEMORIES)
+    def between() -> np.ndarray:
+        return Response(w.run, model, not at_rest(w.smoothed)).between_samples
+
+    return w.recall("response", Response.key(model), between, MEMORIES)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
@@ -335,30 +336,6 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
     if not Response(w.run, model).slow:
         return w.run.tau_cmd
     return thrust_along(w, model, np.zeros_like(w.run.tau_cmd))
-
-
-def _response_to(w: WeakWindows, model: Model) -> Response:
-    return Response(w.run, model, not at_rest(w.smoothed))
-
-
-def remember_responses(data: Sequence[WeakWindows], models: Sequence[Model]) -> None:
-    """Compute what the thrusters of some models make of the commands of all runs, and keep it."""
-    missing: dict[Any, dict[str, tuple[WeakWindows, Model]]] = {}
-    for w in data:
-        for model in (m.during(w.run.name) for m in models):
-            key = Response.key(model)
-            if key not in w.memory.get("response", {}):
-                missing.setdefault(key, {})[w.run.name] = w, model
-
-    def between(one: dict[str, tuple[WeakWindows, Model]]) -> list[np.ndarray]:
-        responses = [_response_to(*of_run) for of_run in one.values()]
-        step_together(responses)
-        return [r.between_samples for r in responses]
-
-    found = for_each(between, [*missing.values()])
-    for (key, one), of_runs in zip(missing.items(), found, strict=True):
-        for (w, _), of_run in zip(one.values(), of_runs, strict=True):
-            w.recall("response", key, lambda of_run=of_run: of_run, MEMORIES)
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:

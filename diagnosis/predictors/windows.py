@@ -5,7 +5,7 @@ smoothed state, with the thrusters' history from the commands before, and is com
 sample that is no spike. Longer predictions say nothing: the nominal hull is unstable.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from fmus.ops import wrap
 from ..runs import Smoothed
 from .prediction import LONGEST_STEP, Starts, by_clock, predict
 from .ship_model import Model
+from .thrust import STEP
 from .weak_form import HORIZON
 
 # Times the scale of the ship.
@@ -66,6 +67,7 @@ class Windows:
         length: of the windows [s]; by default that of the ship.
 
     Attributes:
+        runs: the runs.
         length: of the windows [s].
         run, start: (w,), number of each window's run, and when it starts [s].
         sample_window: (samples,), the window of each sample that is used.
@@ -77,6 +79,7 @@ class Windows:
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float | None = None) -> None:
+        self.runs = tuple(runs)
         self.length = length or HORIZON * runs[0].scale.time
         parts = [usable_windows(smoothed, self.length) for smoothed in runs]
         counts = [p.first_rows.size for p in parts]
@@ -109,6 +112,30 @@ class Windows:
             raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
         return kept
 
+    def within(self, first: float, last: float) -> "Windows":
+        """The windows that start from one time to another [s].
+
+        Raises:
+            InputError: there is none.
+        """
+        chosen = (self.start >= first) & (self.start <= last)
+        if not chosen.any():
+            raise InputError(f"no window starts from {first:.3g} to {last:.3g} s")
+        kept = copy(self)
+        samples = chosen[self.sample_window]
+        kept.run, kept.start = self.run[chosen], self.start[chosen]
+        kept.sample_window = (np.cumsum(chosen) - 1)[self.sample_window[samples]]
+        kept.measured, kept.since = self.measured[samples], self.since[samples]
+        kept._groups = []
+        for starts, windows in self._groups:
+            edges = np.cumsum([rows.size for _, rows in starts.runs])[:-1]
+            parts = zip(starts.runs, np.split(chosen[windows], edges), strict=True)
+            runs = tuple((smoothed, rows[part]) for (smoothed, rows), part in parts if part.any())
+            if runs:
+                place = (np.cumsum(chosen) - 1)[windows[chosen[windows]]]
+                kept._groups.append((replace(starts, runs=runs), place))
+        return kept
+
     def finer(self, parts: int) -> "Windows":
         """The same windows, predicted with steps that are divided into so many."""
         kept = copy(self)
@@ -133,17 +160,26 @@ class Windows:
         model = model or Model()
         shapes = [np.shape(v)[:1] for v in (*model.vessel.values(), *model.thrusters.values())]
         models = np.broadcast_shapes(*shapes)
-        found = np.empty((*(models or (1,)), *self.measured.shape))
+        found = self.residuals_by(lambda starts: predict(starts, model), *(models or (1,)))
+        return found if models else found[0]
+
+    def residuals_by(self, poses: Callable[[Starts], np.ndarray], models: int = 1) -> np.ndarray:
+        """Residuals (p, samples, 3) of p models.
+
+        Args:
+            poses: gives the predicted pose (steps + 1, 3, p, w) at each step of windows.
+            models: p.
+        """
+        found = np.empty((models, *self.measured.shape))
         for starts, windows in self._groups:
             place = np.full(self.run.size, -1)
             place[windows] = np.arange(windows.size)
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
-            steps = predict(starts, model)
-            pose = between_steps(steps, column, self.since[mine] / starts.h)
+            pose = between_steps(poses(starts), column, self.since[mine] / starts.h)
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
-        return found if models else found[0]
+        return found
 
     def residuals_of_each(self, models: Sequence[Model]) -> list[np.ndarray]:
         """Residuals (samples, 3) of some models, many predicted at once."""
@@ -188,10 +224,17 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s], which divides the sample period; names of the commands."""
+        """Step of integration [s], a part or a multiple of the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
-        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
-        return row / parts, self.smoothed.track.run.signals
+        most = LONGEST_STEP * self.smoothed.scale.time
+        step = row / np.ceil(row / most - 1e-6) if row > most else row * np.floor(most / row + 1e-6)
+        return float(step), self.smoothed.track.run.signals
+
+
+def step_of(smoothed: Smoothed) -> float:
+    """Step of predictions by what is not a model of this project [s]; it divides the sample period."""
+    row = round(float(np.median(np.diff(smoothed.time))), 9)
+    return row / float(np.ceil(row / (STEP * smoothed.scale.time) - 1e-6))
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
@@ -242,7 +285,7 @@ def free_runs(
 
 
 def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Predicted pose at the samples, by linear interpolation between steps.
+    """Predicted pose at the samples, by cubic interpolation between steps.
 
     Args:
         predicted: (steps + 1, 3, p, w), pose [m, m, rad] of p models in w windows at each step.
@@ -252,9 +295,15 @@ def between_steps(predicted: np.ndarray, column: np.ndarray, place: np.ndarray) 
     Returns:
         (p, samples, 3) [m, m, rad].
     """
-    step = np.clip(np.floor(place + 1e-6).astype(int), 0, len(predicted) - 2)
-    low, high = (predicted[k, :, :, column] for k in (step, step + 1))
+    first = np.clip(np.floor(place + 1e-6).astype(int) - 1, 0, max(len(predicted) - 4, 0))
+    nodes = range(min(4, len(predicted)))
+    poses = [predicted[first + k, :, :, column] for k in nodes]
     with np.errstate(invalid="ignore", over="ignore"):
-        change = high - low
-        change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
-        return (low + (place - step)[:, None, None] * change).transpose(2, 0, 1)
+        found = poses[0]
+        for k in nodes[1:]:
+            rest = (place - first - j for j in nodes if j != k)
+            share = np.prod([*rest], axis=0) / np.prod([float(k - j) for j in nodes if j != k])
+            change = poses[k] - poses[0]
+            change[:, 2] = wrap(change[:, 2])  # the measured heading is wrapped
+            found = found + share[:, None, None] * change
+        return found.transpose(2, 0, 1)

@@ -1,9 +1,9 @@
 from .content import comparison_content as comparison_content
 from .content import diagnosis_content as diagnosis_content
+from .content import file_content as file_content
 from .content import write_coefficients as write_coefficients
 from .page import write_report as write_report
-from .result_keys import ComparisonContent as ComparisonContent
-from .result_keys import DiagnosisContent as DiagnosisContent
+from .report_data import ReportData as ReportData
 from .shape import Curve as Curve
 from .shape import curves as curves
 from .terminal import show_comparison as show_comparison

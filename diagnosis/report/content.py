@@ -1,34 +1,94 @@
-"""Content of the JSON files, made from the results of the diagnosis."""
+"""Content of ``comparison.json`` and ``diagnosis.json``: parts of the results, by their own names.
+
+All numbers are in SI; a number that is not finite, or not known, is null.
+"""
 
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib.metadata import version
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple
 
-from fmus.effects.text import Found
+from typing_extensions import deprecated
 
-from ..assessment.trial_errors import trial_errors
+from ..assessment.regions import ErrorRegions
 from ..predictors.evaluation import Evaluation
-from ..predictors.measured_outputs import inseparable, named, rms
-from ..predictors.ship_model import of_one_run, parameter_and_run
-from ..search.findings import Finding
-from ..search.prediction_fit.disturbance_summary import Unrecorded
+from ..predictors.ship_model import parameter_and_run
 from ..session import Comparison, Diagnosis
-from . import result_keys
-from .finding_text import advice, equation, sentence, separation_note, unit
+from .formatting import as_json, finite
 from .headline import headline
+from .report_data import Z95, ReportData, seconds
 
-T = TypeVar("T")
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 LIBRARIES = ("cybership", "numpy", "scipy")
-# Effects on other sets of axes count as XYN in the files.
-AXES: dict[str, result_keys.Axes] = {"X": "X", "Y": "Y", "N": "N", "XY": "XY"}
+# Attributes that the files hold; KEY=ATTRIBUTE where a key has another name.
+COUNTS = "samples frozen dropped spikes used"
+COVARIATE = "by=covariate.id unit=covariate.unit run"
+REGION = f"axis {COVARIATE} low high rms elsewhere share_of_time=share sentence"
+PROFILE = f"axis {COVARIATE} ends=edges rms uncertainty share_of_time=share"
+SENSOR = "channel kind value unit ci95 from=start to=end sentence alike repaired"
+EFFECT = (
+    "id axis coefficients confidence share_of_error indistinguishable advice sentence equation "
+    "separation share_unique doubt"
+)
+RANKED = "id score q2 beyond behind behind_std"
+STABILITY = (
+    "nominal_min_dissipation learned_min_dissipation bounded region mass_definite closed_loop notes"
+)
+UNRECORDED = "size=push.size time=push.time values=differing stretches sentence"
+ERRORS = {
+    "window_position_rmse": "position",
+    "window_heading_rmse": "heading",
+    "omega_rms": "omega_rms",
+}
 
 
-def comparison_content(
-    comparison: Comparison, model: Path | None, files: Sequence[str]
-) -> result_keys.ComparisonContent:
+class Content(dict[str, Any]):
+    """The content of a JSON file, whose keys are attributes as well, at any depth."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+    @classmethod
+    def of(cls, value: Any) -> Any:
+        """What JSON can hold of a value, mappings as contents."""
+        if isinstance(value, Mapping):
+            return cls((name, cls.of(each)) for name, each in value.items())
+        return [*map(cls.of, value)] if isinstance(value, list) else value
+
+    @property
+    def accepted(self) -> list["Content"]:
+        """The effects that were found, then those that are only possible."""
+        return [*self["effects"], *self["possibilities"]]
+
+    @deprecated("The content is a dictionary.")
+    def model_dump(self, mode: str = "json", exclude: Collection[str] = ()) -> dict[str, Any]:
+        return {name: value for name, value in self.items() if name not in exclude}
+
+    @deprecated("Use json.dumps.")
+    def model_dump_json(self, indent: int | None = None) -> str:
+        return as_json(self, indent)
+
+
+@deprecated("Use diagnosis.Content.")
+class ComparisonContent(Content):
+    """The content of ``comparison.json``."""
+
+
+@deprecated("Use diagnosis.Content.")
+class DiagnosisContent(Content):
+    """The content of ``diagnosis.json``."""
+
+
+@deprecated("Use diagnosis.Content.")
+class EffectResult(Content):
+    """An effect in ``diagnosis.json``."""
+
+
+def comparison_content(comparison: Comparison, model: Path | None, files: Sequence[str]) -> Content:
     """The content of ``comparison.json``.
 
     Args:
@@ -36,12 +96,10 @@ def comparison_content(
         model: its file; None: the nominal one.
         files: names of the files that are written together.
     """
-    return result_keys.ComparisonContent(**_of_both(comparison, model, files))
+    return file_content(ReportData.of(comparison, model, files))
 
 
-def diagnosis_content(
-    diagnosis: Diagnosis, model: Path | None, files: Sequence[str]
-) -> result_keys.DiagnosisContent:
+def diagnosis_content(diagnosis: Diagnosis, model: Path | None, files: Sequence[str]) -> Content:
     """The content of ``diagnosis.json``.
 
     Args:
@@ -49,51 +107,78 @@ def diagnosis_content(
         model: file of the initial model; None: the nominal one.
         files: names of the files that are written together.
     """
-    learned, comparison, prior = diagnosis.learned, diagnosis.comparison, diagnosis.prior
-    effects, possibilities = _effects(diagnosis)
-    suspects = [
-        result_keys.SuspectResult(
-            name=s.name,
-            z=s.z,
-            value=s.value,
-            description=diagnosis.start.declared(s.name).description,
-        )
-        for s in learned.suspects
-    ]
-    return result_keys.DiagnosisContent(
-        verdict=diagnosis.verdict,
-        sentence=headline(
-            diagnosis.verdict,
-            effects,
-            possibilities,
-            suspects,
-            diagnosis.remainder.beyond_chance,
-            diagnosis.calibrated,
-        ),
-        remainder=result_keys.RemainderResult.model_validate(diagnosis.remainder),
-        effects=effects,
-        possibilities=possibilities,
-        withdrawn=[result_keys.WithdrawnResult.model_validate(w) for w in diagnosis.withdrawn],
-        calibrated=diagnosis.calibrated,
-        unrecorded=_unrecorded(diagnosis.unrecorded),
-        correlation=result_keys.CorrelationResult(
-            names=list(diagnosis.posterior.names),
-            matrix=diagnosis.posterior.correlation.tolist(),
-            together=diagnosis.posterior.together,
-        ),
-        inseparable=inseparable([e.weak_windows for e in comparison.evaluations], diagnosis.start),
-        suspect_coefficients=suspects,
-        coefficients=list(coefficients(diagnosis)),
-        ranking=[result_keys.RankedResult.model_validate(r) for r in learned.ranking],
-        where_after=result_keys.WhereResult.model_validate(comparison.after),
-        stability=result_keys.StabilityResult.model_validate(diagnosis.stability),
-        prior=dict(prior) if isinstance(prior, Mapping) else prior,
-        seed=diagnosis.seed,
-        **_of_both(comparison, model, files),
-    )
+    return file_content(ReportData.of(diagnosis, model, files))
 
 
-def coefficients(diagnosis: Diagnosis) -> Iterator[result_keys.CoefficientChange]:
+def file_content(r: ReportData) -> Content:
+    """The content of the JSON file of a report."""
+    prediction, model_error = r.lengths
+    runs = {
+        "data": _data(r.evaluations),
+        "windows": {"prediction": prediction, "model_error": model_error},
+        "sensors": [s for e in r.evaluations for s in sensor_results(e)],
+        "errors": [*_errors(r)],
+        "where": _where(r.comparison.before),
+    }
+    origin = {
+        "runs": [e.name for e in r.evaluations],
+        "model": r.model,
+        "files": list(r.files),
+        "versions": versions(),
+    }
+    fmu = fmu_result(r.comparison)
+    if r.diagnosis is None:
+        return Content.of(finite(runs | {"fmu": fmu} | origin))
+    d, learned = r.diagnosis, r.diagnosis.learned
+    found = {
+        "verdict": d.verdict,
+        "sentence": headline(r),
+        "remainder": {
+            "significant": d.remainder.significant,
+            "axes": {axis: _part(a, "rms uncertainty share") for axis, a in d.remainder.axes.items()},
+            "sentence": d.remainder.sentence,
+        },
+        "effects": [_part(e, EFFECT) for e in r.effects],
+        "possibilities": [_part(e, f"{EFFECT} in_model") for e in r.possibilities],
+        "withdrawn": [_part(w, "id reason") for w in d.withdrawn],
+        "calibrated": d.calibrated,
+        "unrecorded": _part(d.unrecorded, UNRECORDED),
+        "correlation": _part(d.posterior, "names matrix=correlation together"),
+        "inseparable": r.inseparable,
+        "suspect_coefficients": [
+            _part(s, "name z value") | {"description": r.suspects[s.name]} for s in learned.suspects
+        ],
+        "coefficients": [*coefficients(d)],
+        "ranking": [_part(c, RANKED) for c in learned.ranking],
+    }
+    last = {
+        "where_after": _where(r.comparison.after),
+        "fmu": fmu,
+        "stability": _part(d.stability, STABILITY),
+        "prior": d.prior,
+        "seed": d.seed,
+    }
+    return Content.of(finite(found | runs | last | origin))
+
+
+def _part(of: Any, keys: str) -> dict[str, Any]:
+    """Attributes of an object by the keys of the files."""
+    pairs = (key.split("=") for key in keys.split())
+    return {pair[0]: attrgetter(pair[-1])(of) for pair in pairs}
+
+
+class CoefficientChange(NamedTuple):
+    """A value of the model at first and with what was learned, and where the first is from."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    ci95: tuple[float, float] | None
+    origin: str
+
+
+def coefficients(diagnosis: Diagnosis) -> Iterator[CoefficientChange]:
     """The nominal coefficients that are not zero, then what else was fitted."""
     start, model, std = diagnosis.start, diagnosis.learned.model, diagnosis.posterior.std
     known = start.ship.coefficients
@@ -102,22 +187,21 @@ def coefficients(diagnosis: Diagnosis) -> Iterator[result_keys.CoefficientChange
         if before == after == 0.0:
             continue
         half = Z95 * std[name] if name in std else None
-        yield result_keys.CoefficientChange(
-            name=f"{start.owner(parameter_and_run(name)[0])}.{name}",
-            unit=start.declared(name).unit,
-            before=before,
-            after=after,
-            ci95=None if half is None else (after - half, after + half),
-            origin=known[name].origin if name in known else "learned",
+        yield CoefficientChange(
+            f"{start.owner(parameter_and_run(name)[0])}.{name}",
+            start.declared(name).unit,
+            before,
+            after,
+            None if half is None else (after - half, after + half),
+            known[name].origin if name in known else "learned",
         )
 
 
-def write_coefficients(content: result_keys.DiagnosisContent, csv: Path, tex: Path) -> None:
+def write_coefficients(diagnosis: Diagnosis, csv: Path, tex: Path) -> None:
     """Write the table of all coefficients as CSV and as LaTeX (booktabs)."""
     import pandas as pd
 
-    rows = [c.model_dump() for c in content.coefficients]
-    table = pd.DataFrame(rows, columns=[*result_keys.CoefficientChange.model_fields])
+    table = pd.DataFrame(coefficients(diagnosis), columns=CoefficientChange._fields)
     ends = [interval or (None, None) for interval in table.pop("ci95")]
     table.insert(4, "ci95_low", [low for low, _ in ends])
     table.insert(5, "ci95_high", [high for _, high in ends])
@@ -125,179 +209,47 @@ def write_coefficients(content: result_keys.DiagnosisContent, csv: Path, tex: Pa
     table.to_latex(tex, index=False, escape=True, float_format="%.4g", na_rep="--")
 
 
-def _unrecorded(u: Unrecorded) -> result_keys.UnrecordedResult:
-    return result_keys.UnrecordedResult(
-        size=u.push.size.tolist(),
-        time=u.push.time.tolist(),
-        values=dict(u.differing),
-        stretches=[result_keys.StretchResult(**s._asdict()) for s in u.stretches],
-        sentence=u.sentence,
-    )
-
-
-def _of_both(comparison: Comparison, model: Path | None, files: Sequence[str]) -> dict[str, Any]:
-    """What both files say of the runs, and of their origin."""
-    evaluations = comparison.evaluations
-    return {
-        "data": _data(evaluations),
-        "windows": _lengths(evaluations),
-        "sensors": [s for e in evaluations for s in sensor_results(e)],
-        "errors": [_errors(e) for e in evaluations],
-        "where": result_keys.WhereResult.model_validate(comparison.before),
-        "fmu": fmu_result(comparison),
-        "runs": [e.name for e in evaluations],
-        "model": None if model is None else model.name,
-        "files": list(files),
-        "versions": versions(),
-    }
-
-
 def versions() -> dict[str, str]:
     """Of all that makes numbers."""
     return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
-def _lengths(evaluations: Sequence[Evaluation]) -> result_keys.WindowLengths:
-    """Of the windows, of which one may be a whole run."""
-    w = evaluations[0].weak_windows
-    lengths = [e.windows.length for e in evaluations if e.windows is not None]
-    return result_keys.WindowLengths(prediction=max(lengths, default=w.horizon), model_error=w.width)
+def fmu_result(comparison: Comparison) -> Content | None:
+    """How a predictor that is not a model of this project predicts the runs; None: it is one."""
+    described = comparison.predictor.description()
+    return None if described is None else Content.of(finite(vars(described)))
 
 
-def fmu_result(comparison: Comparison) -> result_keys.FmuResult | None:
-    """How an FMU predicts the runs; None: it is no FMU."""
-    use = comparison.use
-    if use is None:
-        return None
-    runs = [e.smoothed for e in comparison.evaluations]
-    return result_keys.FmuResult(
-        name=use.fmu.name,
-        sha256=use.fmu.sha256,
-        map=use.given.content(),
-        whole_runs=use.whole,
-        run_in={e.name: use.run_in(e.smoothed) for e in comparison.evaluations},
-        sentences=list(use.told(runs)),
-    )
-
-
-def _data(evaluations: Sequence[Evaluation]) -> result_keys.Data:
-    runs = []
-    for e in evaluations:
-        time, track = e.smoothed.time, e.smoothed.track
-        seconds = float(time[-1] - time[0]) + track.period
-        runs.append(
-            result_keys.RunData(
-                run=e.name,
-                held_out=e.held_out,
-                seconds=seconds,
-                notes=list(e.smoothed.notes),
-                **e.smoothed.counts._asdict(),
-            )
-        )
-    totals = {
-        name: sum(getattr(r, name) for r in runs) for name in result_keys.SampleCounts.model_fields
-    }
-    return result_keys.Data(runs=runs, **totals)
-
-
-def sensor_results(e: Evaluation) -> Iterator[result_keys.SensorResult]:
+def sensor_results(e: Evaluation) -> Iterator[Content]:
     """Faults of a run's channels."""
     for f in e.smoothed.sensors.findings if e.smoothed.sensors else ():
-        yield result_keys.SensorResult.model_validate({"run": e.name, **vars(f)})
+        yield Content.of(finite({"run": e.name} | _part(f, SENSOR)))
 
 
-def _errors(e: Evaluation) -> result_keys.RunErrors:
-    b, a = e.before, e.after
-    return result_keys.RunErrors(
-        run=e.name,
-        held_out=e.held_out,
-        window_position_rmse=result_keys.Change(before=b.position, after=a.position),
-        window_heading_rmse=result_keys.Change(before=b.heading, after=a.heading),
-        omega_rms=result_keys.AxesChange(before=b.omega_rms.tolist(), after=a.omega_rms.tolist()),
-        measured={
-            name: result_keys.MeasuredError(
-                rms_before=rms(e.weak_windows, e.model, name),
-                rms_after=rms(e.weak_windows, e.learned or e.model, name),
-            )
-            for name in (named(e.weak_windows, e.model) if e.foreign is None else ())
-        },
-        coverage_90=None if e.bands is None else e.bands.coverage(a.residuals),
-        trial=trial_errors(e),
-    )
+def _data(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
+    """Numbers of samples of all runs together, and of each, with its duration [s] and notes on it."""
+    counts = [_part(e.smoothed.counts, COUNTS) for e in evaluations]
+    runs = [
+        c | _part(e, "run=name held_out") | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
+        for c, e in zip(counts, evaluations, strict=True)
+    ]
+    return {name: sum(c[name] for c in counts) for name in COUNTS.split()} | {"runs": runs}
 
 
-def _effects(
-    diagnosis: Diagnosis,
-) -> tuple[list[result_keys.EffectResult], list[result_keys.PossibilityResult]]:
-    """The findings, and what is only possible."""
-    learned, ship = diagnosis.learned, diagnosis.start.ship
-    found, possible = [], []
-    for f, share, alone, told in zip(
-        learned.effects, diagnosis.shares, diagnosis.unique, diagnosis.believed, strict=True
-    ):
-        result = _effect(diagnosis, f, share, alone)
-        if told:
-            found.append(result)
-        else:
-            possible.append((result, ship.effects[f.id].search.by == "regression"))
-    possible += [(_effect(diagnosis, f, f.share, None), False) for f in diagnosis.dropped]
-    results = [result_keys.PossibilityResult(**r.model_dump(), in_model=here) for r, here in possible]
-    return found, results
+def _errors(r: ReportData) -> Iterator[dict[str, Any]]:
+    """Errors of prediction [m], [rad] and RMS of the model error [N, N, N m] on each run."""
+    for e, measured, trial in zip(r.evaluations, r.measured, r.trials, strict=True):
+        use = {} if r.diagnosis is None else {"use": e.use}
+        rms = {name: _part(e, f"before=before.{of} after=after.{of}") for name, of in ERRORS.items()}
+        outputs = {name: {"rms_before": b, "rms_after": a} for name, (b, a) in measured.items()}
+        coverage = None if e.bands is None else e.bands.coverage(e.after.residuals)
+        rest = {"measured": outputs, "coverage_90": coverage, "trial": trial}
+        yield {"run": e.name, "held_out": e.held_out} | use | rms | rest
 
 
-def _effect(
-    diagnosis: Diagnosis, f: Finding, share: float, unique: float | None
-) -> result_keys.EffectResult:
-    effects = diagnosis.start.ship.effects
-    effect = effects[f.id]
-    # Of a coefficient the addition counts, of any other parameter of the effect its value.
-    present = {n: 0.0 if n in effect.coefficients else diagnosis.start.value(n) for n in f.values}
-    values = {n: x + present[n] for n, x in f.values.items()}
-    ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
-    coefficients = {
-        _plain(name, f): result_keys.Coefficient(
-            value=value,
-            unit=unit(effect, name),
-            ci95=ci95.get(name),
-            run=parameter_and_run(name)[1] or None,
-        )
-        for name, value in values.items()
+def _where(r: ErrorRegions) -> dict[str, Any]:
+    return {
+        "sentences": r.sentences,
+        "regions": [_part(region, REGION) for region in r.regions],
+        "profiles": [_part(profile, PROFILE) for profile in r.profiles],
     }
-    return result_keys.EffectResult(
-        id=f.id,
-        axis=AXES.get(effect.axis, "XYN"),
-        coefficients=coefficients,
-        confidence=f.confidence,
-        share_of_error=share,
-        indistinguishable=list(f.alike),
-        advice=advice(f.id, f.alike, effects),
-        sentence=_sentence(diagnosis, f, values),
-        equation=equation(effect, _shown(diagnosis, values), _shown(diagnosis, ci95)),
-        separation=separation_note(f.id, f.alike),
-        share_unique=unique,
-        doubt=f.doubt,
-    )
-
-
-def _plain(name: str, f: Finding) -> str:
-    """The name of a value in the files: plain, but of the second run on in which alone it holds."""
-    parameter, run = parameter_and_run(name)
-    return parameter if run in f.of_runs[:1] else name
-
-
-def _sentence(diagnosis: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
-    """A finding in words; what holds in single runs, one after the other."""
-
-    def told(own: Mapping[str, float]) -> str:
-        return sentence(Found(diagnosis.start.ship.effects[f.id], own, diagnosis.speeds))
-
-    shown = _shown(diagnosis, values)
-    runs = [run for run in f.of_runs if shown is values]
-    return " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
-
-
-def _shown(diagnosis: Diagnosis, values: Mapping[str, T]) -> Mapping[str, T]:
-    """Values by their names; where there is one run only, without it."""
-    if len(diagnosis.comparison.evaluations) > 1:
-        return values
-    return {parameter_and_run(name)[0]: value for name, value in values.items()}

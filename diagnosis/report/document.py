@@ -1,22 +1,12 @@
 """A document of sections with text, tables and figures as one HTML page, in the style of the report."""
 
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-import cosim
+from typing import Any, NamedTuple
 
 from . import formatting
-from .page import environment
-from .svg import inline, style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-TEMPLATE = "document.html"
+from .page import Figure, drawing, write_page
 
 
 class Table(NamedTuple):
@@ -31,9 +21,9 @@ class Table(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A figure drawn within the page's style, and its caption."""
+    """A figure and its caption."""
 
-    figure: "Figure"
+    figure: Figure
     caption: str
 
 
@@ -77,38 +67,16 @@ def write_document(path: Path, document: Document) -> None:
         path: of the file.
         document: its content.
     """
-    from markupsafe import Markup
-
-    with style():
-        drawn = {
-            (k, j): Markup(inline(plot.figure, f"plot-{k}-{j}", plot.caption))
-            for k, section in enumerate(document.sections)
-            for j, plot in enumerate(section.plots)
-        }
-    text = (
-        environment().get_template(TEMPLATE).render(title=document.title, document=document, drawn=drawn)
-    )
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    drawn = [
+        [drawing(p.figure, f"plot-{k}-{j}", p.caption) for j, p in enumerate(section.plots)]
+        for k, section in enumerate(document.sections)
+    ]
+    write_page(path, "document.html", title=document.title, document=document, drawn=drawn)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Write the content of a JSON file; a number that is not finite is null."""
-    text = json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
-
-
-def finite(value: Any) -> Any:
-    """Arrays as lists, numbers that are not finite as None."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    path.write_text(formatting.as_json(content) + "\n", encoding="utf-8")
 
 
 def numbers(values: Sequence[float], digits: int = 3) -> list[str]:

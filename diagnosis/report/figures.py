@@ -1,157 +1,148 @@
-"""Figures of the model error, of the ranking of candidates and of learned shapes."""
+"""Charts of the model error, of the ranking of candidates and of learned shapes."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 
 from cosim.results import thin
 
+from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
+from ..assessment.regions import Profile
 from ..predictors.evaluation import Evaluation
+from ..search.findings import Ranked
 from ..search.shortlist import TIE
-from .content import Z95
-from .panels import breaks, figure_of, legend, panels_of, plain_numbers, stack
-from .profiles import BinnedError, Quantity
-from .result_keys import RankedResult
+from .chart import AFTER, BAND, BEFORE, PT, Axis, Chart, Panel
+from .report_data import Z95
 from .shape import Curve
-from .svg import AFTER, BAND, BEFORE, INK, THIRD
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-MAX_RANKED = 14  # candidates in the figure; chosen
+MAX_RANKED = 14  # candidates in the chart; chosen
 LOG_SPREAD = 20.0  # standard errors from which on the axis of scores is logarithmic; chosen
 GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; chosen
+STACK, SINGLE, ROW = 320.0, 230.0, 17.0  # pt, height of three panels, of one, of a candidate
+FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
+# Covariates that have a chart, with the labels of their axes.
+LABELS = {
+    SPEED: "surge speed [m/s]",
+    YAW_RATE: "yaw rate [°/s]",
+    THRUST: "thruster level [%]",
+    HEADING: "heading [°]",
+}
 
 
-def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> "Figure":
+def interrupted(values: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Values (n, ...) with NaN between those of different groups (n,)."""
+    return np.insert(values, np.flatnonzero(np.diff(group)) + 1, np.nan, axis=0)
+
+
+def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> Chart:
     """Model error over time of X, Y and N, with its uncertainty, and the part that is explained."""
-    figure, panels = stack(4.6)
     time = e.weak_windows.middle
     segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * e.weak_windows.every)])
-    for axis, panel in enumerate(panels):
+    panels = []
+    for axis, label in enumerate(FORCES):
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]
-        cuts = breaks(segment[rows])
-
-        def drawn(values: np.ndarray, rows: np.ndarray = rows, cuts: np.ndarray = cuts) -> np.ndarray:
-            return np.insert(values[rows], cuts, np.nan)
-
-        t = drawn(time)
+        t, y = interrupted(np.column_stack([time, measured])[rows], segment[rows]).T
+        panel = Panel(Axis("time [s]", margin=0.01, shown=axis == 2), Axis(label), zero=True)
         if std is not None:
-            low, high = (drawn(measured + sign * Z95 * std[:, axis]) for sign in (-1.0, 1.0))
-            panel.fill_between(t, low, high, color=BAND, alpha=0.45, lw=0.0, label="uncertainty, 95 %")
-        panel.axhline(0.0, color=INK, lw=0.6)
-        panel.plot(t, drawn(measured), color=BEFORE, lw=1.8, label="measured")
+            half = Z95 * interrupted(std[rows, axis], segment[rows])
+            panel.fill(t, y - half, y + half, BAND, "uncertainty, 95 %", opacity=0.45)
+        panel.draw(t, y, BEFORE, "measured", width=1.8)
         if learned:
-            explained = measured - e.after.omega[:, axis]
-            panel.plot(t, drawn(explained), color=AFTER, lw=1.0, label="explained")
-    panels[2].set_xlabel("time [s]")
-    panels[2].margins(x=0.01)
-    legend(figure, panels[0], 3)
-    return figure
+            explained = interrupted((measured - e.after.omega[:, axis])[rows], segment[rows])
+            panel.draw(t, explained, AFTER, "explained", width=1.0)
+        panels.append(panel)
+    return Chart(STACK, panels)
 
 
-def profile(quantity: Quantity, errors: Sequence[BinnedError], learned: bool) -> "Figure":
-    """RMS of the model error over a quantity, for X, Y and N."""
-    own = len(set(quantity.labels)) > 1
-    figure, panels = stack(5.0 if own else 4.2, sharex=not own)
-    for panel, error, label in zip(panels, errors, quantity.labels, strict=True):
-        if error.uncertainty is not None:
-            panel.stairs(
-                error.uncertainty, error.edges, fill=True, color=BAND, alpha=0.45, label="noise"
-            )
-        middle = 0.5 * (error.edges[1:] + error.edges[:-1])
-        parts = [("before" if learned else "model error", error.before, BEFORE, "o")]
-        parts += [("after", error.after, AFTER, "s")] if learned else []
-        for name, rms, colour, marker in parts:
-            panel.stairs(rms, error.edges, baseline=None, color=colour, lw=1.6, label=name)
-            panel.plot(middle, rms, marker, color=colour, ms=3.0)
-        panel.set_ylim(bottom=0.0)
-        if own or panel is panels[2]:
-            panel.set_xlabel(label)
-    if quantity.edges is not None:
-        panels[2].set_xticks(np.linspace(quantity.edges[0], quantity.edges[-1], 5))
-    legend(figure, panels[0], 3)
-    return figure
+def profile(
+    covariate: Covariate, before: Sequence[Profile], after: Sequence[Profile] | None = None
+) -> Chart:
+    """RMS of the model error over a covariate.
+
+    Args:
+        covariate: one of :data:`LABELS`.
+        before, after: of all axes, of the initial and of the learned model; None: nothing was learned.
+    """
+    panels = []
+    for axis, force in zip(AXES, FORCES, strict=True):
+        first, *last = (
+            next(p for p in profiles if (p.axis, p.covariate.id) == (axis, covariate.id))
+            for profiles in (before, after)
+            if profiles is not None
+        )
+        # What never changes has one edge, and one bin.
+        edges = covariate.display_factor * np.resize(first.edges, first.rms.size + 1)
+        last_one, own = axis == AXES[-1], covariate is THRUST  # the thrust is that of the axis
+        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=own or last_one)
+        panel = Panel(x, Axis(force), zero=True)
+        steps = np.repeat(edges, 2)[1:-1]
+        panel.fill(steps, 0.0, np.repeat(first.uncertainty, 2), BAND, "noise", opacity=0.45)
+        panel.draw(
+            steps, np.repeat(first.rms, 2), BEFORE, "before" if last else "model error", width=1.8
+        )
+        for p in last:
+            panel.draw(steps, np.repeat(p.rms, 2), AFTER, "after", width=1.0)
+        panels.append(panel)
+    return Chart(STACK + (2.0 * PT.below if covariate is THRUST else 0.0), panels)
 
 
-def ranking(ranked: Sequence[RankedResult]) -> "Figure":
+def ranking(ranked: Sequence[Ranked]) -> Chart:
     """Candidates by how much worse than the first they are, with the standard error of that difference.
 
-    Hollow are those within two of it.
+    The percentage is the share of the model error that each explains beyond other values of the nominal
+    coefficients, where a method tells that. Hollow: so near that only chance decides.
     """
     shown = ranked[:MAX_RANKED]
-    figure = figure_of(0.8 + 0.24 * len(shown))
-    panel = figure.subplots()
-    for k, r in enumerate(shown):
-        behind, std = _behind(r, shown[0])
-        tied = behind <= TIE * std
-        panel.errorbar(
-            behind,
-            k,
-            xerr=std,
-            fmt="o",
-            ms=7.0 if tied else 5.5,
-            color=AFTER if tied else BAND,
-            mfc=AFTER if k == 0 else ("none" if tied else BAND),
-            mew=1.6,
-            elinewidth=1.2,
-        )
-        panel.annotate(
-            _explained(r.beyond if r.beyond is not None else r.q2),
-            (1.0, k),
-            xycoords=("axes fraction", "data"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-        )
-    linear = max((std for _, std in (_behind(r, shown[0]) for r in shown)), default=0.0)
-    if _behind(shown[-1], shown[0])[0] > LOG_SPREAD * linear > 0.0:
-        panel.set_xscale("symlog", linthresh=TIE * linear)
-        plain_numbers(panel.xaxis)
-    else:
-        panel.locator_params(axis="x", nbins=5)
-    panel.margins(x=0.06)
-    panel.set_yticks(range(len(shown)), [r.id for r in shown])
-    panel.set_ylim(len(shown) - 0.5, -0.5)
-    panel.set_xlabel(
+    behind = np.array([_behind(r, shown[0]) for r in shown])
+    linear = float(behind[:, 1].max())
+    far = behind[-1, 0] > LOG_SPREAD * linear > 0.0
+    scale = partial(_from_linear, linear=TIE * linear) if far else None
+    label = (
         "score behind the first, with its standard error [1]\n"
         "right: explained beyond other values of the coefficients"
     )
-    return figure
+    names = Axis(limits=(len(shown) - 0.5, -0.5), names=[r.id for r in shown])
+    panel = Panel(Axis(label, scale=scale), names)
+    for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):
+        tied = x <= TIE * std
+        colour = AFTER if tied else BAND
+        panel.draw([x - std, x + std], [k, k], colour)
+        panel.draw(x, k, colour, radius=3.2 if tied else 2.6, hollow=tied and k > 0)
+        panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)
+    height = PT.above + PT.below + PT.letter + ROW * len(shown)
+    return Chart(height, [panel], right=PT.below)
 
 
-def _behind(r: RankedResult, first: RankedResult) -> tuple[float, float]:
+def _from_linear(x: np.ndarray, linear: float) -> np.ndarray:
+    """A scale that is linear below a value and logarithmic far above."""
+    return np.arcsinh(x / linear)
+
+
+def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
     """By how much a candidate's score is behind, and its standard error; 0 where a method has none."""
-    if r.behind is not None:
-        return r.behind, r.behind_std or 0.0
-    return (r.score or 0.0) - (first.score or 0.0), 0.0
+    if np.isfinite(r.behind):
+        return r.behind, float(np.nan_to_num(r.behind_std))
+    return r.score - first.score, 0.0
 
 
-def _explained(share: float | None) -> str:
+def _explained(share: float) -> str:
     """The share beside a candidate; a negative one without its size, which means nothing."""
-    if share is None:
+    if not np.isfinite(share):
         return ""
     return f"{100.0 * share:.0f} %" if share >= 0.0 else "< 0 %"
 
 
-def curve(c: Curve) -> "Figure":
+def curve(c: Curve) -> Chart:
     """A learned shape beside the nominal one."""
-    figure, (panel,) = panels_of(3.3)
-    if c.covered is not None:
-        for low, high in ((c.x[0], c.covered[0]), (c.covered[1], c.x[-1])):
-            if high > low:
-                panel.axvspan(low, high, color=BAND, alpha=0.25, lw=0.0)
-    panel.axhline(0.0, color=INK, lw=0.6)
+    panel = Panel(Axis(c.over, (c.x[0], c.x[-1])), Axis(c.what), zero=True)
     if c.sure is not None:
-        panel.fill_between(c.x, *c.sure, color=AFTER, alpha=0.2, lw=0.0)
-    panel.plot(c.x, c.nominal, "--", color=BEFORE, label="before")
-    panel.plot(c.x, c.learned, color=AFTER, lw=1.8, label="learned")
-    for name, (x, y) in c.points.items():
-        panel.plot(x, y, "o", ms=4.5, mfc="none", color=THIRD, label=name)
-    panel.set_xlim(c.x[0], c.x[-1])
-    panel.set_xlabel(c.over)
-    panel.set_ylabel(c.what)
-    legend(figure, panel, 2 + len(c.points))
-    return figure
+        panel.fill(c.x, *c.sure, AFTER)
+    panel.draw(c.x, c.nominal, BEFORE, "before", dashed=True)
+    panel.draw(c.x, c.learned, AFTER, "learned", width=1.8)
+    panel.y.limits = panel.ends()[1]
+    for begin, end in ((c.x[0], c.covered[0]), (c.covered[1], c.x[-1])):
+        if end > begin:
+            panel.fill([begin, end], *panel.y.limits, BAND, opacity=0.25)
+    return Chart(SINGLE, [panel])

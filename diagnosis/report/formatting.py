@@ -1,6 +1,8 @@
-"""Numbers and units as the page shows them, and its glossary."""
+"""Numbers and units as the page and JSON show them, and the glossary of the page."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +18,9 @@ GLOSSARY = (
         "{prediction} s of a run, predicted from where the ship was at first; "
         "of ω: {model_error} s, weighted",
     ),
-    ("held out", "a run of which nothing was learned, to see whether what was learned holds"),
+    ("learned from", "a run to which parameters were fitted"),
+    ("decided by", "a validation run: it decided which effects and values the model keeps"),
+    ("seen only now", "a test run: neither a fit nor a decision has used it"),
     ("candidate, effect", "a physical cause that the model lacks, with its own parameters"),
     ("nominal", "what the model has before anything is learned"),
     ("confidence", "probability that this effect, and not another one, is a true cause"),
@@ -55,7 +59,7 @@ def unit(text: str) -> str:
 
 def percent(value: float | None) -> str:
     """A share in per cent; a dash where it is None."""
-    return NO_VALUE if value is None else f"{100.0 * value:.0f} %"
+    return NO_VALUE if value is None or not np.isfinite(value) else f"{100.0 * value:.0f} %"
 
 
 def times(before: float | None, after: float | None) -> str:
@@ -79,3 +83,21 @@ def plain(value: object) -> str:
     if isinstance(value, (int, float)):
         return number(value, 6)
     return NO_VALUE if value is None else str(value)
+
+
+def finite(value: Any) -> Any:
+    """What JSON can hold: arrays as lists, named tuples by name, numbers that are not finite as None."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, Mapping):
+        return {str(k): finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(v) for v in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def as_json(content: Any, indent: int | None = 2) -> str:
+    """The text of a JSON file; a number that is not finite is null."""
+    return json.dumps(finite(content), indent=indent, ensure_ascii=False, allow_nan=False)

@@ -1,10 +1,14 @@
 """The result in a few sentences: what is sure first, what is only possible below it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from ..verdict.decision import FOUND
+import numpy as np
+
+from ..assessment.stability import Stability
+from ..verdict.confidence import FOUND
 from .finding_text import listed
-from .result_keys import DiagnosisContent, EffectResult, PossibilityResult, SuspectResult
+from .report_data import ReportData
+from .reported_effect import ReportedEffect
 
 NOTHING_FOUND = "Nothing is missing that these data show."
 TOO_LITTLE = "What is missing is more than noise, but too little to matter."
@@ -29,62 +33,65 @@ UNSURE = "Something is missing, and what it is, is not sure"
 MOST_NAMED = 4  # of the coefficients; chosen
 
 
-def _names(suspects: Sequence[SuspectResult]) -> str:
-    names = [f"{s.name} ({s.description})" if s.description else s.name for s in suspects]
+def _names(suspects: Mapping[str, str]) -> str:
+    """Coefficients with their descriptions in a row."""
+    names = [f"{name} ({text})" if text else name for name, text in suspects.items()]
     more = [f"{len(names) - MOST_NAMED} others"] if len(names) > MOST_NAMED else []
     *most, last = [*names[:MOST_NAMED], *more]
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def is_sure(e: EffectResult) -> bool:
-    """Whether a finding is told as a fact; one of a method without confidence is not."""
-    return (e.confidence or 0.0) >= FOUND
+def is_sure(e: ReportedEffect) -> bool:
+    """Whether a finding is reported as a fact; one of a method without confidence is not."""
+    return e.confidence >= FOUND
 
 
-def told(e: EffectResult) -> str:
+def surest_first(effects: Sequence[ReportedEffect]) -> list[ReportedEffect]:
+    """Effects that are sure, then the others."""
+    return sorted(effects, key=lambda e: not is_sure(e))
+
+
+def told(e: ReportedEffect) -> str:
     """A finding in a sentence: a fact, or a possibility with its rivals and its probability."""
     if is_sure(e):
         return e.sentence
     others = f" or {listed(e.indistinguishable)}" if e.indistinguishable else ""
-    sure = "" if e.confidence is None else f" ({100.0 * e.confidence:.2g} % for {e.id})"
+    sure = f" ({100.0 * e.confidence:.2g} % for {e.id})" if np.isfinite(e.confidence) else ""
     doubt = f" But {e.doubt}." if e.doubt else ""
-    left_out = isinstance(e, PossibilityResult) and not e.in_model
-    model = " The learned model does not have it." if left_out else ""
+    model = "" if e.in_model else " The learned model does not have it."
     return f"Possibly {e.id}{others}{sure}: {e.sentence}{doubt}{model}"
 
 
-def verdict_title(r: DiagnosisContent) -> str:
-    """The verdict as a heading, which claims no more than the findings do."""
-    one_cause = r.verdict == "ambiguous" and not r.effects[0].indistinguishable
-    possible = r.verdict == "unexplained" and r.possibilities
-    return UNSURE if one_cause or possible else VERDICTS[r.verdict]
+def verdict_title(r: ReportData) -> str:
+    """The verdict as a heading, which claims no more than the findings do; empty for a comparison."""
+    if r.diagnosis is None:
+        return ""
+    verdict = r.diagnosis.verdict
+    one_cause = verdict == "ambiguous" and not r.effects[0].indistinguishable
+    possible = verdict == "unexplained" and r.possibilities
+    return UNSURE if one_cause or possible else VERDICTS[verdict]
 
 
-def headline(
-    verdict: str,
-    effects: Sequence[EffectResult],
-    possibilities: Sequence[EffectResult],
-    suspects: Sequence[SuspectResult],
-    something: bool,
-    calibrated: bool,
-) -> str:
-    """The result in a few sentences.
-
-    Args:
-        verdict: that of the diagnosis.
-        effects: that were found, in the order of acceptance.
-        possibilities: that were accepted and are not believed.
-        suspects: nominal coefficients that are wrong.
-        something: whether more than noise is left.
-        calibrated: whether the learned model is a calibrated one.
-    """
-    if effects:
-        return " ".join(told(e) for e in sorted(effects, key=lambda e: not is_sure(e)))
-    if verdict == "coefficients":
-        names = f", above all {_names(suspects)}" if suspects else ""
+def headline(r: ReportData) -> str:
+    """The result of a diagnosis in a few sentences; empty for a comparison."""
+    d = r.diagnosis
+    if d is None:
+        return ""
+    if r.effects:
+        return " ".join(map(told, surest_first(r.effects)))
+    if d.verdict == "coefficients":
+        names = f", above all {_names(r.suspects)}" if r.suspects else ""
         return (
             f"Other values of the nominal coefficients explain these data{names}; no effect is missing."
         )
-    if verdict == "unexplained":
-        return (NOT_BELIEVED if possibilities else UNEXPLAINED) + CALIBRATED * calibrated
-    return TOO_LITTLE if something else NOTHING_FOUND
+    if d.verdict == "unexplained":
+        return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
+    return TOO_LITTLE if d.remainder.beyond_chance else NOTHING_FOUND
+
+
+def boundedness(s: Stability) -> str:
+    """Whether the learned model stays bounded in a simulation."""
+    where, paths = (
+        ("In closed loop", " on the reference paths") if s.closed_loop else ("Without thrust", "")
+    )
+    return f"{where} the learned model {'stays' if s.bounded else 'does NOT stay'} bounded{paths}"

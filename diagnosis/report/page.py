@@ -1,50 +1,64 @@
-"""The report: content of a JSON file as text and tables, with figures of the runs, in one HTML page."""
+"""The report: a result as text and tables, with charts of the runs, in one HTML page."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 import cosim
 
 from ..assessment.covariates import EAST, NORTH
-from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors.evaluation import Evaluation
 from . import figures, formatting, tracks
-from .headline import told, verdict_title
-from .profiles import QUANTITIES, binned_errors
-from .result_keys import Change, ComparisonContent, DiagnosisContent, StabilityResult
-from .shape import Curve, curves
-from .svg import data_uri, inline, style
-from .trial_rows import trial_rows
+from .chart import data_uri, themed
+from .content import coefficients, versions
+from .headline import boundedness, headline, told, verdict_title
+from .report_data import USES, ReportData, trial_rows
+from .shape import curves
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
     from markupsafe import Markup
-    from matplotlib.figure import Figure
-
 
 PLACE = (NORTH.id, EAST.id)
 NO_ORIGIN: Mapping[str, object] = {}
 
 
 class Drawing(NamedTuple):
-    """A figure of the page: its ``<svg>`` element, its caption, and its name as a file."""
+    """A picture of the page: its ``<svg>`` element, its caption, its name as a file, and the file."""
 
     svg: "Markup"
     caption: str
     key: str
+    file: str
+
+
+class Figure(Protocol):
+    """A :class:`.chart.Chart`, or what else can be an SVG element of a page."""
+
+    def svg(self, key: str, label: str) -> str: ...
+
+
+def drawing(figure: Figure, key: str, caption: str, label: str = "") -> Drawing:
+    """A picture for the page.
+
+    Args:
+        figure: what is drawn.
+        key: name of the file, that no other picture of the page has.
+        caption: text below.
+        label: for screen readers; by default the caption.
+    """
+    from markupsafe import Markup
+
+    svg = figure.svg(key, label or caption)
+    return Drawing(Markup(themed(svg)), caption, key, data_uri(svg))
 
 
 def write_report(
     path: str | Path,
-    content: ComparisonContent | DiagnosisContent,
-    evaluations: Sequence[Evaluation],
-    omega_std: Sequence[np.ndarray] | None = None,
+    data: ReportData,
     advance: Advance = silent,
     origin: Mapping[str, object] = NO_ORIGIN,
 ) -> Path:
@@ -52,9 +66,7 @@ def write_report(
 
     Args:
         path: of the file; an older one is replaced when the new one is complete.
-        content: that of ``comparison.json`` or ``diagnosis.json``.
-        evaluations: one for each run, in the order of ``content.errors``.
-        omega_std: standard deviation (K, 3) [N, N, N m] of each run's model error; None if not known.
+        data: the result.
         advance: receives the name of each step when it begins.
         origin: what else the result was made with, such as the command line and the hashes of its files.
 
@@ -62,49 +74,31 @@ def write_report(
         The path.
     """
     path = Path(path)
-    learned = any(e.after is not e.before for e in evaluations)
-    diagnosis = content if isinstance(content, DiagnosisContent) else None
     advance("report: figures")
-    makers: list[tuple[str, Callable[[], Iterator[Drawing]]]] = [
-        # What takes longest comes first, so that no process waits for it at the end.
-        ("free", lambda: _free(evaluations, learned)),
-        ("where", lambda: _profiles(evaluations, omega_std, learned)),
-        *(("tracks", partial(_tracks, k, e, learned)) for k, e in enumerate(evaluations)),
-        ("omega", lambda: _omega(evaluations, omega_std, learned)),
-        ("growth", lambda: _growth(evaluations, learned)),
-        ("place", lambda: _places(content, evaluations, learned)),
-        ("shapes", lambda: iter(()) if diagnosis is None else _shapes(diagnosis, evaluations)),
-        ("ranking", lambda: iter(()) if diagnosis is None else _ranking(diagnosis)),
-    ]
-    drawn: dict[str, list[Drawing]] = {}
-    with style():
-        made = for_each(lambda maker: list(maker[1]()), makers)
-    for (place, _), drawings in zip(makers, made, strict=True):
-        drawn.setdefault(place, []).extend(drawings)
+    sections = (_tracks, _growth, _free, _omega, _places, _profiles, _shapes, _ranking)
+    drawn = {section.__name__.strip("_"): [*section(data)] for section in sections}
     advance("report: page")
-    text = (
-        environment()
-        .get_template("page.html")
-        .render(
-            content=content,
-            diagnosis=diagnosis,
-            verdict="" if diagnosis is None else verdict_title(diagnosis),
-            title="Model against measurements" if diagnosis is None else "Diagnosis",
-            learned=learned,
-            figures=drawn,
-            tiles=list(_tiles(content, learned)),
-            runs=[(e.name, e.held_out, e.smoothed.counts, e.smoothed.track.notes) for e in evaluations],
-            provenance=[(k, v) for k, v in (*_provenance(content), *origin.items()) if v is not None],
-            glossary=list(formatting.glossary(content.windows.prediction, content.windows.model_error)),
-        )
+    made_with = [*_provenance(data), *origin.items()]
+    write_page(
+        path,
+        "page.html",
+        r=data,
+        diagnosis=data.diagnosis,
+        title="Model against measurements" if data.diagnosis is None else "Diagnosis",
+        verdict=verdict_title(data),
+        sentence=headline(data),
+        pictures=drawn,
+        tiles=[*_tiles(data)],
+        trials=[*trial_rows(data)],
+        coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
+        provenance=[(label, value) for label, value in made_with if value is not None],
+        glossary=[*formatting.glossary(*data.lengths)],
     )
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
     return path
 
 
-def environment() -> "Environment":
-    """Templates of this folder, and the filters that they use."""
+def write_page(path: Path, template: str, **values: object) -> None:
+    """Write a page by a template of this folder; an older file is replaced when it is complete."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -114,174 +108,133 @@ def environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    told_so = (told, data_uri, bounded)
-    filters = (
-        formatting.number,
-        formatting.unit,
-        formatting.percent,
-        formatting.plain,
-        trial_rows,
-        *told_so,
-    )
-    made.filters |= {f.__name__: f for f in filters}
-    made.globals["times"] = formatting.times
-    return made
+    f = formatting
+    made.filters |= {x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, told, boundedness)}
+    made.globals["times"] = f.times
+    text = made.get_template(template).render(values)
+    with cosim.atomic_write(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
 
 
-def _provenance(content: ComparisonContent | DiagnosisContent) -> Iterator[tuple[str, object]]:
+def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:
     """Label and value of all that the result was made with."""
-    yield "files", content.files
-    yield "runs", content.runs
-    yield "model", content.model
-    if isinstance(content, DiagnosisContent):
-        by_origin = "by where each value comes from"
-        yield "prior of the coefficients", by_origin if content.prior is None else content.prior
-        yield "seed", content.seed
-    yield "versions", content.versions
+    yield "files", r.files
+    yield "runs", [e.name for e in r.evaluations]
+    yield "model", r.model
+    if r.diagnosis is not None:
+        prior = r.diagnosis.prior
+        yield "prior of the coefficients", "by where each value comes from" if prior is None else prior
+        yield "seed", r.diagnosis.seed
+    yield "versions", versions()
 
 
-def _draw(figure: "Figure", key: str, label: str, caption: str) -> Drawing:
-    from markupsafe import Markup
-
-    return Drawing(Markup(inline(figure, key, label)), caption, key)
-
-
-def _label(e: Evaluation, learned: bool) -> str:
-    part = "held out" if e.held_out else "training"
-    return f"{e.name} ({part})" if learned else e.name
-
-
-def _tracks(k: int, e: Evaluation, learned: bool) -> Iterator[Drawing]:
-    name = _label(e, learned)
-    yield _draw(tracks.track(e, learned), f"track-{k}", f"Track of {e.name}", f"{name}.")
-    worst = tracks.worst_window(e, learned)
-    if worst is not None:
-        caption = f"{name}: the worst window."
-        yield _draw(worst, f"worst-{k}", f"The worst window of {e.name}", caption)
-    heading = tracks.heading_bands(e)
-    if heading is not None:
-        caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
-        yield _draw(heading, f"heading-{k}", f"Heading in the worst window of {e.name}", caption)
+def _tracks(r: ReportData) -> Iterator[Drawing]:
+    for k, e in enumerate(r.evaluations):
+        name, worst, heading = r.called(e), tracks.worst_window(e, r.learned), tracks.heading_bands(e)
+        yield drawing(tracks.track(e, r.learned), f"track-{k}", f"{name}.", f"Track of {e.name}")
+        if worst is not None:
+            yield drawing(worst, f"worst-{k}", f"{name}: the worst window.")
+        if heading is not None:
+            caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
+            yield drawing(heading, f"heading-{k}", caption)
 
 
-def _growth(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
-    for held_out in (False, True):
-        runs = [e for e in evaluations if e.held_out == held_out and e.windows is not None]
-        if not runs:
-            continue
-        part = "held-out" if held_out else ("training" if learned else "all")
-        caption = f"Error of prediction over time, {part} runs: median, and half of all samples."
-        figure = tracks.error_growth(runs, learned)
-        yield _draw(figure, f"growth-{part}", caption, caption)
+def _growth(r: ReportData) -> Iterator[Drawing]:
+    for use, runs in _by_use(r):
+        known = [e for e in runs if e.windows is not None]
+        if known:
+            caption = f"Error of prediction over time, {use}: median, and half of all samples."
+            yield drawing(tracks.error_growth(known, r.learned), f"growth-{known[0].use}", caption)
 
 
-def _free(evaluations: Sequence[Evaluation], learned: bool) -> Iterator[Drawing]:
-    """The first run of which nothing was learned, else the first one."""
-    for e in sorted(evaluations, key=lambda e: not e.held_out)[:1]:
-        caption = f"{_label(e, learned)}: predicted as a whole."
-        yield _draw(tracks.free(e), "free", f"{e.name} predicted as a whole", caption)
+def _by_use(r: ReportData) -> Iterator[tuple[str, list[Evaluation]]]:
+    """The runs by what their data were used for."""
+    for use in USES:
+        runs = [e for e in r.evaluations if e.use == use]
+        if runs:
+            words = r.use(runs[0])
+            yield f"runs {words}" if words else "all runs", runs
 
 
-def _places(
-    content: ComparisonContent | DiagnosisContent, evaluations: Sequence[Evaluation], learned: bool
-) -> Iterator[Drawing]:
+def _free(r: ReportData) -> Iterator[Drawing]:
+    """The first run of which least was used."""
+    e = max(r.evaluations, key=lambda e: [*USES].index(e.use))
+    yield drawing(tracks.free(e), "free", f"{r.called(e)}: predicted as a whole.")
+
+
+def _places(r: ReportData) -> Iterator[Drawing]:
     """The runs in which something is found at a place or at a time, or that acts from outside."""
-    placed = any(r.by in PLACE for r in content.where.regions)
+    placed = any(region.covariate.id in PLACE for region in r.comparison.before.regions)
     pushes: dict[str, list[tuple[float, float]]] = {}
-    if isinstance(content, DiagnosisContent):
-        effects = evaluations[0].model.ship.effects
-        placed = placed or any(effects[e.id].kind == "environment" for e in content.accepted)
-        for s in content.unrecorded.stretches:
+    if r.diagnosis is not None:
+        effects = r.diagnosis.start.ship.effects
+        placed = placed or any(effects[e.id].kind == "environment" for e in r.accepted)
+        for s in r.diagnosis.unrecorded.stretches:
             if s.axis != "N":
-                pushes.setdefault(s.run, []).append((s.start or 0.0, s.end or 0.0))
-    for k, e in enumerate(evaluations):
-        if not e.weak_windows.middle.size:
-            continue
-        name = _label(e, learned)
+                pushes.setdefault(s.run, []).append((s.start, s.end))
+    for k, e in _with_model_error(r):
+        name = r.called(e)
         if placed:
             caption = f"{name}: the missing force along the track."
-            yield _draw(tracks.place(e, learned), f"place-{k}", f"Missing force, {e.name}", caption)
+            yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
         if e.name in pushes:
-            figure = tracks.place(e, learned, pushes[e.name])
             caption = f"{name}: where something pushed the ship, and the force that is left."
-            yield _draw(figure, f"push-{k}", f"Pushes in {e.name}", caption)
+            yield drawing(tracks.place(e, r.learned, pushes[e.name]), f"push-{k}", caption)
 
 
-def _omega(
-    evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
-) -> Iterator[Drawing]:
-    for k, e in enumerate(evaluations):
-        if not e.weak_windows.middle.size:
-            continue
-        figure = figures.model_error(e, None if std is None else std[k], learned)
-        yield _draw(figure, f"omega-{k}", f"Model error over time, {e.name}", f"{_label(e, learned)}.")
+def _with_model_error(r: ReportData) -> Iterator[tuple[int, Evaluation]]:
+    """Runs, and their numbers, with windows of the weak form."""
+    return ((k, e) for k, e in enumerate(r.evaluations) if e.weak_windows.middle.size)
 
 
-def _profiles(
-    evaluations: Sequence[Evaluation], std: Sequence[np.ndarray] | None, learned: bool
-) -> Iterator[Drawing]:
-    if not any(e.weak_windows.middle.size for e in evaluations):
-        return
-    for k, quantity in enumerate(QUANTITIES):
-        figure = figures.profile(quantity, binned_errors(quantity, evaluations, std), learned)
-        caption = f"Model error by {quantity.name}."
-        yield _draw(figure, f"where-{k}", caption, caption)
+def _omega(r: ReportData) -> Iterator[Drawing]:
+    for k, e in _with_model_error(r):
+        figure = figures.model_error(e, r.comparison.omega_std[k], r.learned)
+        yield drawing(figure, f"omega-{k}", f"{r.called(e)}.", f"Model error over time, {e.name}")
 
 
-def _ranking(d: DiagnosisContent) -> Iterator[Drawing]:
-    ranked = [r for r in d.ranking if r.score is not None]
-    if ranked:
-        figure = figures.ranking(ranked)
-        caption = f"The best of {len(ranked)} candidates."
-        yield _draw(figure, "ranking", "Candidates in the order of their score", caption)
+def _profiles(r: ReportData) -> Iterator[Drawing]:
+    c = r.comparison
+    after = c.after.profiles if r.learned else None
+    for k, (covariate, label) in enumerate(figures.LABELS.items()):
+        figure = figures.profile(covariate, c.before.profiles, after)
+        yield drawing(figure, f"where-{k}", f"Model error by {label.partition(' [')[0]}.")
 
 
-def _shapes(d: DiagnosisContent, evaluations: Sequence[Evaluation]) -> Iterator[Drawing]:
-    learned = [e.model_dump(mode="json") for e in d.accepted]
-    shapes: list[Curve] = curves(learned, evaluations)
-    for k, c in enumerate(shapes):
+def _ranking(r: ReportData) -> Iterator[Drawing]:
+    if r.ranking:
+        caption = f"The best of {len(r.ranking)} candidates."
+        label = "Candidates in the order of their score"
+        yield drawing(figures.ranking(r.ranking), "ranking", caption, label)
+
+
+def _shapes(r: ReportData) -> Iterator[Drawing]:
+    for k, c in enumerate(curves(r.accepted, r.evaluations)):
         caption = f"{c.id}: before and learned. Grey: hardly any data."
-        yield _draw(figures.curve(c), f"curve-{k}", f"Learned shape of {c.id}", caption)
+        yield drawing(figures.curve(c), f"curve-{k}", caption, f"Learned shape of {c.id}")
 
 
-def _tiles(
-    content: ComparisonContent | DiagnosisContent, learned: bool
-) -> Iterator[tuple[str, str, str]]:
-    """Label, number and remark of the main numbers: over held-out runs if there are any."""
-    held_out = [e for e in content.errors if e.held_out]
-    chosen = held_out or content.errors
-    part = "held-out" if held_out else ("training" if learned else "measured")
-    position = [e.window_position_rmse for e in chosen]
-    heading = [e.window_heading_rmse for e in chosen]
-    length = formatting.number(content.windows.prediction)
-    yield from _tile(f"position error of {length} s predictions", position, 1e3, "mm", part, learned)
-    yield from _tile(
-        f"heading error of {length} s predictions", heading, degrees(1.0), "°", part, learned
-    )
+def _tiles(r: ReportData) -> Iterator[tuple[str, str, str]]:
+    """Label, number and remark of the main numbers: over the runs of which least was used."""
+    use, runs = [*_by_use(r)][-1]
+    length = formatting.number(r.lengths[0])
+    position = [(e.before.position, e.after.position) for e in runs]
+    heading = [(e.before.heading, e.after.heading) for e in runs]
+    yield from _tile(f"position error of {length} s predictions", position, 1e3, "mm", use)
+    yield from _tile(f"heading error of {length} s predictions", heading, degrees(1.0), "°", use)
 
 
 def _tile(
-    label: str, changes: Sequence[Change], factor: float, unit: str, part: str, learned: bool
+    label: str, errors: Sequence[tuple[float, float]], factor: float, unit: str, remark: str
 ) -> Iterator[tuple[str, str, str]]:
-    pairs = [(c.before, c.after) for c in changes if c.before is not None]
-    if not pairs:
+    """The root mean square of errors before and after, where these are known and differ."""
+    known = [pair for pair in errors if np.isfinite(pair[0])]
+    if not known:
         return
-    before = float(np.sqrt(np.mean([b**2 for b, _ in pairs])))
-    after = [a for _, a in pairs if a is not None]
+    before, after = np.sqrt(np.mean(np.square(known), axis=0)).tolist()
     shown = formatting.number(before, factor=factor)
-    remark = f"{part} runs"
-    if learned and len(after) == len(pairs):
-        last = float(np.sqrt(np.mean(np.square(after))))
-        shown += f" → {formatting.number(last, factor=factor)}"
-        remark += f", {formatting.times(before, last)} less" if last <= before else ", more than before"
+    if np.isfinite(after) and after != before:
+        shown += f" → {formatting.number(after, factor=factor)}"
+        less = after < before
+        remark += f", {formatting.times(before, after)} less" if less else ", more than before"
     yield label, f"{shown} {unit}", remark
-
-
-def bounded(stability: StabilityResult) -> str:
-    """The verdict on the learned model in a simulation."""
-    if stability.closed_loop:
-        return (
-            "Closed loops stay bounded" if stability.bounded else "A closed loop does not stay bounded"
-        )
-    how = "stays" if stability.bounded else "does not stay"
-    return f"Without thrust its motion {how} bounded"

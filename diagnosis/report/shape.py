@@ -1,7 +1,7 @@
 """Effects that are a shape, such as a thruster's force over its command: the shape itself."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +15,12 @@ from fmus.hull import damping_force
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..predictors.thrust import commanded_shares
+from .reported_effect import Coefficient, ReportedEffect
 
 COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
 POINTS = 401
+# m/s, times the scale of the ship; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
+FASTEST = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +32,7 @@ class Curve:
         over, what: labels of the axes, with units.
         x, nominal, learned: (n,).
         sure: lower and upper bound (n,) of the learned one, 95 %; None if not known.
-        covered: range of x that the data cover; None if not known.
-        points: name -> x and y of measurements that nothing was learned from.
+        covered: range of x that the data cover.
     """
 
     id: str
@@ -39,30 +41,18 @@ class Curve:
     x: np.ndarray
     nominal: np.ndarray
     learned: np.ndarray
-    sure: tuple[np.ndarray, np.ndarray] | None = None
-    covered: tuple[float, float] | None = None
-    points: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    sure: tuple[np.ndarray, np.ndarray] | None
+    covered: tuple[float, float]
 
 
 class Sweep(NamedTuple):
-    """How a shape is drawn.
-
-    Attributes:
-        over, what: labels of the axes, with units.
-        reach: ends of the horizontal axis.
-        force: the shape over x (n,), of a model.
-        data: where the data of a run lie on the horizontal axis.
-    """
+    """How a shape is drawn: labels, ends of the axis, its values over x, and where a run's data lie."""
 
     over: str
     what: str
     reach: tuple[float, float]
     force: Callable[[np.ndarray, Model], Any]
     data: Callable[[Evaluation], np.ndarray]
-
-
-# m/s, times the scale of the ship; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
-FASTEST = 0.6
 
 
 def surge_speed(e: Evaluation) -> np.ndarray:
@@ -83,46 +73,41 @@ def _apart(m: Model) -> Layout:
     return m.ship.layouts[-1]
 
 
-def commands(p: Picture, m: Model) -> Callable[[Evaluation], np.ndarray]:
+def _limits(p: Picture, m: Model) -> tuple[float, float]:
+    """Of the command of the actuator that a picture shows."""
+    return _apart(m).limits(m.drive.params)[p.commands[0]]
+
+
+def _commands(p: Picture, m: Model, e: Evaluation) -> np.ndarray:
     """The commands in a run of the actuators that a picture shows."""
-
-    def of(e: Evaluation) -> np.ndarray:
-        run = e.weak_windows.run
-        shared = m.ship.layout_of(run.commands).shared
-        given = sorted({shared[k] if shared else k for k in p.commands})
-        return np.concatenate(commanded_shares(run, m).T[given])
-
-    return of
+    run = e.weak_windows.run
+    shared = m.ship.layout_of(run.commands).shared
+    given = sorted({shared[k] if shared else k for k in p.commands})
+    return np.concatenate(commanded_shares(run, m).T[given])
 
 
 def _over_command(p: Picture, e: Effect, m: Model) -> Sweep:
     way = {"X": "surge", "Y": "sway"}[p.axis]
-    span = _apart(m).limits(m.drive.params)[p.commands[0]]
     over, what = f"{p.whose}: command in {way}", f"{p.whose}: {way} force [N]"
-    return Sweep(over, what, span, lambda c, m: given(p, m, c), commands(p, m))
+    return Sweep(over, what, _limits(p, m), lambda c, m: given(p, m, c), lambda e: _commands(p, m, e))
 
 
 def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
-    low, high = _apart(m).limits(m.drive.params)[p.commands[0]]
-    full = float(given(p, m, high))
-
     # The nominal force over the command is inverted by interpolation.
-    c = np.linspace(low, high, POINTS)
+    c = np.linspace(*_limits(p, m), POINTS)
     nominal = np.broadcast_to(given(p, m, c), c.shape)
     order = np.argsort(nominal, kind="stable")
 
     def force(f: np.ndarray, learned: Model) -> np.ndarray:
         return given(p, learned, np.interp(f, nominal[order], c[order]))
 
-    def data(e: Evaluation) -> np.ndarray:
-        return given(p, m, commands(p, m)(e))
-
     over, what = f"{p.whose}: force commanded [N]", f"{p.whose}: force given [N]"
-    return Sweep(over, what, (float(nominal.min()), full), force, data)
+    reach = float(nominal.min()), float(nominal[-1])
+    return Sweep(over, what, reach, force, lambda e: given(p, m, _commands(p, m, e)))
 
 
 def _effectiveness(p: Picture, e: Effect, m: Model) -> Sweep:
-    _, most = _apart(m).limits(m.drive.params)[p.commands[0]]
+    _, most = _limits(p, m)
 
     def share(u: np.ndarray, learned: Model) -> np.ndarray:
         nominal = np.broadcast_to(given(p, m, most, u), u.shape)
@@ -152,55 +137,37 @@ SWEEPS: dict[str, Callable[[Picture, Effect, Model], Sweep]] = {
 }
 
 
-def curves(
-    effects: Sequence[Mapping[str, Any]],
-    evaluations: Sequence[Evaluation],
-) -> list[Curve]:
+def curves(effects: Sequence[ReportedEffect], evaluations: Sequence[Evaluation]) -> Iterator[Curve]:
     """The shapes among the effects of a diagnosis.
 
     Args:
-        effects: as in ``diagnosis.json``.
+        effects: of the diagnosis.
         evaluations: the runs, for where their data lie.
     """
     model = evaluations[0].model
-    declared = model.ship.effects
-    drawn = [
-        _curve(e, effect, SWEEPS[picture.what](picture, effect, model), evaluations, model)
-        for e in effects
-        for effect in (declared[e["id"]],)
-        for picture in effect.wording.pictures
-    ]
-    return [c for c in drawn if not np.allclose(c.learned, c.nominal)]
+    for found in effects:
+        effect = model.ship.effects[found.id]
+        for picture in effect.wording.pictures:
+            sweep = SWEEPS[picture.what](picture, effect, model)
+            made = _curve(found, effect, sweep, evaluations, model)
+            if not np.allclose(made.learned, made.nominal):
+                yield made
 
 
 def _curve(
-    found: Mapping[str, Any],
-    effect: Effect,
-    sweep: Sweep,
-    evaluations: Sequence[Evaluation],
-    model: Model,
+    found: ReportedEffect, effect: Effect, s: Sweep, evaluations: Sequence[Evaluation], model: Model
 ) -> Curve:
-    coefficients = found["coefficients"]
     of_effect = {v.name for v in effect.parameters}
-    covered = np.concatenate([sweep.data(e) for e in evaluations])
-    x = np.linspace(*sweep.reach, POINTS)
+    x = np.linspace(*s.reach, POINTS)
 
-    def by(value: Callable[[Mapping[str, Any]], float]) -> np.ndarray:
-        wanted = {name: value(c) for name, c in coefficients.items() if name in of_effect}
+    def by(value: Callable[[Coefficient], float]) -> np.ndarray:
+        wanted = {name: value(c) for name, c in found.coefficients.items() if name in of_effect}
         learned = model.plus({name: v - model.value(name) for name, v in wanted.items()})
-        return np.broadcast_to(sweep.force(x, learned), x.shape)
+        return np.broadcast_to(s.force(x, learned), x.shape)
 
     sure = None
     if effect.linear:  # in weights that are never negative
-        sure = by(lambda c: _bound(c, 0)), by(lambda c: _bound(c, 1))
-    nominal, learned = by(lambda _: 0.0), by(lambda c: c["value"])
-    low, high = np.quantile(covered, COMMON)
-    where = float(low), float(high)
-    return Curve(effect.id, sweep.over, sweep.what, x, nominal, learned, sure, where)
-
-
-def _bound(coefficient: Mapping[str, Any], end: int) -> float:
-    """An end of the interval of a coefficient; the value itself where there is none."""
-    interval = coefficient.get("ci95")
-    bound = interval[end] if interval else None
-    return float(coefficient["value"] if bound is None else bound)
+        sure = by(lambda c: (c.ci95 or (c.value,))[0]), by(lambda c: (c.ci95 or (c.value,))[-1])
+    low, high = np.quantile(np.concatenate([s.data(e) for e in evaluations]), COMMON)
+    nominal, learned = by(lambda _: 0.0), by(lambda c: c.value)
+    return Curve(effect.id, s.over, s.what, x, nominal, learned, sure, (float(low), float(high)))

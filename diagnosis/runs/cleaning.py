@@ -1,7 +1,7 @@
 """Which samples of a measured run are usable: faults are counted and reported, never repaired."""
 
 from bisect import bisect_left
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -65,6 +65,11 @@ class Track:
     notes: tuple[str, ...]
     scale: Scale = REFERENCE
 
+    def rows(self, keep: np.ndarray) -> "Track":
+        """The track with some of its rows (n,) alone."""
+        judged = {name: getattr(self, name)[keep] for name in ("pose", "frozen", "dropped", "between")}
+        return replace(self, run=self.run.rows(keep), **judged)
+
     @cached_property
     def valid(self) -> np.ndarray:
         """(n,), rows with a new measurement."""
@@ -109,12 +114,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     if out:
         notes.append(f"{out} rows left out: time missing, repeated or backwards")
         run = run.rows(kept)
-    with np.errstate(over="ignore"):
-        row = float(np.median(np.diff(run.time))) if kept.size > 1 else 0.0
-    seconds = float(run.time[-1] - run.time[0]) + row if kept.size > 1 else 0.0
-    shortest = SHORTEST * scale.time
-    if seconds < shortest * (1.0 - 1e-6):
-        raise InputError(f"{where} is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed")
+    row, seconds = refuse_short(run, scale)
     dropped = lost(run.pose)
     repeats = repeated(run.pose, ~dropped)
     fresh = np.flatnonzero(~dropped & ~repeats)
@@ -147,6 +147,23 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     _moves(pose[fresh], where)
     notes += _gaps(run.time[fresh] - run.time[0], max(HELD * scale.time, LONG * period))
     return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
+
+
+def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
+    """Median time between two rows and length [s] of a run whose rows are in order.
+
+    Raises:
+        InputError: the run is shorter than a window of prediction.
+    """
+    with np.errstate(over="ignore"):
+        row = float(np.median(np.diff(run.time))) if run.time.size > 1 else 0.0
+    seconds = float(run.time[-1] - run.time[0]) + row if run.time.size > 1 else 0.0
+    shortest = SHORTEST * scale.time
+    if seconds < shortest * (1.0 - 1e-6):
+        raise InputError(
+            f"run '{run.name}' is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed"
+        )
+    return row, seconds
 
 
 def in_order(time: np.ndarray) -> np.ndarray:

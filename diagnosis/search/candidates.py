@@ -16,7 +16,6 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from ..predictors.weak_form import remember_responses
 from .nonlinear.multistart import Landscape, best_values
 from .nonlinear.segmentation import FLOOR, intervals, problem
 
@@ -31,7 +30,7 @@ MOST = 0.5  # share of its largest force from which on it counts as saturated; c
 # Share of a curve's weight that a node must have: half a second of four minutes.
 INSIDE = 2e-3
 FEWEST = 3  # nodes of a curve: of fewer there is no bend
-SLIGHT = 1e-12  # a force below that, squared and summed [N2], is none
+SLIGHT = 1e-12  # sum of squares of a force, in the units above, below which it is none: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ def smoothness(base: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """
     unit = np.square(columns.sum(axis=2))
     axes = unit.sum(axis=0) > 0.0
-    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), 1e-12)) + 1e-12
+    size = np.sqrt(np.square(base[:, axes]).sum() / max(unit.sum(), SLIGHT)) + SLIGHT
     bend = np.diff(np.eye(columns.shape[2]), 2, axis=0) / size
     return bend.T @ bend
 
@@ -257,7 +256,5 @@ def candidates(
     each = any(ship.layout_of(w.run.commands) is apart for w in data)
     effects = [ship.effects[name] for name in ship.candidates if name not in known]
     possible = [e for e in effects if e.search.by == "regression" and (each or APART not in e.needs)]
-    tried = [additions(model, e, v) for e in possible for v in e.search.values(model.values)]
-    remember_responses(data, [model, *map(model.plus, tried)])
     found = for_each(lambda e: candidate(data, model, base, e), possible, possible)
     return [c for c in found if c.shapes]

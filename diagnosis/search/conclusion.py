@@ -9,15 +9,15 @@ import numpy as np
 from ..predictors import Model
 from ..predictors.uncertainty import omega_std
 from .candidates import model_error
-from .confidence import Evidence, confidence, credible, evidence
+from .effect_evidence import Evidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
-from .map_regression import Scored, regression, ridge, score
+from .map_regression import Scored, regression, score
+from .most_likely import NORMAL_95, ridge
 from .prior import NominalPrior
-from .refinement import Estimate, TrainingSet, nuisance_of, refit
+from .refinement import Estimate, TrainingSet, nuisance_of, refit, weighted_rows
 
 SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ class Selection:
                     p.id,
                     values,
                     own | dict(p.intervals),
-                    confidence(seen),
+                    np.nan,
                     alike,
                     sum(shares[: k + 1]),
                     shares[k],
                     nested[k],
                     seen,
-                    confidence(together),
+                    set_evidence=together,
                 )
             )
         t = self.t
@@ -169,7 +169,7 @@ class Selection:
 
 def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:
     """(q,), posterior standard deviation of everything fitted, by Laplace's approximation."""
-    A = np.moveaxis(nuisance.columns * t.weight[:, None], 2, 0).reshape(nuisance.offset.size, -1).T
+    A = weighted_rows(nuisance.columns, t.weight)
     H = A.T @ A + nuisance.precision
     H += ridge(H, nuisance.unit)
     return np.sqrt(np.diag(np.linalg.inv(H)))

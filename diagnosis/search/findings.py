@@ -8,7 +8,7 @@ import numpy as np
 
 from ..predictors import Model
 from ..predictors.ship_model import parameter_and_run
-from .confidence import Evidence
+from .effect_evidence import Evidence
 from .prior import NominalPrior
 
 if TYPE_CHECKING:
@@ -63,15 +63,17 @@ class Finding:
         id: of the effect.
         values: its parameters as additions to the nominal ones; named ``parameter@run`` if of one run.
         ci95: interval of each that is fitted, at the final step.
-        confidence: probability that it is a true cause; NaN where a method has none.
+        confidence: probability that it is a true cause: what its method says, NaN where that says none;
+            of a finding with evidence it is set by the verdict.
         alike: the other ids of the smallest set that holds it and 95 % of the candidates' probability,
             by the weights that its confidence comes from; the most likely first.
         q2: cross-validated share of the model error that is explained, with all found before.
         share: how much of the cross-validated model error went with this finding.
         model: with this and all earlier findings.
         evidence: what the confidence is made of; None where a method has none.
-        together: probability that it or one of ``alike`` is a true cause; NaN where a method has none.
-        doubt: what speaks against it beside the confidence, as a part of a sentence.
+        together: probability that it or one of ``alike`` is a true cause; else as ``confidence``.
+        doubt: what speaks against it in addition to the evidence, as a part of a sentence.
+        set_evidence: what ``together`` is made of; None where a method has none.
     """
 
     id: str
@@ -85,6 +87,7 @@ class Finding:
     evidence: Evidence | None = None
     together: float = np.nan
     doubt: str = ""
+    set_evidence: Evidence | None = None
 
     @property
     def of_runs(self) -> list[str]:

@@ -30,7 +30,6 @@ from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
 from .significance import better, beyond_chance, harmful, matters
 
 MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
-REPLICATES = 200  # of the bootstrap: the standard error of a share is 3.5 % at the most
 ROUNDS = 2  # of searching all effects again, at the most; chosen
 
 
@@ -182,7 +181,7 @@ def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) 
         chosen: number of the candidate in its order.
     """
     first = best.scored[chosen].candidate
-    shares = first_share(best.scored, REPLICATES, rng).tolist()
+    shares = first_share(best.scored, rng).tolist()
     return AcceptedEffect(
         best.ids[first],
         tuple(best.starts[first].values),

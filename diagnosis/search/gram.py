@@ -15,14 +15,14 @@ import numpy as np
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
 from .candidates import Candidate
+from .most_likely import ridge
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
 FOLDS = 8  # of cross-validation over blocks
-# Stretches of a single run that are left out in turn, as long as the shortest run that can be learned
-# from; chosen.
+WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
+# Stretches of fewer runs that are left out in turn; of a single run each is as long as the shortest run
+# that can be learned from; chosen.
 STRETCHES = 4
-# Ridge of the regression for the noise, relative to the regressors: they may be collinear.
-NOISE_RIDGE = 1e-6
 
 Key = tuple[int, int]
 
@@ -134,7 +134,8 @@ def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
         A = A[:, np.abs(A).max(axis=0) > 0.0]
         scale = np.sqrt((A**2).mean(axis=0))
         A = A / scale
-        gram = A.T @ A + NOISE_RIDGE * len(A) * np.eye(A.shape[1])
+        gram = A.T @ A
+        gram += ridge(gram, np.inf)
         fit = A @ np.linalg.solve(gram, A.T @ y[:, axis])
         return float(np.sqrt(np.mean((y[:, axis] - fit) ** 2)))
 
@@ -194,9 +195,26 @@ def gram_table(
     return GramTable(grams, rows, runs, entries, indices, nuisance.precision, unit, sigma)
 
 
-def block_folds(data: Sequence[WeakWindows]) -> list[np.ndarray]:
-    """Numbers of the blocks of each run, counted through all; of a single run those of its stretches."""
+def run_folds(data: Sequence[WeakWindows]) -> list[tuple[int, np.ndarray]]:
+    """The parts of some runs that are left out in turn.
+
+    Args:
+        data: windows of every run.
+
+    Returns:
+        For each fold the number of a run and the numbers of its blocks: all of them where there are
+        WHOLE_RUNS or more runs, else those of a stretch of time.
+    """
+    stretches = 1 if len(data) >= WHOLE_RUNS else -(-STRETCHES // len(data))
     counts = [np.unique(w.block).size for w in data]
-    if len(data) == 1:
-        return np.array_split(np.arange(counts[0]), min(STRETCHES, counts[0]))
-    return np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+    return [
+        (run, blocks)
+        for run, n in enumerate(counts)
+        for blocks in np.array_split(np.arange(n), min(stretches, n))
+    ]
+
+
+def block_folds(data: Sequence[WeakWindows]) -> list[np.ndarray]:
+    """The same, the blocks counted through all runs."""
+    first = np.cumsum([0, *(np.unique(w.block).size for w in data)])
+    return [first[run] + blocks for run, blocks in run_folds(data)]

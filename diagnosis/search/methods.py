@@ -1,6 +1,5 @@
 """Methods of identification behind one interface, and the table of those that there are."""
 
-import runpy
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -8,6 +7,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from cosim import InputError
 from cosim.errors import nearest
+
+from ..execution.user_files import from_file
 
 if TYPE_CHECKING:
     from ..predictors import Model, WeakWindows
@@ -92,12 +93,7 @@ def method(name: str = DEFAULT) -> Method:
 
 def _from_file(path: Path) -> Method:
     """The method that a user's file declares."""
-    if not path.is_file():
-        raise InputError(f"no such Python file of a method: '{path}'")
-    try:
-        found = runpy.run_path(str(path)).get("METHOD")
-    except (Exception, SystemExit) as error:
-        raise InputError(f"'{path}' fails when imported: {error!r}") from error
+    found = from_file(path, "METHOD", "a method")
     if not isinstance(found, Method) or isinstance(found, type):
         raise InputError(f"'{path}' has no METHOD = ..., an object with a name and a function fit")
     return found

@@ -19,16 +19,15 @@ from sklearn.model_selection import GroupKFold
 from cosim import InputError
 
 from ..predictors import Model, WeakWindows
-from .candidates import Candidate, Shape, candidates, model_error
+from .candidates import SLIGHT, Candidate, Shape, candidates, model_error
 from .findings import Finding, Findings, Ranked
-from .gram import RUN
+from .gram import FOLDS, RUN
+from .nonlinear.multistart import NOTHING
 from .prior import Prior
 
-FOLDS = 4  # of cross-validation over blocks; chosen
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
 COMPONENTS = (1, 2, 3, 5, 8)  # latent variables to try; chosen
 RIDGE = 1e-3  # of STLSQ; columns of n rows have a sum of squares of n, so it only breaks ties
-LIVE = 1e-9  # share of the target's standard deviation below which a column is zero but for rounding
 
 
 class Features(NamedTuple):
@@ -78,7 +77,7 @@ def features(data: Sequence[WeakWindows], model: Model) -> Features:
     owner = np.repeat(np.arange(len(columns)), [x.shape[1] for x in columns])
     A = np.concatenate(columns, axis=1)
     scale, size = A.std(axis=0), float(target.std())
-    live = scale * np.concatenate(units) > LIVE * size
+    live = scale * np.concatenate(units) > NOTHING * size
     blocks = np.repeat(np.concatenate([RUN * k + w.block for k, w in enumerate(data)]), 3)
     used = [n for n, keep in zip(names, live, strict=True) if keep]
     standard = A[:, live] / scale[live]
@@ -94,7 +93,7 @@ def _stacked(shape: Shape, sigma: np.ndarray) -> np.ndarray:
 
 def _alone(column: np.ndarray, target: np.ndarray) -> float:
     """How much of the target a column explains by itself."""
-    return abs(float(column @ target)) / max(float(np.linalg.norm(column)), 1e-12)
+    return abs(float(column @ target)) / max(float(np.linalg.norm(column)), SLIGHT)
 
 
 class Peer(ABC):

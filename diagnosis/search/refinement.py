@@ -1,17 +1,13 @@
-"""Gauss-Newton refinement: effects and nuisance parameters moved together to their most likely values.
+"""Effects and nuisance parameters moved together to their most likely values, see :mod:`.most_likely`.
 
-With the model error r(theta) in units of the noise, the cost is
-
-    |r(theta)|^2 + theta^T P theta,
-
-P the prior precision of all parameters about their prior means. A step solves
-(J^T J + P) delta = J^T r - P theta, halved while the cost does not fall. The slopes J by the nuisance
-parameters hardly change on the way and are taken once; those of a new effect anew at each step.
-Times within a run have no slope: they are found by segmentation, anew at each fit of all else.
+The residuals are the model error in units of the noise. Its slopes by the nuisance parameters hardly
+change on the way and are taken once; those of a new effect anew at each step. Times within a run have no
+slope: they are found by segmentation, anew at each fit of all else.
 """
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -24,15 +20,12 @@ from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import OVERLAP
 from .candidates import SMALL, Shape, model_error
 from .gram import Nuisance
-from .map_regression import ridge
+from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
 from .nonlinear.segmentation import likely, problem, segmented
 from .prior import NominalPrior
 
-STEPS = 5  # of Gauss-Newton, at the most
-ENOUGH = 0.05  # of cost, which is twice a log likelihood: below, no further step is taken
 # Of a parameter, in its unit at the size of the ship: the step of its finite difference is scaled by it.
 SMALLEST_SCALE = 1e-2
-HALVINGS = (1.0, 0.5, 0.25)
 NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
 
 
@@ -222,60 +215,90 @@ def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Re
     """
     e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
     if e is None:
-        return _gauss_newton(t, at, nuisance, start)
+        return Refinement(t, at, nuisance, start).solved()
     return _with_intervals(t, at, nuisance, start, e)
 
 
 def refit(t: TrainingSet, at: Estimate, nuisance: Nuisance) -> Refined:
     """The effects found and the nominal coefficients at their most likely values, without a new one."""
-    return _gauss_newton(t, at, nuisance, Start({}, (), np.zeros((0, 0))))
+    return Refinement(t, at, nuisance, Start({}, (), np.zeros((0, 0)))).solved()
 
 
-def _gauss_newton(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
-    fitted = [*start.fitted, *at.fitted]
-    precision = np.asarray(block_diag(start.precision, nuisance.precision))
-    unit = np.array([*[at.start.unit(n) for n in start.fitted], *nuisance.unit])
-    weight = t.weight
+@dataclass(frozen=True, eq=False)
+class Sloped(Quadratic[Refined]):
+    """The cost with the slopes (K, 3, p) of a new effect."""
 
-    def evaluate(estimate: Estimate) -> Refined:
-        left, theta = t.error(estimate), parameters(estimate)
-        cost = float(((left * weight) ** 2).sum() + theta @ precision @ theta)
+    columns: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """The fit of a candidate and all nuisance parameters by slopes; arguments as of :func:`refine`."""
+
+    t: TrainingSet
+    at: Estimate
+    nuisance: Nuisance
+    start: Start
+
+    @cached_property
+    def precision(self) -> np.ndarray:
+        """(q, q), prior precision of all that is fitted."""
+        return np.asarray(block_diag(self.start.precision, self.nuisance.precision))
+
+    def theta(self, of: Estimate) -> np.ndarray:
+        """(q,), all that is fitted: the candidate's, effects found before, nominal coefficients."""
+        return np.array([*[of.values[n] for n in (*self.start.fitted, *self.at.fitted)], *of.offset])
+
+    def begin(self) -> Refined:
+        """The candidate as it begins."""
+        return self._evaluated(self.at.plus(self.start.values, np.zeros(self.t.prior.size)))
+
+    def moved(self, r: Refined, step: np.ndarray) -> Refined:
+        """An estimate after a step (q,), effects within their range."""
+        names = [*self.start.fitted, *self.at.fitted]
+        values = dict(zip(names, step.tolist(), strict=False))
+        return self._evaluated(r.estimate.plus(values, step[len(names) :]))
+
+    def _evaluated(self, estimate: Estimate) -> Refined:
+        left, x = self.t.error(estimate), self.theta(estimate)
+        cost = float(((left * self.t.weight) ** 2).sum() + x @ self.precision @ x)
         return Refined(estimate, left, np.zeros((*left.shape, 0)), cost)
 
-    def with_slopes(r: Refined) -> Refined:
-        model = r.estimate.model(t.prior)
-        columns = [slope(t, model, r.left, n, r.estimate.values[n]) for n in start.fitted]
-        return replace(r, columns=np.stack(columns, axis=2)) if columns else r
+    def rows(self, columns: np.ndarray) -> np.ndarray:
+        """(3 K, q), what one unit of everything takes away, in units of the noise.
 
-    def parameters(estimate: Estimate) -> np.ndarray:
-        return np.array([*[estimate.values[n] for n in fitted], *estimate.offset])
+        Args:
+            columns: (K, 3, p), slopes of the candidate.
+        """
+        return weighted_rows(np.concatenate([columns, self.nuisance.columns], axis=2), self.t.weight)
 
-    best = with_slopes(evaluate(at.plus(start.values, np.zeros(t.prior.size))))
-    for _ in range(STEPS):
-        columns = np.concatenate([best.columns, nuisance.columns], axis=2)
-        A = np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
-        H = A.T @ A + precision
-        H += ridge(H, unit)
-        right = A.T @ (best.left * weight).reshape(-1) - precision @ parameters(best.estimate)
-        delta = np.linalg.solve(H, right)
-        further = best
-        for share in HALVINGS:
-            step = dict(zip(fitted, (share * delta).tolist(), strict=False))
-            further = evaluate(best.estimate.plus(step, share * delta[len(fitted) :]))
-            if further.cost < best.cost:
-                break
-        gained = best.cost - further.cost
-        if gained < ENOUGH:
-            return replace(further, columns=best.columns) if gained > 0.0 else best
-        best = with_slopes(further)
-    return best
+    def about(self, r: Refined) -> Sloped:
+        """The cost about an estimate."""
+        model, fitted = r.estimate.model(self.t.prior), self.start.fitted
+        own = [slope(self.t, model, r.left, n, r.estimate.values[n]) for n in fitted]
+        columns = np.stack(own, axis=2) if own else r.columns
+        A = self.rows(columns)
+        H = A.T @ A + self.precision
+        right = A.T @ (r.left * self.t.weight).reshape(-1) - self.precision @ self.theta(r.estimate)
+        unit = np.array([*[self.at.start.unit(n) for n in fitted], *self.nuisance.unit])
+        return Sloped(H + ridge(H, unit), right, lambda tried: tried.cost, columns)
+
+    def solved(self) -> Refined:
+        """The candidate at its most likely values; times within a run stay as they are."""
+        found, here = most_likely(self.begin(), self.about, self.moved)
+        return replace(found, columns=here.columns)
+
+
+def weighted_rows(columns: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Columns (K, 3, q) as rows (3 K, q), each axis times its weight (3,)."""
+    return np.moveaxis(columns * weight[:, None], 2, 0).reshape(columns.shape[2], -1).T
 
 
 def _with_intervals(
     t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start, e: Effect
 ) -> Refined:
     """The same with the intervals of an effect found anew at each fit of all else, until they stay."""
-    found = _gauss_newton(t, at, nuisance, start)
+    found = Refinement(t, at, nuisance, start).solved()
     present, p = dict(start.values), None
     for _ in range(STEPS):
         estimate = found.estimate
@@ -292,7 +315,7 @@ def _with_intervals(
         if not better or not p.passing(better) or p.cost(better) > p.cost(spans) - ENOUGH:
             break
         present = p.values(better)
-        found = _gauss_newton(t, at, nuisance, replace(start, values=present))
+        found = Refinement(t, at, nuisance, replace(start, values=present)).solved()
     return found if p is None else replace(found, intervals=likely(p, p.spans(present)))
 
 

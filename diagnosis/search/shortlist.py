@@ -12,14 +12,14 @@ from scipy.linalg import block_diag
 
 from ..execution.parallel import for_each
 from ..predictors.correlation import independent
-from .candidates import Candidate, candidates, model_error
+from .candidates import SLIGHT, Candidate, candidates, model_error
 from .gram import GramTable, Nuisance, gram_table, noise
-from .map_regression import Scored, regression, ridge, score
+from .map_regression import Scored, regression, score
+from .most_likely import STEPS, ridge
 from .nonlinear.segmentation import FLOOR
 from .refinement import Estimate, Refined, Start, TrainingSet, as_shape, nuisance_of, refine, timed
 
 LENGTH = 8  # of the shortlist
-REWEIGHTINGS = 4  # at the most
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
 # Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
 # own: as much as its score must fall to be accepted.
@@ -105,7 +105,7 @@ def novelty(t: GramTable, candidate: int, free: int) -> float:
     own, gram, across = t.total[mine][:, mine], t.total[found][:, found], t.total[found][:, mine]
     gram = gram + ridge(gram, t.unit[found])
     left = np.diag(own - across.T @ np.linalg.solve(gram, across))
-    return float(np.max(left / np.maximum(np.diag(own), 1e-12 * t.unit[mine] ** -2.0)))
+    return float(np.max(left / np.maximum(np.diag(own), SLIGHT * t.unit[mine] ** -2.0)))
 
 
 def in_order(scored: Sequence[Scored]) -> list[Scored]:
@@ -178,7 +178,7 @@ def reweighted(
     if not ranking.order:
         return None
     found = shortlist(t, at, ranking)
-    for _ in range(REWEIGHTINGS):
+    for _ in range(STEPS):
         left = found.refined[found.scored[0].candidate].left
         spoiled = np.sqrt(np.mean(left**2, axis=0))
         lasting = np.exp(np.mean(np.log(independent(t.data, left))))

@@ -1,28 +1,27 @@
-"""Unseen data: held-out runs, or parts of the training runs beside fits that have not seen them.
+"""The data that decide: validation runs, or folds of training runs, with fits that have not seen them.
 
-A part is a run; of a single training run it is one of some stretches of time. What a model misses there
-is its model error, by blocks, and the error of its window predictions, by windows.
+A fold is a run; of fewer than three training runs it is one of some stretches of time. The loss there is
+the model error, by blocks, and the error of the window predictions, by windows.
 """
 
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from cosim import InputError
 
+from ..assessment.remainder import any_significant
 from ..execution.parallel import for_each
-from ..predictors import Model, WeakWindows, omega
-from ..predictors.windows import Windows
-from ..search.significance import worse
-
-FITS = "the model fits {where} worse"
-PREDICTS = "predictions of {where} are worse"
+from ..predictors import Model, WeakWindows, Windows, omega
+from ..search.findings import Findings
+from ..search.gram import run_folds
 
 
 class Losses(NamedTuple):
-    """What a model misses on unseen data.
+    """Losses of a model on the data that decide.
 
     Attributes:
         omega: (blocks,), sum of squares of the model error in each block, axes weighted by noise.
@@ -34,7 +33,7 @@ class Losses(NamedTuple):
     heading: np.ndarray
 
 
-class Part:
+class Fold:
     """A run, or a stretch of one.
 
     Args:
@@ -45,16 +44,22 @@ class Part:
     def __init__(self, w: WeakWindows, blocks: np.ndarray | None = None) -> None:
         self.data = w
         number = np.unique(w.block, return_inverse=True)[1]
-        self._rows = np.ones(number.size, bool) if blocks is None else np.isin(number, blocks)
+        blocks = np.unique(number) if blocks is None else blocks
+        whole = blocks.size == number.max() + 1
+        self._rows = np.isin(number, blocks)
         self._block = number[self._rows]
         first, last = w.middle[self._rows][[0, -1]]
-        self._span = (-np.inf, np.inf) if blocks is None else (first, last)
-        self._windows: Windows | None = None
-        with suppress(InputError):  # no window has enough samples
-            self._windows = Windows([w.smoothed], w.horizon)
+        self._span = (-np.inf, np.inf) if whole else (first, last)
+
+    @cached_property
+    def _windows(self) -> Windows | None:
+        """The windows that begin here; None: none has enough samples."""
+        with suppress(InputError):
+            return Windows([self.data.smoothed], self.data.horizon).within(*self._span)
+        return None
 
     def losses(self, models: Sequence[Model], sigma: np.ndarray) -> list[Losses]:
-        """What each of some models misses here, sigma (3,) being what an error is divided by."""
+        """Losses of some models here, sigma (3,) being what a model error is divided by."""
         found, models = [], [m.during(self.data.run.name) for m in models]
         for model, (position, heading) in zip(models, self._predicted(models), strict=True):
             squares = np.sum((omega(self.data, model)[self._rows] / sigma) ** 2, axis=1)
@@ -66,49 +71,68 @@ class Part:
         """Mean square errors in the windows that begin here, of each model."""
         if self._windows is None:
             return [(np.zeros(0), np.zeros(0))] * len(models)
-        inside = (self._windows.start >= self._span[0]) & (self._windows.start <= self._span[1])
         errors = self._windows.summary(np.stack(self._windows.residuals_of_each(models)))
-        return [
-            (position[inside] ** 2, heading[inside] ** 2)
-            for position, heading in zip(errors.position, errors.heading, strict=True)
-        ]
+        return list(zip(errors.position**2, errors.heading**2, strict=True))
 
 
-def losses(
-    parts: Sequence[Part], variants: Sequence[Sequence[Model]], sigma: np.ndarray
-) -> list[Losses]:
-    """What each of some variants misses on all parts.
+class ValidationData:
+    """The data that decide, and the losses of models there.
 
     Args:
-        parts: of the unseen data.
-        variants: of each variant the model of each part.
-        sigma: (3,), what an error is divided by [N, N, N m].
+        train: runs that are learned from.
+        validate: further runs; where there are any, they decide, else folds of ``train`` do.
+        start: the initial model.
+        sigma: (3,), what a model error is divided by [N, N, N m].
     """
-    by_part = for_each(lambda k: parts[k].losses([v[k] for v in variants], sigma), range(len(parts)))
-    return [
-        Losses._make(map(np.concatenate, zip(*one, strict=True))) for one in zip(*by_part, strict=True)
-    ]
 
+    def __init__(
+        self,
+        train: Sequence[WeakWindows],
+        validate: Sequence[WeakWindows],
+        start: Model,
+        sigma: np.ndarray,
+    ) -> None:
+        self.train, self.validate, self.start, self.sigma = train, validate, start, sigma
+        self.where = "validation runs" if validate else "data left out of the fit"
+        self._known: dict[int, tuple[Findings | Model, Losses]] = {}
 
-def gain(its: Losses, others: Losses) -> float:
-    """By how much another model misses less, on a logarithmic scale, summed over the three."""
-    pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))
+    @cached_property
+    def _folds(self) -> list[Fold]:
+        if self.validate:
+            return [Fold(w) for w in self.validate]
+        return [Fold(self.train[run], blocks) for run, blocks in run_folds(self.train)]
 
+    @property
+    def runs(self) -> list[WeakWindows]:
+        """All runs that a verdict may rest on."""
+        return [*self.train, *self.validate]
 
-def harm(its: Losses, others: Losses) -> str:
-    """In what a model is worse than another by more than two paired standard errors; empty: in nothing.
+    def judges(self, found: Findings) -> bool:
+        """Whether these data can judge the findings of a method."""
+        return bool(self.validate) or len(found.fold_models) == len(self._folds)
 
-    Where it predicts positions better and headings worse by as much, or the reverse, the relative
-    changes of both mean squares count together.
-    """
-    if worse(its.omega, others.omega):
-        return FITS
-    pairs = [(its.position, others.position), (its.heading, others.heading)]
-    if not its.position.size or not any(worse(a, b) for a, b in pairs):
-        return ""
-    if any(worse(b, a) for a, b in pairs):
-        change = sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs)
-        return PREDICTS if change > 0.0 else ""
-    return PREDICTS
+    def remains(self, model: Model) -> bool:
+        """Whether a model leaves a significant residual."""
+        return any_significant(self.runs, self.start, model)
+
+    def losses(self, *found: Findings | Model) -> list[Losses]:
+        """Losses of models, each fitted without the fold that it is judged on."""
+        # The first model, which comes up again, takes hardly longer together with others.
+        due = {id(f): f for f in (*found, self.start) if id(f) not in self._known}
+        if any(id(f) in due for f in found):
+            variants = [self._models(f) for f in due.values()]
+
+            def of_fold(k: int) -> list[Losses]:
+                return self._folds[k].losses([models[k] for models in variants], self.sigma)
+
+            by_fold = for_each(of_fold, range(len(self._folds)))
+            for f, parts in zip(due.values(), zip(*by_fold, strict=True), strict=True):
+                self._known[id(f)] = f, Losses(*map(np.concatenate, zip(*parts, strict=True)))
+        return [self._known[id(f)][1] for f in found]
+
+    def _models(self, found: Findings | Model) -> Sequence[Model]:
+        if isinstance(found, Findings):
+            if not self.validate:
+                return found.fold_models
+            found = found.model if found.effects else found.refitted or self.start
+        return [found] * len(self._folds)

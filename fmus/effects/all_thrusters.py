@@ -24,6 +24,12 @@ def share_reached(h: Number, lag: Number) -> Number:
     return 1.0 - exp(-h / fmax(lag, 1e-9))
 
 
+def lag_filter(h: float, lag: float) -> tuple[Sequence[float], Sequence[float]]:
+    """A first-order lag as a linear filter, see :class:`.effect.Memory`."""
+    share = share_reached(h, lag)
+    return (share,), (1.0, share - 1.0)
+
+
 def way(before: Number, wanted: Number, angle: bool) -> Number:
     """From a command to another one; of an angle that goes round the shorter way [rad]."""
     return wrap(wanted - before) if angle else wanted - before
@@ -63,6 +69,8 @@ def slow(
             "force",
             lambda lag: FORGOTTEN * lag,
             idle=lambda before, wanted: wanted,
+            filter=None if any(turns) else lag_filter,
+            own=own,
         ),
         search=Search(tries=[{name: d.scale.time * T} for T in (*TIMES, 2.0)]),
         description=f"first-order lag of {d.label}",
@@ -189,6 +197,13 @@ class Kept(NamedTuple):
     commands: tuple[tuple[Number, ...], ...]
 
 
+def delay_filter(h: float, delay: float) -> tuple[Sequence[float], Sequence[float]]:
+    """A delay that keeps every step as a linear filter, see :class:`.effect.Memory`."""
+    ago = floor(delay / h + 1e-6)
+    part = fmax(0.0, delay / h - ago)
+    return (*[0.0] * int(ago), 1.0 - part, part), (1.0,)
+
+
 @effect(
     "delay",
     "actuator",
@@ -200,7 +215,11 @@ class Kept(NamedTuple):
     linear=False,
     description="pure delay of all thrusters",
     memory=Memory(
-        lambda width: Kept(0.0, ((0.0,) * width,) * SLOTS), "command", lambda delay: delay, keeps=SLOTS
+        lambda width: Kept(0.0, ((0.0,) * width,) * SLOTS),
+        "command",
+        lambda delay: delay,
+        SLOTS,
+        filter=delay_filter,
     ),
     search=Search(tries=[{"delay": T} for T in TIMES]),
     wording=Wording(

@@ -23,7 +23,7 @@ parameters that start at zero are the effect's coefficients: with all of them ze
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -134,6 +134,9 @@ class Memory(NamedTuple):
         keeps: how many steps of the past it holds; None: as many as there are.
         idle: ``idle(memory, signals)``: the memory after a step in which the effect does not act, from
             which it starts if it is switched on; by default it stays as it is.
+        filter: ``filter(h, *parameters)``: numerator and denominator in 1/z of the linear filter that
+            the effect is in steps of h [s], of unit gain for constant signals; None: it is none.
+        own: places of the signals that it changes.
     """
 
     initial: Any
@@ -141,6 +144,8 @@ class Memory(NamedTuple):
     lasts: Callable[..., Any]
     keeps: int | None = None
     idle: Callable[[Any, Any], Any] | None = None
+    filter: Callable[..., tuple[Sequence[float], Sequence[float]]] | None = None
+    own: slice = slice(None)
 
     def start(self, width: int) -> Any:
         """The memory before anything was commanded, of thrusters with ``width`` commands."""

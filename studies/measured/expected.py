@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from diagnosis import DiagnosisContent
+from diagnosis import Content
 
 AXES = ("surge", "sway", "yaw")
 BY_HAND, STEERED = "by hand", "dynamic positioning"
@@ -74,7 +74,7 @@ def commanded(fall: Fall) -> str:
     return text
 
 
-def vsp_curve(found: DiagnosisContent) -> str:
+def vsp_curve(found: Content) -> str:
     """The shape of the VSP's surge force."""
     came = [e.id for e in found.accepted if e.id in SHAPES]
     if came:
@@ -83,14 +83,14 @@ def vsp_curve(found: DiagnosisContent) -> str:
     return f"only as indistinguishable ({', '.join(dict.fromkeys(alike))})" if alike else "no"
 
 
-def coefficients(found: DiagnosisContent, axis: str) -> str:
+def coefficients(found: Content, axis: str) -> str:
     """Damping coefficients of an axis: as effects, and as nominal ones that are likely wrong."""
     effects = [e.id for e in found.accepted if e.id.startswith(f"{axis}_")]
     suspects = [f"{s.name} = {s.value:.3g}" for s in found.suspect_coefficients if s.name[0] == axis]
     return ", ".join(effects + suspects) or "no"
 
 
-def delay(found: DiagnosisContent) -> str:
+def delay(found: Content) -> str:
     """A pure delay of the thrusters, and whether it is as long as expected."""
     for e in found.accepted:
         value = e.coefficients["delay"].value if e.id == "delay" else None
@@ -101,7 +101,7 @@ def delay(found: DiagnosisContent) -> str:
     return f"no; {', '.join(others)} in its place" if others else "no"
 
 
-def expectations(found: Sequence[DiagnosisContent]) -> list[Expectation]:
+def expectations(found: Sequence[Content]) -> list[Expectation]:
     """What was expected, and the result of each diagnosis."""
     return [
         Expectation("thrust_curve or curve_vsp_x(c)", [vsp_curve(d) for d in found]),

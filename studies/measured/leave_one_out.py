@@ -11,8 +11,8 @@ import numpy as np
 import diagnosis
 from cosim import InputError
 from diagnosis import (
+    Content,
     Diagnosis,
-    DiagnosisContent,
     Evaluation,
     Model,
     WeakWindows,
@@ -49,7 +49,7 @@ class Fold:
         return self.evaluation.name
 
     @cached_property
-    def content(self) -> DiagnosisContent:
+    def content(self) -> Content:
         """As in ``diagnosis.json``."""
         return diagnosis_content(self.found, None, [])
 

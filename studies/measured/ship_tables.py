@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 from matplotlib.figure import Figure
 
-from diagnosis import DiagnosisContent, EffectResult, Evaluation, Model
+from diagnosis import Content, Evaluation, Model
 
 from ..study_report import Report
 from . import bollard
@@ -157,11 +157,11 @@ def write_expected(report: Report, folds: Sequence[Fold]) -> None:
     report.result("late", delays)
 
 
-def write_findings(report: Report, name: str, d: DiagnosisContent) -> None:
+def write_findings(report: Report, name: str, d: Content) -> None:
     """The findings of one set of runs."""
     report.heading(name)
 
-    def row(e: EffectResult) -> list[str]:
+    def row(e: Content) -> list[str]:
         numbers = [f"{x:.2f}" for x in (e.confidence or 0.0, e.share_of_error or 0.0)]
         return [f"`{e.id}`", e.equation, *numbers, ", ".join(e.indistinguishable) or "none"]
 

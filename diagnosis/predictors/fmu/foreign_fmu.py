@@ -1,23 +1,35 @@
-"""An FMU that is to be held against measured runs, and which of its variables are what."""
+"""FMUs for co-simulation as predictors of measured runs."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 import cosim
 from cosim.export import export_fmu
-from cosim.fmu import Model
+from cosim.fmu import Model as FmuModel
 from cosim.system import prepare
-from fmus.ship import ship
+from fmus.frames import rotate_to_body
+from fmus.ship import Ship, ship
 
-from ...runs import OF_UNIT, QUANTITY, Run
-from .variable_map import VariableMap, completed, propose, read_map, unmatched
+from ...execution.progress import Advance, silent
+from ...runs import OF_UNIT, QUANTITY, UNITS, Column, Run, Smoothed, to_si
+from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
+from ..described_ship import nominal
+from ..predictor import FOUND, MAP
+from ..ship_model import Model
+from ..weak_form import WeakWindows
+from .instances import Begun, simulate
+from .short_steps import FIRST, LONGEST, SECOND, STEP, ShortSteps
+from .variable_map import VariableMap, completed, propose, quantities, read_map, unmatched, write_map
+from .wrapper import Wrapped, write_wrapper
 
 SYSTEMS = (".ssp", ".json")
-SUFFIXES = (".fmu", *SYSTEMS)
-TAU = ("tau_X", "tau_Y", "tau_N")
 
 
 class Fmu:
@@ -27,19 +39,28 @@ class Fmu:
         path: of the file; a system, as an SSP archive or a scenario, is made one FMU, with what no
             connection feeds as its inputs, and variables called ``instance.variable``.
         map: which of its variables is which signal, a file; None: as names and units tell.
+        ship: that it is a model of; None: that of the runs.
 
     Raises:
         InputError: no such FMU, or none for co-simulation by FMI 2.0; a system that one FMU cannot hold.
     """
 
-    def __init__(self, path: str | Path, map: str | Path | None = None) -> None:  # noqa: A002
+    parametric = False
+
+    def __init__(
+        self,
+        path: str | Path,
+        map: str | Path | None = None,  # noqa: A002 - as the option of the commands
+        ship: Ship | None = None,
+    ) -> None:
         self._given = self.path = Path(path).absolute()
         if self.path.suffix in SYSTEMS:
             self._made = TemporaryDirectory(prefix="cosim_")
             self.path = _as_one(self._given, Path(self._made.name))
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
-        self.model = Model(self.path)
+        self.model = FmuModel(self.path)
+        self.start = None if ship is None else Model(ship=ship)
 
     @property
     def name(self) -> str:
@@ -81,6 +102,152 @@ class Fmu:
         if lacking:
             raise UnmatchedError(f"{where}: {'; '.join(lacking)}", given.content())
         return found
+
+    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> "FmuPredictor":
+        """The predictor of some runs, see :meth:`..predictor.ModelSource.on`.
+
+        Raises:
+            InputError: as :meth:`variables`; the FMU refuses to be set to a measured state, or fails.
+        """
+        predictor = FmuPredictor(self, runs, self.start or nominal(runs))
+        advance(f"what {self.name} does in measured states")
+        assert predictor.model  # which takes a while
+        return predictor
+
+
+class FmuPredictor(BlackBox):
+    """How an FMU predicts some runs.
+
+    Args:
+        fmu: the FMU.
+        runs: no two of the same name.
+        ship: model of the ship.
+
+    Attributes:
+        given: which of its variables is which signal, as it was told or proposed.
+        map: the same with the units that the FMU declares.
+
+    Raises:
+        InputError: as :meth:`Fmu.variables`.
+    """
+
+    kind = "FMU"
+
+    def __init__(self, fmu: Fmu, runs: Sequence[WeakWindows], ship: Model) -> None:
+        super().__init__(fmu.name, runs, ship)
+        measured = [w.run for w in runs]
+        self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
+        self.units = SignalUnits(self.map, commands_of(measured))
+        self.starts = frozenset(self.map.told("start")) & set(MOTION)
+        self.inputs = frozenset(self.map.told("inputs"))
+        self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
+
+    @property
+    def whole(self) -> bool:
+        return not set(VELOCITY) <= {*self.starts, *self.map.fixed}
+
+    @property
+    def placed(self) -> bool:
+        return not set(POSE) <= self.map.told("outputs").keys() & self.starts
+
+    @cached_property
+    def _along_runs(self) -> Model:
+        inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
+        time = self.runs[0].scale.time
+        h = min(self.fmu.step or STEP * time, LONGEST * time)
+        with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
+            return super()._along_runs
+
+    def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
+        run, columns = smoothed.track.run, self.map.told("outputs")
+        at, middle = self.units.variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        begun = [
+            Begun(
+                _row(at, row),
+                self.units.variables("inputs", commands_at(run, smoothed.time[row] + middle)),
+            )
+            for row in rows
+        ]
+        names = [c.name for c in columns.values()]
+        try:
+            told = simulate(self.fmu.path, self.fmu.isolated, begun, names, h, steps)
+        except cosim.InputError as error:
+            raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
+        motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
+        for signal, values in self.units.outputs(told).items():
+            motion[:, MOTION.index(signal)] = values
+        return motion
+
+    def accelerations(self, signals: Signals) -> np.ndarray:
+        start, inputs = (self.units.variables(group, signals) for group in ("start", "inputs"))
+        size = next(iter(signals.values())).size
+        return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
+
+    def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
+        """nu_dot (3,) from a start on, by differences of a few short steps."""
+        motion, h = self.units.outputs(self._steps.run(start, inputs)), self._steps.h
+        if set(VELOCITY) <= motion.keys():
+            return np.array([FIRST @ motion[s] for s in VELOCITY]) / h
+        x, y, psi = (motion[s] for s in POSE)
+        rate = [FIRST @ p / h for p in (x, y, np.unwrap(psi))]
+        change = [SECOND @ p / h**2 for p in (x, y, np.unwrap(psi))]
+        u, v = rotate_to_body(psi[0], rate[0], rate[1])
+        u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
+        return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
+
+    @property
+    def _started_by(self) -> str:
+        return f", by {', '.join(c.name for c in self.map.told('start').values())}"
+
+    def write(
+        self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
+    ) -> list[str]:
+        """Its map; with additions, one FMU of both, and the map of that."""
+        if learned is None:
+            write_map(folder / MAP, self.given.content())
+            return []
+        wrapped = Wrapped(
+            self.name, self.fmu.path, self.fmu.model.variables, self.map, self.units.quantity
+        )
+        told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
+        write_map(folder / MAP, (of_both or self.given).content())
+        return [told]
+
+
+class SignalUnits:
+    """Values of an FMU's variables as signals in SI, and the other way.
+
+    Args:
+        map: with the units of all variables.
+        commands: of the runs: signal -> quantity.
+    """
+
+    def __init__(self, map: VariableMap, commands: Mapping[str, str]) -> None:  # noqa: A002
+        known = quantities(commands)
+        self.map = map
+        self.quantity = {**known["outputs"], **known["inputs"]}
+
+    def in_variable(self, signal: str, column: Column, values: Any) -> Any:
+        """Values of a signal in SI as its variable has them."""
+        factor = -column.factor if column.flip else column.factor
+        unit = UNITS[self.quantity[signal]].get(column.unit or "", 1.0)
+        return (values / unit - column.offset) / factor
+
+    def variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
+        """Variable -> its values, for those of some signals [SI] that a group of the map has."""
+        told = self.map.told(group)
+        return {c.name: self.in_variable(s, c, signals[s]) for s, c in told.items() if s in signals}
+
+    def outputs(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Signal -> its values [SI], by variables' values; also of those that stay the same."""
+        columns = self.map.told("outputs")
+        found = {s: to_si(values[c.name], s, c, self.quantity[s]) for s, c in columns.items()}
+        like = next(iter(values.values()))
+        return found | {s: np.full(like.shape, x) for s, x in self.map.fixed.items()}
+
+
+def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
+    return {name: float(x[k]) for name, x in values.items()}
 
 
 def _as_one(path: Path, folder: Path) -> Path:

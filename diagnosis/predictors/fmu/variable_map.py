@@ -28,9 +28,8 @@ from cosim.fmu import Model, Variable
 from fmus.base_units import base_exponents
 
 from ...runs import QUANTITY, UNITS, Column, meaning
+from ..black_box import MOTION, POSE, VELOCITY
 
-POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
-MOTION = (*POSE, *VELOCITY)
 PROPOSED = ("inputs", "outputs", "start")
 GROUPS = (*PROPOSED, "beside")
 # Inputs that act beside all else: forces, or accelerations.
@@ -113,6 +112,11 @@ def read_map(path: Path) -> VariableMap:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def write_map(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a map as JSON."""
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:

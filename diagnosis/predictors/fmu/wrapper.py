@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import cosim
 from cosim.export import export_fmu
+from cosim.fmu import Variable
 from cosim.process import scratch_folder
 from cosim.system import prepare
 from fmus.addition import ACCELERATION, FORCE, Line
@@ -16,7 +17,7 @@ from fmus.build import BuildError, build, native_targets
 from ...runs import UNITS, Column
 from ..ship_model import Model
 from ..weak_form import WeakWindows, omega
-from .fmu_windows import Use, step_of
+from ..windows import step_of
 from .variable_map import BESIDE, VariableMap
 
 SLIGHT = 1e-9  # of the ship's forces: less is none
@@ -33,14 +34,31 @@ COMPONENT = addition(ship(description={description!r}), {arguments})
 '''
 
 
+class Wrapped(NamedTuple):
+    """An FMU that effects are added to.
+
+    Attributes:
+        name, path: of the file.
+        variables: by their names.
+        map: which of them is which signal, with units.
+        quantity: of each signal.
+    """
+
+    name: str
+    path: Path
+    variables: Mapping[str, Variable]
+    map: VariableMap
+    quantity: Mapping[str, str]
+
+
 def write_wrapper(
-    path: Path, use: Use, start: Model, learned: Model, runs: Sequence[WeakWindows]
+    path: Path, fmu: Wrapped, start: Model, learned: Model, runs: Sequence[WeakWindows]
 ) -> tuple[str, VariableMap | None]:
     """Write an FMU of a foreign one and of what was found beside it.
 
     Args:
         path: of the file.
-        use: how the foreign one predicts.
+        fmu: the foreign one.
         start: that moves as it does.
         learned: the same with what was found.
         runs: on which that was.
@@ -50,43 +68,43 @@ def write_wrapper(
     """
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
     needed = np.abs(change).max(axis=0) > SLIGHT * np.array(start.ship.scale.forces)
-    takes = {*use.map.told("inputs"), *use.map.told("beside")}
+    takes = {*fmu.map.told("inputs"), *fmu.map.told("beside")}
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
         return "Nothing is added to the FMU.", None
     if missing:
         axes = " and ".join(f"{FORCE[k]} or {ACCELERATION[k]}" for k in missing)
-        needs = f"{use.fmu.name} has no input for a force or an acceleration beside all else"
+        needs = f"{fmu.name} has no input for a force or an acceleration beside all else"
         return f"{NONE}: {needs}; it needs {axes}, which the map tells under 'beside'.", None
     if start.ship.effects.files:
         return f"{NONE}: the ship has effects of your own.", None
     try:
         with scratch_folder() as folder:
-            system = prepare(cosim.load_scenario(_scenario(use, start, learned, folder, runs)))
+            system = prepare(cosim.load_scenario(_scenario(fmu, start, learned, folder, runs)))
             try:
-                export_fmu(system, path, overwrite=True, expose=_start_values(use))
+                export_fmu(system, path, overwrite=True, expose=_start_values(fmu))
             finally:
                 system.close()
     except (cosim.InputError, BuildError) as error:
         return f"{NONE}: {error}.", None
-    return f"{path.name} is {use.fmu.name} with what was found.", _map(use)
+    return f"{path.name} is {fmu.name} with what was found.", _map(fmu)
 
 
 def _scenario(
-    use: Use, start: Model, learned: Model, folder: Path, runs: Sequence[WeakWindows]
+    fmu: Wrapped, start: Model, learned: Model, folder: Path, runs: Sequence[WeakWindows]
 ) -> dict[str, Any]:
     """The two FMUs, wired; values pass as they are, for the addition converts them."""
-    groups = {group: use.map.told(group) for group in ("outputs", "inputs", "beside")}
-    told: dict[str, Line | float] = {**_lines(use, groups["outputs"]), **use.map.fixed}
+    groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", "beside")}
+    told: dict[str, Line | float] = {**_lines(fmu, groups["outputs"]), **fmu.map.fixed}
     parts = [
         {part: {n: float(x) for n, x in getattr(m, part).items()} for part in ("vessel", "thrusters")}
         for m in (start, learned)
     ]
-    arguments = (*parts, told, *(_lines(use, groups[g]) for g in ("inputs", "beside")))
+    arguments = (*parts, told, *(_lines(fmu, groups[g]) for g in ("inputs", "beside")))
     source = folder / f"{ADDED}.py"
     description = start.ship.description
     text = ", ".join(map(repr, arguments))
-    source.write_text(SOURCE.format(name=use.fmu.name, description=description, arguments=text))
+    source.write_text(SOURCE.format(name=fmu.name, description=description, arguments=text))
     try:
         (made,) = build(source, folder, native=native_targets())
     except BuildError:  # no compiler
@@ -101,7 +119,7 @@ def _scenario(
         "name": "wrapper",
         "step": h,
         "stop": round(max(float(w.run.time[-1] - w.run.time[0]) for w in runs) / h) * h,
-        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(use.fmu.path)}},
+        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(fmu.path)}},
         "connections": wires,
         "transformations": {target: {"factor": 1.0} for _, target in wires},
     }
@@ -112,31 +130,31 @@ def _plain(signal: str) -> str:
     return signal.replace(".", "_")
 
 
-def _lines(use: Use, columns: Mapping[str, Column]) -> dict[str, Line]:
+def _lines(fmu: Wrapped, columns: Mapping[str, Column]) -> dict[str, Line]:
     """Signal in SI by an FMU's variable."""
     found = {}
     for signal, c in columns.items():
-        unit = UNITS[{**use.quantity, **BESIDE}[signal]].get(c.unit or "", 1.0)
+        unit = UNITS[{**fmu.quantity, **BESIDE}[signal]].get(c.unit or "", 1.0)
         found[_plain(signal)] = Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
     return found
 
 
-def _start_values(use: Use) -> list[str]:
-    parameters = (use.fmu.model.variables[c.name] for c in use.map.told("start").values())
+def _start_values(fmu: Wrapped) -> list[str]:
+    parameters = (fmu.variables[c.name] for c in fmu.map.told("start").values())
     return [f"{FOREIGN}.{v.name}" for v in parameters if v.causality == "parameter"]
 
 
-def _map(use: Use) -> VariableMap:
+def _map(fmu: Wrapped) -> VariableMap:
     """The map of the container: commands in SI, all else as of the foreign FMU."""
 
     def inside(columns: Mapping[str, Column]) -> dict[str, Column]:
         return {s: c.model_copy(update={"name": f"{FOREIGN}.{c.name}"}) for s, c in columns.items()}
 
-    exposed = _start_values(use)
-    start = inside(use.map.told("start"))
+    exposed = _start_values(fmu)
+    start = inside(fmu.map.told("start"))
     return VariableMap(
-        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in use.map.told("inputs")},
-        outputs={**inside(use.map.told("outputs")), **use.map.fixed},
+        inputs={s: Column(name=f"{ADDED}.{_plain(s)}") for s in fmu.map.told("inputs")},
+        outputs={**inside(fmu.map.told("outputs")), **fmu.map.fixed},
         start={s: c for s, c in start.items() if c.name in exposed},
-        run_in=use.map.run_in,
+        run_in=fmu.map.run_in,
     )

@@ -13,13 +13,14 @@ called, in which unit it is, and how its axis lies::
         },
     }
 
-Columns that it does not name keep their names and SI units.
+Columns that it does not name keep their names and SI units. What each signal means:
+docs/measurements.md.
 """
 
 import codecs
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,7 @@ from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
 
-from .channels import BESIDE, outputs
-from .unit_factors import UNITS
+from .unit_check import UNITS
 
 MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
@@ -47,6 +47,20 @@ ALL = (*TAU, *THREE, *FIVE, *POWER)
 
 # Quantity of a described ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
+# Signal -> quantity, of what may be measured beside pose and commands.
+BESIDE = {
+    **dict.fromkeys(("u", "v", "x_dot", "y_dot", "speed"), "speed"),
+    "course": "angle",
+    "r": "rate",
+    **dict.fromkeys(("u_water", "v_water"), "speed"),
+    **dict.fromkeys(("a_x", "a_y"), "acceleration"),
+    "wind_speed": "speed",
+    "wind_direction": "angle",
+    "x_2": "length",
+    "y_2": "length",
+    "psi_2": "angle",
+}
+OUTPUTS = {"thrust": "force", "torque": "moment"}  # of an actuator
 QUANTITY = {
     "time": "time",
     "x": "length",
@@ -55,8 +69,9 @@ QUANTITY = {
     "tau_X": "force",
     "tau_Y": "force",
     "tau_N": "moment",
-} | dict.fromkeys((*THREE, *FIVE, *POWER), "command")
-QUANTITY |= BESIDE
+    **dict.fromkeys((*THREE, *FIVE, *POWER), "command"),
+    **BESIDE,
+}
 # Other names of signals that files use, without case, blanks and marks between words.
 CALLED: dict[str, tuple[str, ...]] = {
     "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
@@ -78,6 +93,23 @@ CALLED: dict[str, tuple[str, ...]] = {
     "wind_direction": ("truewinddirection", "twd"),
 }
 OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
+
+
+def outputs(commands: Iterable[str]) -> dict[str, str]:
+    """Outputs of a ship's actuators that may be measured -> quantity, for its ``ACTUATOR.COMMAND``."""
+    actuators = dict.fromkeys(name.partition(".")[0] for name in commands if "." in name)
+    return {f"{actuator}.{name}": q for actuator in actuators for name, q in OUTPUTS.items()}
+
+
+def quantities(commands: Mapping[str, str] | None) -> dict[str, str]:
+    """Signal -> quantity, of a described ship with its own commands (name -> unit) too."""
+    own = {name: OF_UNIT[unit] for name, unit in (commands or {}).items()}
+    return QUANTITY | outputs(own) | own
+
+
+def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
+    """The message about a unit that a signal cannot have."""
+    return f"'{unit[:SHOWN]}' is not a unit of {signal}{nearest(unit, units)}"
 
 
 class Column(BaseModel):
@@ -119,7 +151,7 @@ class Layout(BaseModel):
     def _is_trial(cls, value: str | None) -> str | None:
         if value is not None and value not in KINDS:
             hint = nearest(value, KINDS) or f"; there are {', '.join(KINDS)}"
-            raise ValueError(f"'{value[:SHOWN]}' is no manoeuvring trial{hint}")
+            raise ValueError(f"'{value[:SHOWN]}' is not a manoeuvring trial{hint}")
         return value
 
     @field_validator("encoding")
@@ -129,9 +161,8 @@ class Layout(BaseModel):
             "".encode(value)  # there are others than those of texts
             return codecs.lookup(value).name
         except (LookupError, UnicodeError):
-            raise ValueError(
-                f"'{value[:SHOWN]}' is no encoding; there are utf-8, latin-1, ..."
-            ) from None
+            text = f"'{value[:SHOWN]}' is not an encoding; there are utf-8, latin-1, ..."
+            raise ValueError(text) from None
 
     @field_validator("columns", mode="before")
     @classmethod
@@ -150,12 +181,10 @@ class Layout(BaseModel):
             if column.factor == 0.0:
                 raise ValueError(f"{key}.factor is not zero")
             own = QUANTITY | outputs([key])
-            every = [UNITS[own[key]]] if key in own else [UNITS[q] for q in OF_UNIT.values()]
-            units = [unit for table in every for unit in table]
+            possible = [own[key]] if key in own else OF_UNIT.values()
+            units = [unit for quantity in possible for unit in UNITS[quantity]]
             if column.unit is not None and column.unit not in units:
-                raise ValueError(
-                    f"'{column.unit[:SHOWN]}' is no unit of {key}{nearest(column.unit, units)}"
-                )
+                raise ValueError(no_unit(column.unit, key, units))
         return value
 
     def column(self, signal: str) -> Column:
@@ -175,58 +204,48 @@ def log_of(commands: Iterable[str]) -> Layout:
     return Layout(columns={signal: Column(name=name) for signal, name in names.items()})
 
 
-LOG = log_of(THREE)
-
-
-def log_layout(
-    folder: Path, names: Sequence[str], commands: Mapping[str, str] | None = None
-) -> Layout | None:
-    """The layout of the log of a run: by the roles that its scenario states, else by the usual names.
-
-    Args:
-        folder: of the run.
-        names: columns of its log.
-        commands: of a described ship, see :func:`signals`.
-
-    Returns:
-        None if it is no log of a ship.
-    """
-    if LOG.column("x").name in names:
-        return LOG if not commands else log_of(commands)
-    roles = read_options(folder).roles
-    named = dict(zip((*POSE, *TAU), roles.of("pose", "force"), strict=True))
-    if not set(named.values()) <= set(names):
-        return None
-    return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
-
-
 WITH_UNIT = re.compile(r"(.+?)\s*[\[(]\s*(\S+)\s*[\])]")
 
 
 def layout_of(
-    names: Sequence[str], units: Mapping[str, str], where: str, commands: Iterable[str] = ()
+    names: Sequence[str],
+    units: Mapping[str, str],
+    where: str,
+    commands: Mapping[str, str] | None = None,
+    folder: Path | None = None,
 ) -> Layout:
-    """The layout of a table that says itself in which units it is.
+    """The layout of a log by its usual names or the roles of its scenario, or of a table by its units.
 
     Args:
-        names: of its columns, which may end in a unit, as ``x [mm]``.
+        names: of the columns, which may end in a unit, as ``x [mm]``.
         units: column -> unit, where that is known otherwise; those of no signal do not count.
         where: what messages call the table.
-        commands: of a described ship.
+        commands: of a described ship, see :func:`signals`.
+        folder: in which it lies, where the run's scenario may be.
 
     Raises:
-        InputError: no unit of that signal.
+        InputError: a unit that the signal cannot have.
     """
-    known = {*QUANTITY, *commands, *outputs(commands)}
-    told = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
+    log = log_of(commands or THREE)
+    if log.column("x").name in names:
+        return log
+    if folder is not None:
+        named = dict(zip((*POSE, *TAU), read_options(folder).roles.of("pose", "force"), strict=True))
+        if set(named.values()) <= set(names):
+            return Layout(columns={signal: Column(name=name) for signal, name in named.items()})
+    known = quantities(commands)
+    stated = {name: (name, unit) for name, unit in units.items() if name in known and name in names}
     found = (WITH_UNIT.fullmatch(name.strip()) for name in names)
-    told |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
+    stated |= {m[1]: (name, m[2]) for name, m in zip(names, found, strict=True) if m and m[1] in known}
+    columns = {s: {"name": name, "unit": unit} for s, (name, unit) in stated.items()}
     try:
-        return Layout.model_validate(
-            {"columns": {s: {"name": n, "unit": u} for s, (n, u) in told.items()}}
-        )
+        return Layout.model_validate({"columns": columns})
     except ValidationError as error:
-        raise InputError(f"{where}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        raise InputError(f"{where}: {_text(error)}") from None
+
+
+def _text(error: ValidationError) -> str:
+    return error.errors()[0]["msg"].removeprefix("Value error, ")
 
 
 def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
@@ -238,7 +257,7 @@ def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
     factor = -column.factor if column.flip else column.factor
     units = UNITS[quantity]
     if column.unit is not None and column.unit not in units:
-        raise InputError(f"'{column.unit[:SHOWN]}' is no unit of {signal}{nearest(column.unit, units)}")
+        raise InputError(no_unit(column.unit, signal, units))
     with np.errstate(over="ignore"):  # an infinite number is no measurement, and counts as dropped
         return (factor * values + column.offset) * units.get(column.unit or "", 1.0)
 
@@ -259,8 +278,7 @@ def read_layout(path: Path) -> Layout | None:
         place = ".".join(str(part)[:SHOWN] for part in first["loc"])
         known = Column.model_fields if "columns" in first["loc"] else Layout.model_fields
         hint = nearest(str(first["loc"][-1]), known) if first["type"] == "extra_forbidden" else ""
-        text = first["msg"].removeprefix("Value error, ")
-        raise InputError(f"'{beside}': {place}: {text}{hint}") from None
+        raise InputError(f"'{beside}': {place}: {_text(error)}{hint}") from None
     except RecursionError:
         raise InputError(f"'{beside}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
@@ -287,10 +305,10 @@ def signals(
     every = COMMANDS if commands is None else (tuple(commands), TAU)
     groups: list[tuple[str, ...]] = [g for g in every if any(layout.column(s).name in names for s in g)]
     if commands is not None:
-        known = {*QUANTITY, *commands, *outputs(commands)}
-        for signal in layout.columns:
-            if signal not in known:
-                raise InputError(f"{where}: '{signal[:SHOWN]}' is no signal{nearest(signal, known)}")
+        known = quantities(commands)
+        strange = next((signal for signal in layout.columns if signal not in known), None)
+        if strange:
+            raise InputError(f"{where}: '{strange[:SHOWN]}' is not a signal{nearest(strange, known)}")
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
         told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'
@@ -300,12 +318,12 @@ def signals(
         )
     if FIVE in groups and any(layout.column(s).name in names for s in POWER):
         groups.append(POWER)
-    ours = layout is LOG or (commands is not None and layout == log_of(commands))
-    named = [signal for signal in layout.columns if not ours]
-    beside = [
-        s for s in (*BESIDE, *outputs(commands or ())) if layout.column(s).name in names and not ours
-    ]
-    wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g], *named, *beside])
+    wanted = dict.fromkeys(["time", *POSE, *[s for g in groups for s in g]])
+    named: Collection[str] = ()
+    if layout != log_of(commands or THREE):  # of a log of ours only what a ship would measure is read
+        named = layout.columns.keys()
+        others = [s for s in (*BESIDE, *outputs(commands or ())) if layout.column(s).name in names]
+        wanted |= dict.fromkeys((*named, *others))
     others = [name for name in names if name not in {layout.column(s).name for s in wanted}]
     for signal in list(wanted):
         name = layout.column(signal).name

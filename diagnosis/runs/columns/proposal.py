@@ -9,25 +9,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim import InputError
-from cosim.errors import nearest
 from fmus.ship import Ship, ship
 
 from ..cleaning import in_order, lost, repeated
 from ..files.reading import Run, column_names, read
 from ..files.text_layout import bare_unit, table_cells, text_layout
-from .channels import outputs
 from .columns import (
     CALLED,
-    LOG,
-    OF_UNIT,
     OPPOSITE,
     QUANTITY,
+    THREE,
     UNITS,
     UTF_8,
     WITH_UNIT,
     Column,
     Layout,
     log_of,
+    no_unit,
+    quantities,
     signals,
 )
 from .unit_check import OFTENEST, RAREST, doubts, likely_unit
@@ -75,8 +74,8 @@ class Proposal(NamedTuple):
 
     @property
     def needed(self) -> dict[str, Any]:
-        """What has to be told, as JSON holds it; a log of this project needs nothing."""
-        if self.layout.column("x") == LOG.column("x"):
+        """What has to be stated, as JSON holds it; a log of this project needs nothing."""
+        if self.layout.column("x") == log_of(()).column("x"):
             return {}
         told = self.layout.model_dump(exclude_defaults=True)
         for signal, column in told.get("columns", {}).items():
@@ -96,10 +95,9 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
             without a column.
     """
     of = of or ship()
-    commands = of.commands or {}
-    quantity = QUANTITY | outputs(commands) | {name: OF_UNIT[unit] for name, unit in commands.items()}
+    quantity = quantities(of.commands)
     if path.suffix not in (".csv", ".parquet") or path.is_dir():
-        raise InputError(f"'{path}' is no CSV or Parquet file, of which columns can be told")
+        raise InputError(f"'{path}' is not a CSV or Parquet file, whose columns have names")
     text = Layout()
     if path.is_file() and path.suffix == ".csv":
         encoding = _encoding(path)
@@ -110,12 +108,11 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
     elif not path.is_file():
         read(path, of=of)  # says so
     names = column_names(path, text)
-    if LOG.column("x").name in names:
-        log = log_of(commands) if commands else LOG
+    log = log_of(of.commands or THREE)
+    if log.column("x").name in names:
         return Proposal(log, [], read(path, log, of))
     units = _units_line(path, text) if text.units_line else [""] * len(names)
     columns = _columns(path, names, units, quantity)
-    told = {signal for signal, column in columns.items() if column.unit}
     layout = text.model_copy(update={"columns": columns})
     unused = [name for name in names if name not in {layout.column(s).name for s in quantity}]
     try:
@@ -125,7 +122,7 @@ def propose(path: Path, of: Ship | None = None) -> Proposal:
         raise InputError(f"{error}{more}") from None
     run = read(path, layout, of)
     for signal, unit in _seen_units(run):
-        if signal not in told:
+        if not layout.column(signal).unit:
             columns[signal] = layout.column(signal).model_copy(update={"unit": unit})
     needed = {s: c for s, c in columns.items() if c != Column(name=s)}
     layout = text.model_copy(update={"columns": needed})
@@ -171,9 +168,7 @@ def _columns(
             continue
         known = UNITS[quantity[signal]]
         if unit not in NO_UNIT and unit not in known:
-            raise InputError(
-                f"'{path}': '{unit}' in the column '{name}' is no unit of {signal}{nearest(unit, known)}"
-            )
+            raise InputError(f"'{path}', column '{name}': {no_unit(unit, signal, known)}")
         is_si = known.get(unit, 1.0) == 1.0
         columns[signal] = Column(name=name, unit=None if is_si else unit, flip=flip)
     return columns
@@ -181,9 +176,10 @@ def _columns(
 
 def _seen_units(run: Run) -> Iterable[tuple[str, str]]:
     """Signals that seem to be in another unit, and in which."""
-    rows = in_order(run.time) if np.isfinite(run.time).any() else np.array([], int)
-    run = run.rows(rows)
-    apart = float(np.median(np.diff(run.time))) if rows.size > 1 else 1.0
+    if not np.isfinite(run.time).any():
+        return
+    run = run.rows(in_order(run.time))
+    apart = float(np.median(np.diff(run.time))) if run.time.size > 1 else 1.0
     unit = likely_unit(apart) if not OFTENEST < apart < RAREST else None
     if unit:
         yield "time", unit

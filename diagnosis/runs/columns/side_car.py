@@ -54,86 +54,61 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
         unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
-        flip = column.flip != (sign < 0.0)
-        other = {"name": name or column.name, "unit": unit, "factor": column.factor, "flip": flip}
-        other["noise"] = column.noise
-        other["offset"] = sign * column.offset
+        changed = {"name": name or column.name, "flip": column.flip != (sign < 0.0)}
+        changed |= {"unit": unit, "offset": sign * column.offset}
         if unit is None:
-            other |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
+            changed |= {"unit": column.unit, "factor": float(f"{column.factor * factor:.4g}")}
         if offset:
-            other["offset"] += float(f"{offset / units.get(unit or '', 1.0):.4g}")
-        columns[signal] = Column.model_validate(other).model_dump(exclude_defaults=True)
+            changed["offset"] += float(f"{offset / units.get(unit or '', 1.0):.4g}")
+        columns[signal] = Column.model_validate(column.model_dump() | changed).model_dump(
+            exclude_defaults=True
+        )
         if columns[signal].get("unit") in SI:
             del columns[signal]["unit"]
     return f"; {_line(path, {'columns': columns})}"
 
 
-def _line(path: Path, told: Mapping[str, Any]) -> str:
-    return f"put {json.dumps(told)} into '{path}.json'"
+def _line(path: Path, content: Mapping[str, Any]) -> str:
+    return f"put {json.dumps(content)} into '{path}.json'"
 
 
-def refuse_separator(path: Path, header: str) -> None:
-    """Refuse a CSV file whose one column is a row of cells, between other separators.
-
-    Raises:
-        InputError: with the line that tells the separator.
-    """
-    found = text_layout(path, UTF_8)
-    if found is None or found.separator == Layout().separator:
-        return
-    raise InputError(
-        f"'{path}' has a single column, '{header[:SHOWN]}': its cells seem to be separated by "
-        f"{found.separator!r}; {_line(path, found.model_dump(exclude_defaults=True))}"
-    )
-
-
-def _put(path: Path, layout: Layout, **changes: Any) -> str:
+def _changed(path: Path, layout: Layout, **changes: Any) -> str:
     """What to put into the file beside a measurement, with what it says now."""
     return _line(path, layout.model_dump(exclude_defaults=True) | changes)
 
 
 def refuse_encoding(path: Path, layout: Layout) -> None:
-    """Refuse a CSV file whose text is not UTF-8, unless another encoding was told.
-
-    Raises:
-        InputError: with the line that tells the encoding that it may have.
-    """
-    content = path.read_bytes()
-    if layout.encoding == UTF_8 and b"\0" not in content:
-        line = _put(path, layout, encoding="latin-1")
-        raise InputError(f"'{path}' is no text in UTF-8; if it is in Latin-1, {line}")
+    """Refuse a CSV file whose text is not UTF-8, with the line that states the encoding it may have."""
+    if layout.encoding == UTF_8 and b"\0" not in path.read_bytes():
+        line = _changed(path, layout, encoding="latin-1")
+        raise InputError(f"'{path}' is not a text in UTF-8; if it is in Latin-1, {line}")
 
 
-def refuse_preamble(path: Path, layout: Layout, names: Sequence[str]) -> None:
-    """Refuse a CSV file whose names of columns are in a later line than was told.
-
-    Raises:
-        InputError: with the line that tells where they are.
-    """
+def refuse_layout(path: Path, layout: Layout, names: Sequence[str]) -> None:
+    """Refuse a CSV file with another separator or line of names than stated, with the line that does."""
     if layout.column("time").name in names:
         return
     found = text_layout(path, layout.encoding)
     if found is None or (found.skip, found.separator) == (layout.skip, layout.separator):
         return
-    line = _put(path, layout, **found.model_dump(exclude_defaults=True))
-    raise InputError(f"'{path}' has the names of its columns in line {found.skip + 1}; {line}")
+    seen = f"has the names of its columns in line {found.skip + 1}"
+    if found.separator != layout.separator:
+        seen = f"has cells that seem to be separated by {found.separator!r}"
+    line = _changed(path, layout, **found.model_dump(exclude_defaults=True))
+    raise InputError(f"'{path}' {seen}; {line}")
 
 
 def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
-    """Refuse a CSV file with a line of units below the names, unless that was told.
-
-    Raises:
-        InputError: with the line that tells it.
-    """
+    """Refuse a CSV file with a line of units below the names, unless that was stated."""
     cells = table.drop(columns=layout.column("time").name, errors="ignore").head(2).astype("string")
     numbers = cells.apply(lambda column: pd.to_numeric(column.str.replace(",", "."), errors="coerce"))
     if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
         return
     if numbers.iloc[0].isna().all():
         shown = ", ".join(cells.iloc[0])[:SHOWN]
-        told = _put(path, layout, units_line=True)
         raise InputError(
-            f"'{path}' has a line of units below the names ({shown}); {told}, with the units of "
+            f"'{path}' has a line of units below the names ({shown}); "
+            f"{_changed(path, layout, units_line=True)}, with the units of "
             'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
         )
 
@@ -142,4 +117,4 @@ def decimal_comma(path: Path, layout: Layout, cell: str) -> str:
     """The end of a message about a cell that is no number: what to do if it is one such as 0,5."""
     if not DECIMAL_COMMA.fullmatch(cell.strip()):
         return ""
-    return f"; if a comma begins the decimals, {_put(path, layout, decimal=',')}"
+    return f"; if a comma begins the decimals, {_changed(path, layout, decimal=',')}"

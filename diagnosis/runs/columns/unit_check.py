@@ -1,6 +1,7 @@
-"""Units that a run cannot be in, whatever the ship."""
+"""Units of columns: their factors to SI, and those that a run cannot be in, whatever the ship."""
 
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -9,8 +10,22 @@ import numpy as np
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
-from .unit_factors import UNITS
-
+# Quantity -> unit -> factor to SI.
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254},
+    "angle": {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
+    "command": {"1": 1.0, "%": 1e-2},
+    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
+    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0},
+    "rate": {"rad/s": 1.0}
+    | dict.fromkeys(("deg/s", "°/s"), math.pi / 180.0)
+    | {"deg/min": math.pi / 10800.0},
+    "acceleration": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
+    "angular acceleration": {"rad/s2": 1.0, "deg/s2": 0.017453292519943295},
+}
 GO_ON = "--anyway goes on all the same"
 # s between two samples of a measurement, by which a unit of time is guessed (chosen)
 USUAL = 1e-3, 1.0
@@ -24,10 +39,18 @@ FARTHEST = 1e9  # m, rad; beyond is no place on earth
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 
 
+class Doubt(NamedTuple):
+    """Signals that seem to be in another unit: which, in which, and why."""
+
+    signals: tuple[str, ...]
+    unit: str
+    reason: str
+
+
 def refuse_time(
     row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = REFERENCE
 ) -> None:
-    """Refuse a time in another unit than said.
+    """Refuse a time in another unit than stated.
 
     Args:
         row: median time between two rows [s].
@@ -39,40 +62,42 @@ def refuse_time(
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
     """
-    rarest = RAREST * scale.time
-    if row > rarest or row < OFTENEST:
-        much = "rare" if row > rarest else "frequent"
+    rare = row > RAREST * scale.time
+    if rare or row < OFTENEST:
         unit = likely_unit(row)
-        told = f" {_say(('time',), unit, called)}" if unit else ""
+        remedy = f" {_remedy(('time',), unit, called)}" if unit else ""
         raise InputError(
-            f"{where}: a sample each {row:.4g} s is too {much}; is the time in another unit?{told}"
+            f"{where}: a sample each {row:.4g} s is too {'rare' if rare else 'frequent'}; "
+            f"is the time in another unit?{remedy}"
         )
     if seconds > LONGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
 
 
-def _refuse_nowhere(pose: np.ndarray, where: str) -> None:
-    """Refuse a pose that is nowhere."""
-    far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
-    if far > FARTHEST:
-        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
-
-
-class Doubt(NamedTuple):
-    """Signals that seem to be in another unit: which, in which, and why."""
-
-    signals: tuple[str, ...]
-    unit: str
-    reason: str
-
-
-def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
-    """Units that no ship's motion can be in.
+def refuse_units(
+    time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
+) -> None:
+    """Refuse units of a pose that no ship's motion can be in.
 
     Args:
         time: (n,) [s].
-        pose: (n, 3), as it was read, of samples that are valid.
+        pose: (n, 3), as it was read.
+        where: what messages call the run.
+        anyway: whether every speed is accepted.
+        called: signal -> its column in the file, where that has another name.
+
+    Raises:
+        InputError: it goes or turns too fast, or is nowhere on earth.
     """
+    far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
+    if far > FARTHEST:
+        raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
+    for signals, unit, reason in () if anyway else doubts(time, pose):
+        raise InputError(f"{where} {reason} {_remedy(signals, unit, called)}; {GO_ON}")
+
+
+def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
+    """Units that no ship's motion can be in, of a pose (n, 3) as it was read at valid times (n,) [s]."""
     second = np.searchsorted(time, time + 1.0)
     second = second[second < time.size]
     dt = time[second] - time[: second.size]
@@ -81,37 +106,18 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
     if speed > FASTEST:
         yield Doubt(("x", "y"), "mm", f"goes {speed:.3g} m/s: is its position in mm?")
     psi = pose[:, 2]
-    if float(np.quantile(np.abs(psi), 0.9)) <= TURN:
+    reach = float(np.quantile(np.abs(psi), 0.9))
+    if reach <= TURN:
         return
     jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
     turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
-    if turn > QUICKEST or (jumps.any() and float(np.quantile(np.abs(psi), 0.9)) < 365.0):
+    if turn > QUICKEST or (jumps.any() and reach < 365.0):
         reason = f"turns at {turn:.3g} rad/s or jumps by 360: is its heading in deg?"
         yield Doubt(("psi",), "deg", reason)
 
 
-def refuse_units(
-    time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
-) -> None:
-    """Refuse units that no ship's motion can be in.
-
-    Args:
-        time: (n,) [s].
-        pose: (n, 3), as it was read.
-        where: what messages call the run.
-        anyway: whether every speed is believed.
-        called: signal -> its column in the file, where that has another name.
-
-    Raises:
-        InputError: it goes or turns too fast, or is nowhere.
-    """
-    _refuse_nowhere(pose, where)
-    for signals, unit, reason in () if anyway else doubts(time, pose):
-        raise InputError(f"{where} {reason} {_say(signals, unit, called)}; {GO_ON}")
-
-
-def _say(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
-    """The line that tells a unit."""
+def _remedy(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str:
+    """The line that states a unit."""
     columns = {s: {"name": called.get(s, s), "unit": unit} for s in signals}
     return f"Then put {json.dumps({'columns': columns})} into the .json file beside it"
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
 from cosim import InputError
 
@@ -25,6 +24,8 @@ def read_matlab(path: Path) -> dict[str, np.ndarray]:
         InputError: not such a file.
     """
     try:
+        from scipy.io import loadmat  # most runs are no MATLAB files
+
         data = np.asarray(loadmat(path)[MATLAB], float)
         if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop or not data.size:
             raise ValueError(f"a matrix of shape {data.shape}")

@@ -5,10 +5,10 @@ Read are CSV and Parquet with the columns ``time``, ``x``, ``y``, ``psi`` and co
 files that NTNU publishes of CyberShip Enterprise 1.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,30 +19,26 @@ from cosim.results import read_options
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
 
-from ..columns.channels import BESIDE, outputs
 from ..columns.columns import (
     ALL,
+    BESIDE,
     FIVE,
-    LOG,
-    OF_UNIT,
     POSE,
     POWER,
-    QUANTITY,
     TAU,
     THREE,
+    Column,
     Layout,
     layout_of,
-    log_layout,
-    log_of,
+    outputs,
+    quantities,
     read_layout,
     signals,
     to_si,
 )
-from ..columns.side_car import refuse_preamble, refuse_separator, refuse_units
-from ..columns.unit_factors import UNITS
-from .csv_tables import csv_names, csv_table
+from ..columns.unit_check import UNITS
 from .matlab_files import read_matlab
-from .table_cells import date_stamps, numbers
+from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
@@ -69,7 +65,7 @@ class Run:
         file: that it was read from; None if it was not.
         absent: commands that have no column, and are taken as zero.
         signals: names of ``commands``; of a run with the force alone of those that it is allocated to.
-        measured: beside the pose: signal of :mod:`.channels` -> (n,) in SI, NaN where it is missing.
+        measured: beside the pose: signal of :mod:`.columns` -> (n,) in SI, NaN where it is missing.
         noise: signal -> standard deviation that the file beside tells [SI].
         ship: that was measured; None: CyberShip Enterprise 1.
         trial: kind of manoeuvring trial that it is, such as zigzag; None: it is none.
@@ -106,13 +102,16 @@ class Run:
         return replace(self, **kept, measured={s: c[keep] for s, c in self.measured.items()})
 
 
-def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None) -> Run:
+def read(
+    path: str | Path, layout: Layout | None = None, of: Ship | None = None, also: Iterable[str] = ()
+) -> Run:
     """A measured run.
 
     Args:
         path: a ``.csv``, ``.parquet`` or ``.mat`` file, or the folder of a log.
         layout: in place of what the file beside it says.
         of: the ship that was measured; None: CyberShip Enterprise 1.
+        also: names of other columns [SI] that are kept in :attr:`Run.measured` where there are such.
 
     Raises:
         InputError: absent, unreadable, a column missing, or commands in another unit.
@@ -126,30 +125,70 @@ def read(path: str | Path, layout: Layout | None = None, of: Ship | None = None)
     elif not path.is_file():
         near = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(f"no such measurement: '{path}'{nearest(path.name, near)}")
-    name = path.absolute().parent.name if path.name in LOGS else path.stem
+    is_log = path.name in LOGS
+    name = path.absolute().parent.name if is_log else path.stem
     of = of or ship()
-    is_matlab = path.suffix == ".mat" and of.commands is None
-    if is_matlab:
+    if path.suffix == ".mat" and of.commands is None:
         return replace(_run(name, read_matlab(path), f"'{path}'", of), file=path)
-    table = _tabular(path, layout, of.commands)
-    run = replace(_of_table(name, table, f"'{path}'", of), file=path)
-    told = read_options(path.parent).trial if path.name in LOGS else None
+    table, layout = _tabular(path, layout, of, set(also))
+    run = replace(_of_table(name, table, layout, path, f"'{path}'", of), file=path)
+    others = {n: pd.to_numeric(table[n], errors="coerce") for n in also if n in table}
+    run = replace(run, measured={**run.measured, **{n: np.asarray(c, float) for n, c in others.items()}})
+    told = read_options(path.parent).trial if is_log else None
     return run if told is None else replace(run, trial=told.kind)
 
 
-class _Table(NamedTuple):
-    """Signals of a table in SI, names of their columns where these are others, and their noise [SI]."""
+def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None) -> Run:
+    """A measured run in a table.
 
-    columns: dict[str, np.ndarray]
-    called: dict[str, str]
-    noise: dict[str, float]
-    trial: str | None
+    Args:
+        frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
+            log of a run, :func:`cosim.log_frame`.
+        name: of the run.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
+
+    Raises:
+        InputError: a column is missing, or commands are in another unit.
+    """
+    of = of or ship()
+    where, names = f"the table '{name}'", [str(column) for column in frame.columns]
+    layout = layout_of(names, frame.attrs.get("units", {}), where, of.commands)
+    return _of_table(name, frame.set_axis(names, axis=1), layout, Path(name), where, of)
 
 
-def _of_table(name: str, table: _Table, where: str, of: Ship) -> Run:
+def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tuple[pd.DataFrame, Layout]:
+    """What is needed of a CSV or Parquet file, and which column is which signal."""
+    given = layout or read_layout(path)
+    try:
+        names = column_names(path, given or Layout())
+        layout = given or layout_of(names, {}, f"'{path}'", of.commands, path.parent)
+        wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of.commands)}
+        return table_of_file(path, layout, wanted | also.intersection(names)), layout
+    except ImportError:
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+    except InputError:
+        raise
+    except Exception as error:  # a broken file makes the readers stumble in many ways
+        text = " ".join(str(error).split())
+        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
+
+
+def _of_table(name: str, table: pd.DataFrame, layout: Layout, path: Path, where: str, of: Ship) -> Run:
     """A run of a table's signals."""
-    run = _run(name, table.columns, where, of)
-    return replace(run, called=table.called or None, noise=table.noise, trial=table.trial)
+    columns, noise, called, quantity = {}, {}, {}, quantities(of.commands)
+    for signal in signals(layout, list(table.columns), where, of.commands):
+        column = layout.column(signal)
+        cells = table[column.name]
+        values = date_stamps(cells, f"'{path}'") if signal == "time" else None
+        if values is None:
+            values = to_si(numbers(cells, path, layout), signal, column, quantity[signal])
+        columns[signal] = values
+        if column.noise is not None:
+            noise[signal] = column.noise * UNITS[quantity[signal]].get(column.unit or "", 1.0)
+        if column.name != signal:
+            called[signal] = column.name
+    run = _run(name, columns, where, of)
+    return replace(run, called=called or None, noise=noise, trial=layout.trial)
 
 
 def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run:
@@ -179,17 +218,15 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         tau = of.commanded_force(commands, power)
     notes = (f"commands are missing in {lost} columns, and held",) if lost else ()
     notes += tuple(f"no column {signal}: it is taken as zero" for signal in absent)
-    pose = np.column_stack([columns[s] for s in POSE])
-    held = np.any(missing, axis=0) if lost else None
     return Run(
         name,
         columns["time"],
-        pose,
+        np.column_stack([columns[s] for s in POSE]),
         tau,
         commands,
         power,
         notes,
-        held,
+        held=np.any(missing, axis=0) if lost else None,
         absent=absent,
         signals=own,
         ship=of.description,
@@ -205,86 +242,15 @@ def _held(commands: np.ndarray | None) -> np.ndarray | None:
     return pd.DataFrame(finite).ffill().fillna(0.0).to_numpy()
 
 
-def _tabular(path: Path, layout: Layout | None, commands: Mapping[str, str] | None) -> _Table:
-    """Signals of a CSV or Parquet file."""
-    given = layout or read_layout(path)
-    try:
-        names = column_names(path, given or Layout())
-        if given is None and len(names) == 1:
-            refuse_separator(path, names[0])
-        layout = given or log_layout(path.parent, names, commands)
-        layout = layout or layout_of(names, {}, f"'{path}'", commands or ())
-        wanted = signals(layout, names, f"'{path}'", commands)
-        table = _table(path, layout, list(dict.fromkeys(layout.column(s).name for s in wanted)))
-    except ImportError:
-        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
-    except InputError:
-        raise
-    except Exception as error:  # a broken file makes the readers stumble in many ways
-        text = " ".join(str(error).split())
-        raise InputError(f"'{path}' cannot be read as a table: {text}") from None
-    return _signals(table, layout, wanted, path, commands or {})
+def table_of(run: Run) -> pd.DataFrame:
+    """All that was measured and commanded, by its own names and in SI, as :func:`read` takes it."""
+    pose = dict(zip(POSE, run.pose.T, strict=True))
+    return pd.DataFrame({"time": run.time, **pose, **run.commanded, **run.measured})
 
 
-def read_frame(frame: pd.DataFrame, name: str = "frame", of: Ship | None = None) -> Run:
-    """A measured run in a table.
-
-    Args:
-        frame: columns as in a file, units in their names (``x [mm]``) or in ``attrs["units"]``; or the
-            log of a run, :func:`cosim.log_frame`.
-        name: of the run.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
-
-    Raises:
-        InputError: a column is missing, or commands are in another unit.
-    """
-    of = of or ship()
-    where, names = f"the table '{name}'", [str(column) for column in frame.columns]
-    frame = frame.set_axis(names, axis=1)
-    is_log = LOG.column("x").name in names
-    log = LOG if of.commands is None else log_of(of.commands)
-    layout = log if is_log else layout_of(names, frame.attrs.get("units", {}), where, of.commands or ())
-    wanted = signals(layout, names, where, of.commands)
-    return _of_table(name, _signals(frame, layout, wanted, Path(name), of.commands or {}), where, of)
-
-
-def _signals(
-    table: pd.DataFrame,
-    layout: Layout,
-    wanted: Sequence[str],
-    path: Path,
-    commands: Mapping[str, str],
-) -> _Table:
-    columns, noise = {}, {}
-    quantities = QUANTITY | outputs(commands) | {s: OF_UNIT[unit] for s, unit in commands.items()}
-    for signal in wanted:
-        column = layout.column(signal)
-        cells = table[column.name]
-        stamps = date_stamps(cells, f"'{path}'") if signal == "time" else None
-        if stamps is None:
-            columns[signal] = to_si(numbers(cells, path, layout), signal, column, quantities[signal])
-        else:
-            columns[signal] = stamps
-        if column.noise is not None:
-            noise[signal] = column.noise * UNITS[quantities[signal]].get(column.unit or "", 1.0)
-    called = {s: layout.column(s).name for s in wanted if layout.column(s).name != s}
-    return _Table(columns, called, noise, layout.trial)
-
-
-def column_names(path: Path, layout: Layout) -> list[str]:
-    """The names of the columns of a CSV or Parquet file."""
-    if path.suffix == ".parquet":
-        from pyarrow import parquet
-
-        return list(parquet.read_schema(path).names)
-    names = csv_names(path, layout)
-    refuse_preamble(path, layout, names)
-    return names
-
-
-def _table(path: Path, layout: Layout, wanted: list[str]) -> pd.DataFrame:
-    if path.suffix == ".parquet":
-        return pd.read_parquet(path, columns=wanted)
-    table = csv_table(path, layout, wanted)
-    refuse_units(path, layout, table)
-    return table
+def layout_beside(run: Run) -> dict[str, Any]:
+    """The file beside that table: noise, and what the one beside the run's own file says of the run."""
+    before = None if run.file is None else read_layout(run.file)
+    kept = (before or Layout()).model_dump(exclude_defaults=True, include={"trial"})
+    columns = {name: Column(name=name, noise=std) for name, std in run.noise.items()}
+    return kept | Layout(columns=columns).model_dump(exclude_defaults=True)

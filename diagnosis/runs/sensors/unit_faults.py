@@ -9,7 +9,7 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 from fmus.scale import Scale
 
 from ..columns.columns import POSE
-from ..columns.unit_factors import UNITS
+from ..columns.unit_check import UNITS
 from ..files.reading import Run
 from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, spread_of
 from .sensor_finding import Examined, SensorFinding

@@ -154,14 +154,12 @@ def without_commands(run: Smoothed, pose: np.ndarray | None = None) -> Motion:
 
     Args:
         run: a smoothed run.
-        pose: (n, 3), that of the run by default; another one is judged anew.
+        pose: (n, 3), in place of the run's; the spline is as stiff as that of the run.
     """
-    if pose is None:
-        rows, weights, stiffness, smoothness = run.pose_only
-        p, origin = _problem(run.track, rows)
-        p = p.adapted(stiffness=stiffness)
-    else:
-        _, _, origin, (p, smoothness, weights, _) = _judged(replace(run.track, pose=pose))
+    rows, weights, stiffness, smoothness = run.pose_only
+    track = run.track if pose is None else replace(run.track, pose=pose)
+    p, origin = _problem(track, rows)
+    p = p.adapted(stiffness=stiffness)
     grid, time = p.spline.grid, run.time - run.time[0]
     where = within(grid, time)
     coefficients = solve(p, smoothness, weights).coefficients

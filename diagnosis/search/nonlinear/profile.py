@@ -9,11 +9,12 @@ none.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from ...predictors.ship_model import parameter_and_run
 from ..conclusion import AcceptedEffect
@@ -34,8 +35,7 @@ COARSER = 30.0  # times the step of a slope, with which it is compared: 3 % of t
 ROUGH = 0.5  # share of itself by which a slope that means something differs between the two steps
 REACH = 1.5  # factor to both sides within which the best value is looked for
 TRIALS = 16  # of that search, at the most
-FINEST = 1e-3  # of the value: the first step away from it
-BISECTIONS = 6  # of the step at which the cost passes the limit
+FINEST = 0.01  # of REACH, to which the ends of an interval are found
 
 Interval = tuple[float, float]
 
@@ -65,7 +65,8 @@ def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate,
     value = best.estimate.values[name]
     start = at.start.value(name)
     size = max(abs(start + value), SMALLEST_SCALE * at.start.unit(name))
-    low, high = (_end(trial, best.cost, start + value, sign * size) for sign in (-1.0, 1.0))
+    present = start + value
+    low, high = (_end(trial, best.cost, present, present + k * REACH * size) for k in (-1.0, 1.0))
     own = [at.fitted.index(n) for n in p.names if n in at.fitted and n != name]
     precision = np.asarray(block_diag(best.estimate.precision, at.precision[own][:, own]))
     last = replace(best.estimate, precision=precision, held=at.held | {name})
@@ -92,6 +93,7 @@ def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Call
     nuisance = nuisance_of(t, beside, t.error(beside))
     others = [n for n in p.names if n != name]
 
+    @cache
     def trial(value: float) -> Refined:
         held = bounded(at.start, name, value - at.start.value(name))
         values: Mapping[str, float] = {**{n: at.values[n] for n in p.names}, name: held}
@@ -100,18 +102,12 @@ def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Call
     return trial
 
 
-def _end(trial: Callable[[float], Refined], least: float, value: float, size: float) -> float:
-    """Where the cost passes its least by LIKELY, on the side of a value that its size is on."""
-    inside, step = value, FINEST * size
-    while abs(step) < REACH * abs(size):
-        if trial(value + step).cost > least + LIKELY:
-            break
-        inside, step = value + step, 2.0 * step
-    outside = value + step
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (inside + outside)
-        if trial(middle).cost > least + LIKELY:
-            outside = middle
-        else:
-            inside = middle
-    return outside
+def _end(trial: Callable[[float], Refined], least: float, value: float, end: float) -> float:
+    """Where the cost passes its least by LIKELY between a value and an end; the end if nowhere."""
+
+    def beyond(x: float) -> float:
+        return trial(x).cost - least - LIKELY
+
+    if beyond(end) <= 0.0:
+        return end
+    return float(brentq(beyond, value, end, xtol=FINEST * abs(end - value)))  # pyright: ignore

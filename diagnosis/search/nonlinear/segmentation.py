@@ -32,21 +32,20 @@ from fmus.scale import Scale
 from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
 from ...predictors.weak_form import EVERY, OVERLAP, thrust_along
+from ..most_likely import ENOUGH, NORMAL_95, STEPS, ridge
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
 CELL, CELLS = 0.1, 50_000
 DECIMALS = 6  # of a time [s], so that it reads as it was meant
 MOVES = (20, 5, 1)  # cells by which change points are moved, the coarse first
-ROUNDS = 8  # of programming and fitting, and of moves, at the most; three are usual
-LIKELY = 3.84  # of cost above the least: the 95 % quantile of chi^2 with one degree of freedom
+LIKELY = NORMAL_95**2  # of cost above the least: the 95 % quantile of chi^2, one degree of freedom
 
 SETTLED = 0.95  # share of the noise by which it must still fall for another round; chosen
 FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
 # Share of the time at work of a thruster in a run in which it fails at the most: what is so most of the
 # time is the rule and no failure, such as a dead band of small commands; chosen.
 EXCEPTION = 0.5
-RIDGE = 1e-9  # relative: collinear nuisance parameters share what they explain
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -184,7 +183,7 @@ class Problem:
     @cached_property
     def _information(self) -> tuple[np.ndarray, bool]:
         H = self.nuisance.T @ self.nuisance + self.precision
-        return cho_factor(H + RIDGE * np.diag(np.diag(H) + self.unit**-2.0))
+        return cho_factor(H + ridge(H, self.unit))
 
     def cost(self, spans: Spans) -> float:
         """What is minimised; an end beyond the data of a run is no change point."""
@@ -197,14 +196,14 @@ def segmented(p: Problem, start: Spans | None = None) -> Spans:
     best = moved(p, start or [])
     least = p.cost(best)
     whole = np.asarray(p.columns.sum(axis=1)).ravel()
-    for _ in range(ROUNDS):
+    for _ in range(STEPS):
         left = p.left(best)
         # With b held where it is: the error were there no interval, and what it falls by in each window.
         before = p.fitted(left)[0] + p.y - left
         gain = (2.0 * before * whole - whole**2).reshape(-1, 3).sum(axis=1)
         found = moved(p, [span for s in p.sections for span in programmed_in(p, s, gain)])
         cost = p.cost(found)
-        if cost > least - 1e-6:
+        if cost > least - ENOUGH:
             break
         best, least = found, cost
     return best
@@ -228,7 +227,7 @@ def intervals(p: Problem) -> Spans:
     """
     spans: Spans = []
     sigma = np.full(3, np.inf)
-    for _ in range(ROUNDS):
+    for _ in range(STEPS):
         left = p.fitted(p.left(spans))[0].reshape(-1, 3)
         smaller = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
         if (smaller > SETTLED * sigma).all():
@@ -289,7 +288,7 @@ def moved(p: Problem, spans: Spans) -> Spans:
     """Intervals with change points moved one by one while the cost falls."""
     least = p.cost(spans)
     for size in MOVES:
-        for _ in range(ROUNDS):
+        for _ in range(STEPS):
             before = least
             for k in reversed(range(len(spans))):
                 if k < len(spans):

@@ -100,6 +100,8 @@ def _steps(motion: Linear, push: Push) -> tuple[np.ndarray, np.ndarray]:
     A = np.zeros((*motion.slope.shape[:2], 9, 9))
     A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass
     A[..., 6:, 6:] = -np.diag(1.0 / push.time)
+    if not push.size.any():
+        return _exponential(motion.every * A), np.zeros_like(A)
     rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
     added = np.zeros_like(A)
     for x, weight in zip(*np.polynomial.legendre.leggauss(GAUSS), strict=True):

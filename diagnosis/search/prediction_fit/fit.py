@@ -1,4 +1,4 @@
-"""Fit to predictions: Gauss-Newton steps on windows of the ship's length, of half and of twice that.
+"""Fit to predictions in windows of the ship's length, of half and of twice that.
 
 The fit minimises
 
@@ -21,7 +21,7 @@ S the covariance at hand, and the posterior has the covariance
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -31,16 +31,13 @@ from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
 from ..candidates import SMALL, model_error
-from ..map_regression import ridge
+from ..most_likely import STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
-from ..refinement import HALVINGS, SMALLEST_SCALE, Estimate
+from ..refinement import SMALLEST_SCALE, Estimate
 from .disturbance import NO_PUSH, Push, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
-STEPS = 6  # of Gauss-Newton, at the most
-ENOUGH = 0.1  # of cost, which is twice a log likelihood, that a step may still gain
 ROUNDING = 1e-10  # of the largest variance in a window
-POWERS = 5  # iterations of k, which changes by less than 1 % after three
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +95,7 @@ class Information:
     def power(self, P: np.ndarray) -> float:
         """k, for a prior precision P (q, q)."""
         k = 1.0
-        for _ in range(POWERS):
+        for _ in range(STEPS):
             S = np.linalg.inv(regular(k * self.H + P))
             k = float(np.sum(S * self.H) / np.sum(S * self.G))
         return k
@@ -106,7 +103,7 @@ class Information:
 
 def regular(H: np.ndarray) -> np.ndarray:
     """A matrix with a slight ridge: collinear parameters share what they explain."""
-    return H + ridge(H, np.ones(len(H)))
+    return H + ridge(H)
 
 
 class PredictionFit:
@@ -164,6 +161,11 @@ class PredictionFit:
         names = at.fitted
         return at.plus(dict(zip(names, whole.tolist(), strict=False)), whole[len(names) :])
 
+    def around(self, s: Shooting, model: Model) -> Around:
+        """Predictions in some windows, and their slopes in units of the parameters."""
+        found = s.around(model, self._steps)
+        return replace(found, slopes=found.slopes[..., self._columns] * self.unit)
+
     def whitening(self, s: Shooting, around: Around) -> np.ndarray:
         """The factor (w, 3T, 3T) that whitens the residuals of windows; zero where a model runs away."""
         r = around.residuals
@@ -210,9 +212,9 @@ class PredictionFit:
         model, q = at.model(self.prior), self.unit.size
 
         def of_windows(s: Shooting) -> tuple[np.ndarray, ...]:
-            around = s.around(model, self._steps)
+            around = self.around(s, model)
             W = self.whitening(s, around)
-            A = whitened(W, around.slopes[..., self._columns] * self.unit)
+            A = whitened(W, around.slopes)
             flat = A.reshape(-1, q)
             fine = running(W)
             sizes = np.array([pushes[self._place[id(run)]].size for run in s.runs])[s.run[fine]]
@@ -262,22 +264,25 @@ def fit_predictions(
     return fit_to(PredictionFit(runs, windows, at, prior), at)
 
 
+@dataclass(frozen=True, eq=False)
+class _Weighed(Quadratic[Estimate]):
+    """The cost with what the windows say, at the power of their likelihood."""
+
+    known: Information
+    power: float
+
+
 def fit_to(problem: PredictionFit, at: Estimate) -> Fitted:
     """The most likely model of a problem, from where to begin, and how sure it is."""
-    P, known = problem.precision, problem.information(at)
-    for _ in range(STEPS):
-        k = known.power(P)
-        right = k * known.g - P @ problem.theta(at)
-        step = np.linalg.solve(regular(k * known.H + P), right)
-        if right @ step < ENOUGH:
-            break
-        before = problem.cost(at, known.weights, k)
-        tried = (problem.moved(at, share * step) for share in HALVINGS)
-        further = next((t for t in tried if problem.cost(t, known.weights, k) < before), None)
-        if further is None:
-            break
-        at, known = further, problem.information(further)
-    k = known.power(P)
-    S = np.linalg.inv(regular(k * known.H + P))
-    covariance = S @ (k * k * known.G + P) @ S * np.outer(problem.unit, problem.unit)
-    return Fitted(at, problem.names, covariance, known.push)
+    P = problem.precision
+
+    def about(at: Estimate) -> _Weighed:
+        known = problem.information(at)
+        k, weights = known.power(P), known.weights
+        H, right = regular(k * known.H + P), k * known.g - P @ problem.theta(at)
+        return _Weighed(H, right, lambda e: problem.cost(e, weights, k), known, k)
+
+    at, here = most_likely(at, about, problem.moved)
+    S = np.linalg.inv(here.H)
+    covariance = S @ (here.power**2 * here.known.G + P) @ S * np.outer(problem.unit, problem.unit)
+    return Fitted(at, problem.names, covariance, here.known.push)

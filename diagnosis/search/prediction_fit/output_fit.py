@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from cosim import InputError
 from cosim.errors import nearest
@@ -12,15 +13,14 @@ from ...predictors.measured_outputs import named, residual
 from ...predictors.weak_form import OVERLAP
 from ..prior import NominalPrior, Prior
 
-STEP = 0.01  # of a prior standard deviation; thrust is smooth in its coefficients
-STEPS = 4  # of Gauss-Newton; thrust is nearly linear in its coefficients
+PASSES = 2  # of the fit, the second weighted by what the first leaves
 
 
 def fitted(runs: Sequence[WeakWindows], model: Model, prior: Prior, names: Iterable[str]) -> Model:
     """The model with the coefficients of actuators fitted to what is measured of them.
 
-    Averages over the windows of the weak form, of which :data:`OVERLAP` count as one, by Gauss-Newton
-    from the prior.
+    Least squares of averages over the windows of the weak form, of which :data:`OVERLAP` count as one,
+    and of the departure from the prior.
 
     Args:
         runs: to learn from.
@@ -56,12 +56,9 @@ def _fitted(having: Sequence[WeakWindows], start: Model, belief: NominalPrior, n
         return np.concatenate(parts)
 
     offset = np.zeros(len(of))
-    for _ in range(STEPS):
-        error = left(offset)
-        size = float(np.std(error)) * np.sqrt(OVERLAP)
-        if size == 0.0:
-            break
-        J = np.column_stack([(left(offset + h) - error) / STEP for h in np.eye(len(of)) * STEP]) / size
-        right = J.T @ error / size + offset
-        offset = offset - np.linalg.solve(J.T @ J + np.eye(len(of)), right)
+    for _ in range(PASSES):
+        size = float(np.std(left(offset))) * np.sqrt(OVERLAP)
+        if size > 0.0:
+            weighted = lambda x, size=size: np.append(left(x) / size, x)  # noqa: E731
+            offset = least_squares(weighted, offset, method="lm").x
     return at(offset)

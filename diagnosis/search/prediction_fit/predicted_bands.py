@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...predictors import Model
-from ...predictors.bands import Bands
+from ...predictors.evaluation import Bands
 from ...predictors.shooting import Shooting
 from ...predictors.windows import Windows
 from ...runs import Smoothed

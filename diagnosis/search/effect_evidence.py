@@ -1,4 +1,4 @@
-"""Confidence of a finding: the probability that its id is a true cause, that no candidate is included.
+"""Evidence for a finding, from which :mod:`diagnosis.verdict.confidence` makes its confidence.
 
 A share of wins among candidates says nothing of causes that no candidate has. What does:
 
@@ -8,29 +8,21 @@ A share of wins among candidates says nothing of causes that no candidate has. W
 - varies: relative standard deviation between blocks of the factor by which the effect would fit best.
   The parameters of a true cause are constants; those of a stand-in change with the motion.
 
-The last two are root mean squares beyond what noise gives, so that neither grows with its level. The map
-from evidence to probability is a logistic regression.
+The last two are root mean squares beyond what noise gives, so that neither grows with its level.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit
 
 from ..predictors.uncertainty import NOISE_TOLERANCE
 
-# Constants of the logistic map, to be fitted by benchmarks.hidden_effects on other seeds and effects
-# than its reliability diagram shows. These are first values, chosen: 0.99 without any doubt, one half
-# where a third of what the effect explains is left, or its size varies by as much.
-SURE = 4.6
-PER_LEFT = 14.0
-PER_VARIATION = 14.0
 CREDIBLE = 0.95  # probability of the set of ids that are told together, of the candidates'
 
 
 class Evidence(NamedTuple):
-    """What the confidence of a finding is made of.
+    """What speaks for a finding.
 
     Attributes:
         bagged: probability of the id beside the other candidates, 0...1.
@@ -41,12 +33,6 @@ class Evidence(NamedTuple):
     bagged: float
     left: float
     varies: float
-
-
-def confidence(e: Evidence) -> float:
-    """Probability that the id is a true cause."""
-    a_candidate_is_right = expit(SURE - PER_LEFT * e.left - PER_VARIATION * e.varies)
-    return float(e.bagged * a_candidate_is_right)
 
 
 def credible(own: str, weights: Mapping[str, float]) -> list[str]:

@@ -1,39 +1,32 @@
-"""A calibrated model where no cause is believed: all coefficients at once, by predictions and priors.
+"""Calibration: all coefficients at once, by predictions and priors, where no cause is found.
 
-Predictions may use what is not sure enough to be told. Beside the nominal coefficients, each with the
-prior of where its value is from, those that simple models leave out are fitted (lift of the hull by
-sway and yaw, drag in turns, resistance that is not quadratic), and the axis of the heading; a
-current that all runs are in besides, where runs left out show it beyond chance. The windows
-are weighed by the covariance of initial state, noise and unrecorded force of the usual run, and in each
-run a constant sway force and a constant yaw moment of that size act besides, integrated out: the angle
-of an actuator that nobody recorded is no coefficient. So a run counts as what it is, hardly more than
-one sample of what lasts, and many of what changes with its motion.
-
-No effect follows from it. It is kept if runs left out are predicted better than by what was found.
+In addition to the nominal coefficients, each with the prior of where its value is from, those that
+simple models leave out are fitted (lift of the hull by sway and yaw, drag in turns, resistance that is
+not quadratic), and the axis of the heading. The windows are weighed by the covariance of initial state,
+noise and disturbance of the usual run, and in each run a constant sway force and a constant yaw moment
+of that size act, integrated out: the angle of an actuator that nobody recorded is no coefficient. So a
+run counts as what it is, hardly more than one sample of what lasts, and many of what changes with its
+motion.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..predictors import Model, WeakWindows
-from ..predictors.shooting import Shooting
-from ..search.candidates import SMALL, model_error
-from ..search.findings import Findings
-from ..search.prediction_fit.disturbance import Push
-from ..search.prediction_fit.disturbance_summary import unrecorded
-from ..search.prediction_fit.fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
-from ..search.prediction_fit.joint_posterior import Posterior
-from ..search.prediction_fit.refit import Outcome
-from ..search.prior import NominalPrior
-from ..search.refinement import Estimate
-from .decision import something_left
-from .pruning import Unseen
-from .validation_data import gain, harm
+from ...predictors import Model, WeakWindows
+from ...predictors.shooting import Shooting
+from ..candidates import SMALL, model_error
+from ..findings import Findings
+from ..prior import NominalPrior
+from ..refinement import Estimate
+from .disturbance import Push
+from .disturbance_summary import unrecorded
+from .fit import Information, PredictionFit, fit_to, push_of, shootings, whitened
+from .joint_posterior import Posterior
+from .refit import Outcome
 
-FEWEST = 4  # runs, from which on constants of each are told from coefficients; chosen
 # Effects whose coefficients models of few terms leave out, and their prior standard deviation in units
 # of the ship's size. Chosen: for R/V Gunnerus and KVLCC2 the regression of Clarke, Gedling and Hine
 # (1983, RINA 125, 45-68) gives such terms 2 to 25 units, of which models have some by other terms; half
@@ -110,71 +103,54 @@ class Calibration(PredictionFit):
         ]
 
 
-def calibrated(
-    found: Findings,
-    train: Sequence[WeakWindows],
-    held_out: Sequence[WeakWindows],
-    start: Model,
-    prior: NominalPrior,
-) -> Outcome | None:
-    """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
+@dataclass(frozen=True, eq=False)
+class Calibrator:
+    """Fits of all coefficients to some runs.
 
-    Each training run is predicted without it, held-out runs only veto.
-
-    Args:
-        found: what was found, of which nothing is believed.
-        train, held_out: runs.
-        start: the model at first.
+    Attributes:
+        found: the findings, whose effects the calibrated model does not have.
+        train: runs to learn from.
+        start: the initial model.
         prior: of the nominal coefficients.
     """
-    fits = len(train) >= FEWEST and any(prior.std.values())
-    if not fits or not something_left(train, start, start):
-        return None
-    windows = shootings(train, LENGTH)
-    if not windows:
-        return None
-    of = partial(_fitted, found, train, windows, prior)
-    best = of(begin(start, prior))
-    unseen = Unseen(train, [], start, found.sigma)
-    other, first = unseen.losses(found if found.effects else start, start)
-    flowing = of(begin(start, prior, {CURRENT: STREAM}, best.findings.estimate))
-    still, now = unseen.losses(best.findings, flowing.findings)
-    if harm(still, now) and gain(still, now) > 0.0:
-        best = flowing
-    else:
-        now = still
-    if harm(now, first) or gain(other, now) <= 0.0:
-        return None
-    model = best.findings.model
-    if held_out and harm(*Unseen(train, held_out, start, found.sigma).losses(model, start)):
-        return None
-    return best
 
+    found: Findings
+    train: Sequence[WeakWindows]
+    start: Model
+    prior: NominalPrior
 
-def _fitted(
-    found: Findings,
-    train: Sequence[WeakWindows],
-    windows: Sequence[Shooting],
-    prior: NominalPrior,
-    at: Estimate,
-) -> Outcome:
-    """All coefficients of an estimate, fitted."""
-    problem = Calibration(train, windows, at, prior)
-    fitted = fit_to(problem, at)
-    at = fitted.estimate
-    model = at.model(prior)
-    learned = replace(
-        found,
-        effects=[],
-        model=model,
-        suspects=[],
-        refitted=model,
-        moved=dict(zip(prior.mean, at.offset.tolist(), strict=True)),
-        fold_models=problem.without_each_run(at),
-        refit=None,
-        estimate=at,
-    )
-    return Outcome(learned, Posterior.of(fitted, prior), unrecorded(train, model, fitted.push, {}))
+    @cached_property
+    def windows(self) -> list[Shooting]:
+        """Those in which predictions are shown."""
+        return shootings(self.train, LENGTH)
+
+    def still(self) -> Outcome:
+        """The calibrated model in still water."""
+        return self._fitted(begin(self.start, self.prior))
+
+    def flowing(self, still: Outcome) -> Outcome:
+        """The same with a current that all runs are in."""
+        near = still.findings.estimate
+        return self._fitted(begin(self.start, self.prior, {CURRENT: STREAM}, near))
+
+    def _fitted(self, at: Estimate) -> Outcome:
+        problem = Calibration(self.train, self.windows, at, self.prior)
+        fitted = fit_to(problem, at)
+        at = fitted.estimate
+        model = at.model(self.prior)
+        learned = replace(
+            self.found,
+            effects=[],
+            model=model,
+            suspects=[],
+            refitted=model,
+            moved=dict(zip(self.prior.mean, at.offset.tolist(), strict=True)),
+            fold_models=problem.without_each_run(at),
+            refit=None,
+            estimate=at,
+        )
+        posterior = Posterior.of(fitted, self.prior)
+        return Outcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
 
 
 def begin(

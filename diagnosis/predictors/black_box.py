@@ -1,0 +1,332 @@
+"""A predictor that is known by its answers only: a motion from a state on, and accelerations in states.
+
+**Windows.** Where its velocity can be set, a black box starts in each window from the smoothed state,
+as the models of this project do. Else it runs through the whole run from its own start; of a ship that
+is under way when the run begins, the first part, the run-in, does not count. Where its pose cannot be
+set, the track that it gives is laid onto the measured pose where the comparison begins, in place and
+heading.
+
+**Model error, by inverse use.** In the measured state and with the command of each sample, the black
+box accelerates by nu_dot, and the model of the ship by another nu_dot. The difference, times the
+inertia, is a force over time, linear in pose and velocity about the measured ones, that makes the model
+what the black box is along the run. With it as a given force (:class:`.ship_model.GivenForce`) all that
+is done with a model can be done with the black box: its model error, and the library's effects in
+addition to it. A black box whose velocity cannot be set is asked along its own prediction of the run,
+in place of the measured one.
+
+Where it takes forces, its inertia is that by which it answers them, and the model has the same, so that
+forces are its own; else that of the ship.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from cosim import InputError
+from fmus.frames import rotate_to_body, rotate_to_earth
+from fmus.ops import wrap
+
+from ..runs import Run, Smoothed
+from .described_ship import DescribedShip, windows_of
+from .prediction import Starts, at_rest
+from .predictor import Description, Predictor
+from .ship_model import GivenForce, Model
+from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
+from .windows import Windows, free_runs, step_of
+
+POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
+MOTION = (*POSE, *VELOCITY)
+TAU = ("tau_X", "tau_Y", "tau_N")
+# s, times the scale of the ship; after that a surge speed has forgotten most of its start. Chosen.
+RUN_IN = 60.0
+SMALL = 1e-3  # of the ship's speeds; step of the slopes by velocity
+ALIKE = 1e-6  # relative; inertias that differ by less are the same
+LIGHTEST, HEAVIEST = 1e-3, 1e3  # of the ship's inertia, within which that of a black box is used; chosen
+
+# Name of a pose, velocity, force or command -> values (n,) [SI].
+Signals = Mapping[str, np.ndarray]
+
+
+class BlackBox(ABC):
+    """The part of :class:`.predictor.Predictor` that follows from answers.
+
+    Args:
+        name: of the black box, as messages have it.
+        runs: that it predicts, no two of the same name.
+        ship: model of the ship.
+
+    Attributes:
+        kind, sha256, given_map: see :class:`.predictor.Description`.
+        starts: what a prediction can begin with, of :data:`MOTION`.
+        inputs: the forces and commands that it takes.
+        own_run_in: the run-in of every run [s]; None: none from rest, else the usual one.
+    """
+
+    parametric = False
+    kind, sha256 = "black box", ""
+
+    def __init__(self, name: str, runs: Sequence[WeakWindows], ship: Model) -> None:
+        self.name, self.runs, self.ship = name, runs, ship
+        self.starts: frozenset[str] = frozenset(MOTION)
+        self.inputs: frozenset[str] = frozenset()
+        self.given_map: Mapping[str, Any] = {}
+        self.own_run_in: float | None = None
+
+    @abstractmethod
+    def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
+        """Predictions of a run that begin in some of its rows, with the commands of the run.
+
+        Args:
+            smoothed: the run.
+            rows: (w,), where they begin.
+            h: length of a step [s]; a command acts from its time to the next.
+            steps: of each.
+
+        Returns:
+            (steps + 1, 6, w), see :data:`MOTION`; NaN where the black box does not give a quantity.
+
+        Raises:
+            InputError: the black box fails.
+        """
+
+    @abstractmethod
+    def accelerations(self, signals: Signals) -> np.ndarray:
+        """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the body in some states.
+
+        Raises:
+            InputError: the black box fails.
+        """
+
+    @property
+    def _started_by(self) -> str:
+        """What sets a measured state, a part of a sentence."""
+        return ""
+
+    @property
+    def whole(self) -> bool:
+        return not set(VELOCITY) <= self.starts
+
+    @property
+    def placed(self) -> bool:
+        """Whether predictions are laid onto the measured pose, for that cannot be set."""
+        return not set(POSE) <= self.starts
+
+    def run_in(self, smoothed: Smoothed) -> float:
+        if not self.whole or (self.own_run_in is None and at_rest(smoothed)):
+            return 0.0
+        return RUN_IN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
+
+    @property
+    def model(self) -> Model:
+        return self._along_runs
+
+    @cached_property
+    def _along_runs(self) -> Model:
+        """A model that moves as the black box does along its runs."""
+        body = Model({**self.ship.vessel, **self._inertia()}, self.ship.thrusters, ship=self.ship.ship)
+        given = {w.run.name: self._beyond_along(w, body) for w in self.runs}
+        return Model(body.vessel, body.thrusters, ship=body.ship, given=given)
+
+    def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
+        if not self.whole:
+            return windows_of(runs, length)
+        (smoothed,) = runs
+        seconds = float(smoothed.time[-1] - smoothed.time[0]) + 0.75 * smoothed.track.period
+        try:
+            return Windows(runs, seconds).after(self.run_in(smoothed))
+        except InputError as error:
+            raise InputError(f"run '{smoothed.track.run.name}': {error}") from None
+
+    def residuals(self, windows: Windows, learned: Sequence[Model] = ()) -> list[np.ndarray]:
+        """Those of additions: as the residuals of :attr:`model` change by them."""
+        (own,) = windows.residuals_by(self._poses)
+        if not learned:
+            return [own]
+        run = windows.runs[0].track.run.name
+        base, *others = windows.residuals_of_each([m.during(run) for m in (self.model, *learned)])
+        changed = [own + other - base for other in others]
+        for residuals in changed:
+            residuals[:, 2] = wrap(residuals[:, 2])
+        return [own, *changed]
+
+    def free_runs(
+        self, smoothed: Smoothed, learned: Model | None = None, begin: float = -np.inf
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """By its own answers; with additions, those of :attr:`model`."""
+        if learned is not None:
+            return free_runs(smoothed, [self.model, learned], begin)
+        usable = np.flatnonzero(smoothed.used)
+        row = int(usable[max(np.searchsorted(smoothed.time[usable], begin, side="right") - 1, 0)])
+        start = 0 if self.whole else row
+        h = step_of(smoothed)
+        steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
+        pose = _pose(self.motion(smoothed, np.array([start]), h, steps), h)
+        first = round((smoothed.time[row] - smoothed.time[start]) / h)
+        if self.placed:
+            pose = _laid(pose, first, smoothed.eta[row][:, None])
+        pose = pose[first:, :, 0]
+        return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
+
+    def description(self) -> Description:
+        waits = {w.run.name: self.run_in(w.smoothed) for w in self.runs}
+        told = [*self._sentences()]
+        return Description(self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told)
+
+    def in_windows(self) -> Predictor:
+        return DescribedShip(self.model) if self.whole else self
+
+    def write(
+        self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
+    ) -> list[str]:
+        return (
+            [] if learned is None else [f"What was found is not written: {self.name} has no parameters."]
+        )
+
+    def _sentences(self) -> Iterator[str]:
+        if not self.whole:
+            yield f"Each window starts from the measured state{self._started_by}."
+        else:
+            waits = [self.run_in(w.smoothed) for w in self.runs]
+            began = "from rest" if not any(waits) else f"after a run-in of {max(waits):.3g} s"
+            yield (
+                f"Its velocity cannot be set ({', '.join(VELOCITY)} of the map's start): runs are "
+                f"predicted as a whole, {began}. The force that it lacks is that along its prediction."
+            )
+        if self.placed:
+            yield "Its pose is laid onto the measured one where a prediction begins."
+
+    def _poses(self, starts: Starts) -> np.ndarray:
+        """The predicted pose (steps + 1, 3, 1, w) in windows."""
+        found = []
+        for smoothed, rows in starts.runs:
+            pose = _pose(self.motion(smoothed, rows, starts.h, starts.steps), starts.h)
+            if self.placed:
+                first = round(self.run_in(smoothed) / starts.h)
+                time = smoothed.time[rows] + first * starts.h
+                onto = np.searchsorted(smoothed.time, time - 1e-9)
+                pose = _laid(pose, first, smoothed.eta[onto].T)
+            found.append(pose)
+        return np.concatenate(found, axis=-1)[:, :, None]
+
+    def _whole_run(self, smoothed: Smoothed) -> tuple[np.ndarray, np.ndarray]:
+        """Pose and velocity, each (n, 3), along a run from its start."""
+        h = step_of(smoothed)
+        steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
+        motion = self.motion(smoothed, np.array([0]), h, steps)
+        pose = _laid(_pose(motion, h), 0, smoothed.eta[:1].T)[:, :, 0]
+        nu = motion[:, 3:, 0]
+        if np.isnan(nu).any():
+            rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
+            nu = np.column_stack([*rotate_to_body(pose[:, 2], rate[:, 0], rate[:, 1]), rate[:, 2]])
+        time = smoothed.time[0] + h * np.arange(steps + 1)
+        columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu]).T
+        found = np.column_stack([np.interp(smoothed.time, time, x) for x in columns])
+        return found[:, :3], found[:, 3:]
+
+    def _beyond_along(self, w: WeakWindows, body: Model) -> GivenForce:
+        """The force of the black box beyond that of a model, along a run."""
+        time = w.run.time
+        slope = np.zeros((time.size, 3, len(MOTION)))
+        if self.whole:
+            eta, nu = self._whole_run(w.smoothed)
+            motion = np.concatenate([eta, nu], axis=1)
+            return GivenForce(_beyond(w, body, motion, np.gradient(nu, time, axis=0)), slope)
+        known = np.flatnonzero(w.known)
+        motion = np.concatenate([w.smoothed.eta, w.smoothed.nu], axis=1)
+        motion[~w.known] = 0.0
+        signals = at_samples(w.smoothed)
+
+        def beyond(rows: np.ndarray, moving: np.ndarray) -> np.ndarray:
+            """(n, 3), by accelerations in some rows, and between them by interpolation."""
+            at = {**signals, **dict(zip(MOTION, moving.T, strict=True))}
+            found = self.accelerations({name: x[rows] for name, x in at.items()})
+            columns = [np.interp(time, time[rows], x) for x in found.T]
+            return _beyond(w, body, moving, np.column_stack(columns))
+
+        force = beyond(known, motion)
+        places = np.searchsorted(time[known], np.arange(time[known].min(), time[known].max(), w.every))
+        sparse = known[np.unique(places)]
+        plain = beyond(sparse, motion)
+        sizes = (w.scale.length, w.scale.length, 1.0, *w.scale.speeds)
+        for k, (name, size) in enumerate(zip(MOTION, sizes, strict=True)):
+            if name not in self.starts:
+                continue
+            moved = motion.copy()
+            moved[:, k] += SMALL * size
+            change = (beyond(sparse, moved) - plain)[sparse] / (SMALL * size)
+            slope[:, :, k] = np.column_stack([np.interp(time, time[sparse], x) for x in change.T])
+        gone = ~w.known
+        force[gone], slope[gone] = 0.0, 0.0
+        return GivenForce(force - np.einsum("nij,nj->ni", slope, motion), slope)
+
+    def _inertia(self) -> dict[str, float]:
+        """Coefficients that give a model the inertia of the black box, as far as it takes forces."""
+        ship = self.ship
+        axes = [k for k, name in enumerate(TAU) if name in self.inputs]
+        still = dict.fromkeys(at_samples(self.runs[0].smoothed), np.zeros(1))
+        at_rest = self.accelerations(still)[0]
+        by_force = np.linalg.inv(ship.mass)
+        for k in axes:
+            push = ship.ship.scale.forces[k]
+            pushed = (self.accelerations({**still, TAU[k]: np.array([push])})[0] - at_rest) / push
+            if not LIGHTEST < pushed[k] * ship.mass[k, k] < HEAVIEST:
+                return {}  # something lags between force and motion, or there is none
+            by_force[axes, k] = pushed[axes]
+        M = np.linalg.inv(by_force)
+        if np.abs(M - ship.mass).max() <= ALIKE * np.abs(ship.mass).max():
+            return {}
+        i = ship.hull.hull.inertia
+        heavier = {"X_udot": i.m - M[0, 0], "Y_vdot": i.m - M[1, 1], "N_rdot": i.I_z - M[2, 2]}
+        across = i.m * i.x_g
+        coupled = {"Y_rdot": across - M[1, 2], "N_vdot": across - M[2, 1]}
+        return {name: float(value) for name, value in {**heavier, **coupled}.items()}
+
+
+def commanded(run: Run) -> dict[str, np.ndarray]:
+    """Force or command -> its values (n,) in a run [SI]."""
+    return dict(zip(TAU, run.tau_cmd.T, strict=True)) | run.commanded
+
+
+def commands_at(run: Run, time: np.ndarray) -> dict[str, np.ndarray]:
+    """Force or command -> its values at some times [s]; a command acts from its time to the next."""
+    row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
+    return {name: values[row] for name, values in commanded(run).items()}
+
+
+def at_samples(smoothed: Smoothed) -> dict[str, np.ndarray]:
+    """Signal -> its values (n,) at the samples of a run [SI]: commands, and the smoothed motion."""
+    motion = np.concatenate([smoothed.eta, smoothed.nu], axis=1).T
+    return commanded(smoothed.track.run) | dict(zip(MOTION, motion, strict=True))
+
+
+def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray) -> np.ndarray:
+    """Force (n, 3) that a model of a ship lacks in a motion (n, 6)."""
+    eta, nu = motion[:, :3], motion[:, 3:]
+    free = acceleration(body, w.run.time, eta, nu)
+    return (nu_dot - free) @ body.mass.T - thrust_along(w, body, inflow_along(w, body, eta, nu))
+
+
+def _pose(motion: np.ndarray, h: float) -> np.ndarray:
+    """Pose of a motion (steps + 1, 6, w); where it has none, by its velocity from the origin on."""
+    return _track(motion, h) if np.isnan(motion[0, :3]).any() else motion[:, :3]
+
+
+def _track(motion: np.ndarray, h: float) -> np.ndarray:
+    """Pose (steps + 1, 3, w) from the origin on, by the velocities (steps + 1, 6, w) of the body."""
+    sums = partial(cumulative_trapezoid, dx=h, axis=0, initial=0.0)
+    u, v, r = motion[:, 3:].transpose(1, 0, 2)
+    psi = sums(r)
+    north, east = rotate_to_earth(psi, u, v)
+    return np.stack([sums(north), sums(east), psi], axis=1)
+
+
+def _laid(pose: np.ndarray, first: int, onto: np.ndarray) -> np.ndarray:
+    """Tracks (steps + 1, 3, w), moved and turned so that at a step they are where others (3, w) are."""
+    x, y, psi = (pose - pose[first]).transpose(1, 0, 2)
+    north, east = rotate_to_earth(onto[2] - pose[first, 2], x, y)
+    return np.stack([onto[0] + north, onto[1] + east, onto[2] + psi], axis=1)

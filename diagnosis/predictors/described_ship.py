@@ -1,0 +1,102 @@
+"""A described ship as a predictor: the functions of its vessel and thrusters, by its parameters."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ship import Ship, ship
+from fmus.ships.naming import DEFAULT
+
+from ..execution.progress import Advance, silent
+from ..runs import Smoothed
+from .parameter_set import read_model, write_model
+from .predictor import MODEL, Description, Predictor, refuse_map
+from .ship_model import Model
+from .weak_form import WeakWindows
+from .windows import Windows, free_runs
+
+
+class DescribedShip:
+    """A model of this project, see :class:`.predictor.Predictor` and :class:`.predictor.ModelSource`."""
+
+    parametric, whole = True, False
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    @property
+    def name(self) -> str:
+        return f"the model of {ship_name(self.model.ship)}"
+
+    @property
+    def start(self) -> Model:
+        return self.model
+
+    def on(self, runs: Sequence[WeakWindows], advance: Advance = silent) -> "DescribedShip":
+        return self
+
+    def run_in(self, smoothed: Smoothed) -> float:
+        return 0.0
+
+    def windows(self, runs: Sequence[Smoothed], length: float) -> Windows | None:
+        return windows_of(runs, length)
+
+    def residuals(self, windows: Windows, learned: Sequence[Model] = ()) -> list[np.ndarray]:
+        run = windows.runs[0].track.run.name
+        return windows.residuals_of_each([m.during(run) for m in (self.model, *learned)])
+
+    def free_runs(
+        self, smoothed: Smoothed, learned: Model | None = None, begin: float = -np.inf
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        return free_runs(smoothed, [self.model, learned or self.model], begin)
+
+    def in_windows(self) -> Predictor:
+        return self
+
+    def description(self) -> Description | None:
+        return None
+
+    def write(
+        self, folder: Path, learned: Model | None = None, runs: Sequence[WeakWindows] = ()
+    ) -> list[str]:
+        if learned is not None:
+            write_model(folder / MODEL, learned)
+        return []
+
+
+def windows_of(runs: Sequence[Smoothed], length: float) -> Windows | None:
+    """Windows of a length [s]; None: none has enough samples."""
+    try:
+        return Windows(runs, length)
+    except InputError:
+        return None
+
+
+def ship_name(of: Ship) -> str:
+    """The name of a ship."""
+    return DEFAULT if of.description is None else of.description.name
+
+
+def nominal(runs: Sequence[WeakWindows]) -> Model:
+    """The nominal model of the ship that runs are of.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    ships = dict.fromkeys(w.run.ship for w in runs)
+    if len(ships) > 1:
+        names = (DEFAULT if one is None else one.name for one in ships)
+        raise InputError(f"the runs are of several ships: {', '.join(names)}")
+    return Model(ship=ship(description=next(iter(ships), None)))
+
+
+def open_parameters(
+    path: Path,
+    map: Path | None,  # noqa: A002 - as the option of the commands
+    of: Ship | None,
+) -> DescribedShip:
+    """The model in a parameter set, see :func:`.predictor.open_model`."""
+    refuse_map(map)
+    return DescribedShip(read_model(path, of))

@@ -1,0 +1,113 @@
+"""The findings of a diagnosis with what is said of them, for terminal, page and files alike."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+from fmus.effects.text import Found
+
+from ..predictors.ship_model import of_one_run, parameter_and_run
+from ..search.findings import Finding
+from ..session import Diagnosis
+from .finding_text import advice, equation, sentence, separation_note, unit
+
+T = TypeVar("T")
+AXES = ("X", "Y", "N", "XY")  # effects on other sets of axes count as XYN
+
+
+class Coefficient(NamedTuple):
+    """An addition to the nominal value, and its 95 % interval; None where there is none.
+
+    ``run`` is the one in which alone it holds, such as the time of a failure; None: it holds in all.
+    """
+
+    value: float
+    unit: str
+    ci95: tuple[float, float] | None
+    run: str | None
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedEffect:
+    """A finding, and what is said of it; attributes as in ``diagnosis.json``.
+
+    Attributes:
+        in_model: whether ``model.ssv`` has it.
+    """
+
+    id: str
+    axis: str
+    coefficients: Mapping[str, Coefficient]
+    confidence: float
+    share_of_error: float
+    indistinguishable: Sequence[str]
+    advice: str
+    sentence: str
+    equation: str
+    separation: str
+    share_unique: float | None = None
+    doubt: str = ""
+    in_model: bool = True
+
+
+def reported_effects(d: Diagnosis) -> tuple[list[ReportedEffect], list[ReportedEffect]]:
+    """The effects that are reported as found, and those that are only possible."""
+    found, possible = [], []
+    for f, share, unique, told in zip(d.learned.effects, d.shares, d.unique, d.believed, strict=True):
+        fitted = d.start.ship.effects[f.id].search.by == "regression"
+        (found if told else possible).append(_reported(d, f, share, unique, told or fitted))
+    return found, [*possible, *(_reported(d, f, f.share, None, False) for f in d.dropped)]
+
+
+def _reported(
+    d: Diagnosis, f: Finding, share: float, unique: float | None, in_model: bool
+) -> ReportedEffect:
+    effects = d.start.ship.effects
+    effect = effects[f.id]
+    # Of a coefficient the addition counts, of any other parameter of the effect its value.
+    present = {n: 0.0 if n in effect.coefficients else d.start.value(n) for n in f.values}
+    values = {n: x + present[n] for n, x in f.values.items()}
+    ci95 = {n: (low + present[n], high + present[n]) for n, (low, high) in f.ci95.items()}
+    coefficients = {
+        _plain(n, f): Coefficient(x, unit(effect, n), ci95.get(n), parameter_and_run(n)[1] or None)
+        for n, x in values.items()
+    }
+    return ReportedEffect(
+        f.id,
+        effect.axis if effect.axis in AXES else "XYN",
+        coefficients,
+        f.confidence,
+        share,
+        list(f.alike),
+        advice(f.id, f.alike, effects),
+        _sentence(d, f, values),
+        equation(effect, _shown(d, values), _shown(d, ci95)),
+        separation_note(f.id, f.alike),
+        unique,
+        f.doubt,
+        in_model,
+    )
+
+
+def _plain(name: str, f: Finding) -> str:
+    """The name of a value in the files: plain, but of the second run on in which alone it holds."""
+    parameter, run = parameter_and_run(name)
+    return parameter if run in f.of_runs[:1] else name
+
+
+def _sentence(d: Diagnosis, f: Finding, values: Mapping[str, float]) -> str:
+    """A finding in words; what holds in single runs, one after the other."""
+
+    def told(own: Mapping[str, float]) -> str:
+        return sentence(Found(d.start.ship.effects[f.id], own, d.speeds))
+
+    shown = _shown(d, values)
+    runs = [run for run in f.of_runs if shown is values]
+    return " ".join(f"Run {run}: {told(of_one_run(values, run))}" for run in runs) or told(shown)
+
+
+def _shown(d: Diagnosis, values: Mapping[str, T]) -> Mapping[str, T]:
+    """Values by their names; where there is one run only, without it."""
+    if len(d.comparison.evaluations) > 1:
+        return values
+    return {parameter_and_run(name)[0]: value for name, value in values.items()}

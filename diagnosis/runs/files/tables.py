@@ -1,0 +1,118 @@
+"""CSV and Parquet files as tables, read as the JSON file beside them says, and cells as numbers."""
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from cosim import InputError
+
+from ..columns.columns import SHOWN, Layout
+from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
+
+# What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
+READ_INTERRUPTED = "Calling read(nbytes) on source failed"
+
+
+def column_names(path: Path, layout: Layout) -> list[str]:
+    """The names of the columns as they stand there, one that is there twice included.
+
+    Raises:
+        InputError: the text is in another encoding, or begins with other lines.
+        OSError, ValueError: it cannot be read.
+    """
+    if path.suffix == ".parquet":
+        from pyarrow import parquet
+
+        return list(parquet.read_schema(path).names)
+    first = _csv(path, layout, nrows=1, header=None, dtype=str, keep_default_na=False)
+    names = [name.strip() for name in first.iloc[0]]
+    refuse_layout(path, layout, names)
+    return names
+
+
+def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
+    """The columns of some names.
+
+    Raises:
+        InputError: the text is in another encoding, or has a line of units that was not stated.
+        OSError, ValueError: it cannot be read.
+        KeyboardInterrupt: the user has asked for the end.
+    """
+    if path.suffix == ".parquet":
+        return pd.read_parquet(path, columns=list(wanted))
+    table = csv_table(path, layout, wanted)
+    refuse_units(path, layout, table)
+    return table
+
+
+def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
+    """The columns of some names of a CSV file, those of them that there are."""
+    try:
+        return _csv(
+            path,
+            layout,
+            usecols=lambda name: str(name).strip() in wanted,
+            decimal=layout.decimal,
+            skipinitialspace=True,
+        ).rename(columns=str.strip)
+    except pd.errors.ParserError as error:
+        if READ_INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
+        raise
+
+
+def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
+    units = [layout.skip + 1] if layout.units_line else []
+    try:
+        with open(path, "rb") as content:  # a long log does not fit into memory twice
+            return pd.read_csv(
+                content,
+                sep=layout.separator,
+                encoding=layout.encoding,
+                skiprows=[*range(layout.skip), *units],
+                index_col=False,
+                **options,
+            )
+    except UnicodeDecodeError:
+        refuse_encoding(path, layout)
+        raise
+
+
+def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
+    """Seconds since the first of a column of date stamps (ISO 8601), NaN where empty; None: numbers."""
+    if not pd.api.types.is_datetime64_any_dtype(cells):
+        try:
+            if not np.isnan(np.asarray(pd.to_numeric(cells, errors="coerce"), float)).all():
+                return None
+        except (TypeError, ValueError, OverflowError):  # lists and the like in a Parquet file
+            return None
+        cells = cells.astype("string").str.replace(",", ".")
+    stamps = pd.to_datetime(cells, errors="coerce", utc=True, format="ISO8601")
+    if stamps.isna().all():
+        return None
+    wrong = _first(cells, stamps.isna())
+    if wrong is not None:
+        raise InputError(f"{where}: {cells.name} = {wrong!r} is not a date stamp of ISO 8601")
+    return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
+
+
+def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
+    """A column as floats; empty cells are NaN."""
+    try:
+        found = np.asarray(pd.to_numeric(cells, errors="coerce"), float)
+    except (TypeError, ValueError, OverflowError):  # lists, times and the like in a Parquet file
+        raise InputError(f"'{path}': {cells.name} is not a column of numbers") from None
+    wrong = _first(cells, np.isnan(found))
+    if wrong is not None:
+        hint = decimal_comma(path, layout, wrong)
+        raise InputError(f"'{path}': {cells.name} = {wrong!r} is not a number{hint}")
+    return found
+
+
+def _first(cells: pd.Series, unreadable: Any) -> str | None:
+    """The beginning of the first cell that is not empty and could not be read."""
+    wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
+    return str(cells.iloc[wrong[0]])[:SHOWN] if wrong.size else None

@@ -1,0 +1,138 @@
+"""A measured run as every command uses it: one file gives one set of samples.
+
+A run is read, repaired by its own redundant channels (:mod:`.sensors`), cleaned, thinned if it is long,
+and smoothed with the velocities and rates that agree with its pose.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from cosim import InputError
+from fmus.ship import Ship, ship
+
+from .cleaning import Track, clean, refuse_short
+from .columns.unit_check import GO_ON
+from .files.reading import Run, read
+from .sensors.examination import examine
+from .sensors.sensor_finding import Examined
+from .smoothing.smoother import Smoothed, smooth
+from .thinning import thinned
+
+MOST_SPIKES = 0.1  # of the samples; chosen: of a run of the real ship 7 % are spikes, and it can be used
+# A part of a log contains less information on its clock than the whole.
+WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedRun:
+    """A measured run, and the samples of it that every command uses.
+
+    Attributes:
+        raw: the run as it was read.
+        sensors: faults that its redundant channels show, and the run as far as they repair it.
+        track: its samples in the order of time, judged, of a long run thinned.
+        anyway: whether a run is accepted in which more is wrong than can be repaired.
+    """
+
+    raw: Run
+    sensors: Examined
+    track: Track
+    anyway: bool = False
+
+    @cached_property
+    def smoothed(self) -> Smoothed:
+        """The motion by the samples.
+
+        Raises:
+            InputError: the samples do not determine a motion, or too many of them are spikes.
+        """
+        found = smooth(self.track, agreeing=self.sensors.agreeing)
+        if not self.anyway:
+            self._refuse_spikes(found)
+        return replace(found, sensors=self.sensors)
+
+    @property
+    def samples(self) -> np.ndarray:
+        """(n,), rows of the track that are samples: a new measurement that is no spike."""
+        return self.smoothed.used
+
+    def part(self, rows: np.ndarray) -> "PreparedRun":
+        """The run with some rows (n,) of its track alone, which is examined, cleaned and thinned whole.
+
+        Raises:
+            InputError: the part is too short.
+        """
+        part = self.track.rows(rows)
+        refuse_short(part.run, self.track.scale)
+        return replace(self, track=part)
+
+    def _refuse_spikes(self, found: Smoothed) -> None:
+        fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
+        if spikes > MOST_SPIKES * fresh:
+            raise InputError(
+                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
+                "than five standard deviations from where all others say the ship is: something is "
+                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
+                f"of a log, {WHOLE_FIRST}; {GO_ON}"
+            )
+
+
+def prepare(
+    source: str | Path | Run, of: Ship | None = None, anyway: bool = False, also: Iterable[str] = ()
+) -> PreparedRun:
+    """Prepare a measured run: the only way in for all commands.
+
+    Args:
+        source: a file or the folder of a log, see :func:`.read`, or a run that was read.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
+        anyway: whether a run is accepted whose units seem to be other ones than stated, whose channels
+            contradict each other beyond repair, or many of whose samples are spikes.
+        also: see :func:`.read`.
+
+    Raises:
+        InputError: the run cannot be read or used.
+    """
+    of = of or ship()
+    raw = source if isinstance(source, Run) else read(source, of=of, also=also)
+    sensors = examine(raw, of.scale)
+    unrepaired = next((finding for finding in sensors.findings if not finding.repaired), None)
+    if unrepaired and not anyway:
+        raise InputError(
+            f"run '{raw.name}': {unrepaired.sentence}; no other channel shows how to repair that; "
+            f"if it is a part of a log, {WHOLE_FIRST}; {GO_ON}"
+        )
+    repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))
+    return PreparedRun(raw, sensors, thinned(clean(repaired, anyway, of.scale)), anyway)
+
+
+def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> list[Run]:
+    """Read several runs, each under a name of its own: of the same name with more of the path in it.
+
+    Args:
+        sources: files, folders of logs, or runs that were read.
+        of: the ship that was measured; None: CyberShip Enterprise 1.
+
+    Raises:
+        InputError: a run cannot be read, or two hold the same measurement, which would count twice, and
+            as validation data would prove nothing.
+    """
+    runs = [source if isinstance(source, Run) else read(source, of=of) for source in sources]
+    paths = [source.name if isinstance(source, Run) else source for source in sources]
+    known: dict[bytes, str | Path] = {}
+    for run, path in zip(runs, paths, strict=True):
+        content = np.column_stack([run.time, run.pose]).tobytes()
+        if content in known:
+            again = f"'{path}' is given twice"
+            same = f"'{path}' holds the same measurement as '{known[content]}'"
+            raise InputError(again if Path(path) == Path(known[content]) else same)
+        known[content] = path
+    times = Counter(run.name for run in runs)
+    return [
+        run if times[run.name] == 1 else replace(run, name=Path(path).absolute().as_posix())
+        for run, path in zip(runs, paths, strict=True)
+    ]

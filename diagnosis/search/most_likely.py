@@ -1,0 +1,69 @@
+"""The most likely parameters by Gauss-Newton steps, for fits whose evaluations are costly.
+
+With residuals r(theta) in units of their noise, slopes J = -dr/dtheta and a prior precision P about the
+prior means, the cost is |r|^2 + theta^T P theta, twice a negative log likelihood. A step solves
+(J^T J + P) delta = J^T r - P theta, halved while the cost does not fall. The weights of the residuals
+may depend on the parameters: they are held during a step. :func:`scipy.optimize.least_squares` takes
+twice to eight times as long to the same minimum (benchmarks.fit_drivers).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+STEPS = 6  # of whatever is iterated, at the most; two or three are usual
+ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
+NORMAL_95 = 1.96  # standard deviations, of a normal distribution within which 95 % lie
+HALVINGS = (1.0, 0.5, 0.25)  # of a step
+RIDGE = 1e-9  # relative, far above rounding: collinear parameters share what they explain
+
+At = TypeVar("At")
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic(Generic[At]):
+    """The cost about an estimate.
+
+    Attributes:
+        H: (q, q), J^T J + P.
+        right: (q,), J^T r - P theta.
+        cost: of an estimate, with the weights of this one; infinite where it cannot be computed.
+    """
+
+    H: np.ndarray
+    right: np.ndarray
+    cost: Callable[[At], float]
+
+
+About = TypeVar("About", bound=Quadratic[Any])
+
+
+def ridge(H: np.ndarray, unit: np.ndarray | float = 1.0) -> np.ndarray:
+    """(p, p), what makes an information matrix regular, for parameters with units (p,)."""
+    return RIDGE * np.diag(np.diag(H) + np.power(unit, -2.0))
+
+
+def most_likely(
+    at: At, about: Callable[[At], About], moved: Callable[[At, np.ndarray], At]
+) -> tuple[At, About]:
+    """The estimate of least cost, and the cost about it.
+
+    Args:
+        at: where to begin.
+        about: the cost about an estimate.
+        moved: an estimate after a step (q,), within its limits.
+    """
+    here = about(at)
+    for _ in range(STEPS):
+        step = np.linalg.solve(here.H, here.right)
+        if here.right @ step < ENOUGH:
+            break
+        least = here.cost(at)
+        tried = (moved(at, share * step) for share in HALVINGS)
+        further = next((t for t in tried if here.cost(t) < least), None)
+        if further is None:
+            break
+        at, here = further, about(further)
+    return at, here

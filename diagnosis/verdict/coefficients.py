@@ -1,0 +1,96 @@
+"""Nominal coefficients in place of effects: where they alone explain the data, or predict better."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..predictors import Model
+from ..search.findings import Finding, Findings
+from ..search.prediction_fit.coefficient_calibration import Calibrator
+from ..search.prediction_fit.refit import Outcome
+from ..search.prior import NominalPrior
+from .confidence import confidence_of
+from .paired_errors import gain, harm, harms
+from .pruning import without
+from .validation_data import ValidationData
+
+FEWEST = 4  # runs, from which on constants of each are told from coefficients; chosen
+
+
+class Conclusion(NamedTuple):
+    """The model that findings amount to.
+
+    Attributes:
+        learned: the findings with that model.
+        refitted: whether that is other nominal coefficients alone.
+        dropped: effects that were accepted, of which the model has none.
+    """
+
+    learned: Findings
+    refitted: bool
+    dropped: Sequence[Finding]
+
+
+def any_finding(found: Findings, start: Model) -> bool:
+    """Whether any effect is a finding, and not only a possibility."""
+    return any(confidence_of(f, start).is_finding for f in found.effects)
+
+
+def concluded(found: Findings, data: ValidationData, prior: NominalPrior) -> Conclusion:
+    """The model that the findings amount to.
+
+    Coefficients alone explain the data if something was missing, nothing is with them, none is further
+    than MOST_MOVED from its prior, by where its value is from, and the data that decide are not worse
+    than without. They then take the place of effects of which none is a finding, if the data that decide
+    are not worse either.
+
+    Args:
+        found: the findings that pruning left.
+        data: the data that decide.
+        prior: of the nominal coefficients, by where their values are from.
+    """
+    start = data.start
+    if any_finding(found, start) or (found.effects and found.refit is None):
+        return Conclusion(found, False, [])
+    alone = without(found, [f.id for f in found.effects], start) if found.effects else found
+    other = alone.refitted
+    judged = alone.plausible_by(prior) and data.judges(alone)
+    if other is not None and judged and data.remains(start) and not data.remains(other):
+        now, *others = data.losses(alone, *([found, start] if found.effects else [start]))
+        if not any(harm(now, each) for each in others):
+            return Conclusion(replace(alone, model=other), True, found.effects)
+    if found.effects:
+        return Conclusion(found, False, [])
+    return Conclusion(replace(found, model=start, suspects=[]), False, [])
+
+
+def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Outcome | None:
+    """The calibrated model; None: nothing is missing, the runs are too few, or it predicts no better.
+
+    No effect follows from it. Each training run is predicted without it; a current is in it where that
+    shows beyond chance. Validation runs can reject it.
+
+    Args:
+        found: what was found, of which nothing is a finding.
+        data: the data that decide.
+        prior: of the nominal coefficients.
+    """
+    train, start = data.train, data.start
+    if len(train) < FEWEST or not any(prior.std.values()):
+        return None
+    runs = ValidationData(train, [], start, found.sigma)
+    calibrator = Calibrator(found, train, start, prior)
+    if not runs.remains(start) or not calibrator.windows:
+        return None
+    best = calibrator.still()
+    other, first = runs.losses(found if found.effects else start, start)
+    flowing = calibrator.flowing(best)
+    still, now = runs.losses(best.findings, flowing.findings)
+    if harm(still, now) and gain(still, now) > 0.0:
+        best = flowing
+    else:
+        now = still
+    if harm(now, first) or gain(other, now) <= 0.0:
+        return None
+    rejected = data.validate and harms(data, best.findings.model, start)
+    return None if rejected else best

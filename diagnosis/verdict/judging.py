@@ -1,0 +1,185 @@
+"""The judgement: evidence of a search and data that decide in, one verdict out."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..assessment.recurrence import recurrence
+from ..assessment.regions import find_regions
+from ..assessment.remainder import Remainder, remaining
+from ..assessment.remainder_text import remainder_sentence
+from ..assessment.stability import OperatingRegion, drives_on
+from ..execution.progress import Advance
+from ..predictors import Model, WeakWindows, omega
+from ..predictors.uncertainty import omega_std
+from ..search.findings import Finding, Findings
+from ..search.prediction_fit.disturbance_summary import Unrecorded
+from ..search.prediction_fit.joint_posterior import Posterior
+from ..search.prediction_fit.refit import to_predictions
+from ..search.prior import NominalPrior
+from .coefficients import any_finding, calibrated, concluded
+from .confidence import FOUND, Confidence, confidence_of
+from .paired_errors import harms
+from .pruning import NOTHING, Withdrawn, prune
+from .pruning_criteria import Harm
+from .shares import shares, unique_shares
+from .validation_data import ValidationData
+
+VerdictName = Literal["found", "ambiguous", "coefficients", "unexplained", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What a model lacks, as the runs that decide have it.
+
+    Attributes:
+        learned: the findings with their confidence, and the model with them.
+        withdrawn: effects that were accepted and rejected afterwards.
+        remainder: what the learned model leaves; where nothing was learned, the first one.
+        refitted: whether the learned model has other nominal coefficients and no effect.
+        dropped: effects that were accepted, where the learned model has other coefficients instead.
+        shares: for each finding the share of the error's sum of squares that it explains.
+        unique: for each the share that nothing else explains; None where that cannot be told.
+        posterior: of all fitted values; of none where nothing was learned.
+        unrecorded: what acts on the ship and is in no command and no effect.
+    """
+
+    learned: Findings
+    withdrawn: Sequence[Withdrawn]
+    remainder: Remainder
+    refitted: bool
+    dropped: Sequence[Finding]
+    shares: Sequence[float]
+    unique: Sequence[float | None]
+    posterior: Posterior
+    unrecorded: Unrecorded
+
+    @property
+    def verdict(self) -> VerdictName:
+        return verdict_name(self.learned, self.refitted, self.remainder)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the learned model has other coefficients, and these are no explanation."""
+        return self.refitted and self.verdict == "unexplained"
+
+    @property
+    def believed(self) -> list[bool]:
+        """Of each effect of the learned model whether it is a finding, or a possibility."""
+        return [is_finding(f) for f in self.learned.effects]
+
+    @property
+    def changed(self) -> bool:
+        """Whether the learned model differs from the initial one."""
+        return bool(self.learned.effects) or self.refitted
+
+
+def is_finding(f: Finding) -> bool:
+    """Whether an effect with its confidence is a finding, and not only a possibility."""
+    return Confidence(f.confidence, f.together).is_finding
+
+
+def verdict_name(learned: Findings, refitted: bool, remainder: Remainder) -> VerdictName:
+    """The verdict in a word, by the one rule that JSON, terminal and page follow."""
+    first = next(filter(is_finding, learned.effects), None)
+    if first is not None:
+        return "found" if first.confidence >= FOUND else "ambiguous"
+    if refitted and learned.plausible and not remainder.significant:
+        return "coefficients"
+    return "unexplained" if remainder.significant or learned.effects or refitted else "none"
+
+
+def judge(
+    found: Findings,
+    data: ValidationData,
+    prior: NominalPrior,
+    criterion: Harm,
+    region: OperatingRegion,
+    calibrates: bool,
+    advance: Advance,
+) -> Verdict:
+    """Judge what a search found: prune, conclude, fit to predictions, calibrate, say how sure it is.
+
+    Args:
+        found: the evidence of the search.
+        data: the data that decide.
+        prior: of the nominal coefficients.
+        criterion: of pruning.
+        region: motions that the training runs hold.
+        calibrates: whether coefficients may take the place of effects that are no findings.
+        advance: receives the name of each step when it begins.
+    """
+    start, train = data.start, data.train
+    advance("effects without which validation data are predicted better")
+    kept, withdrawn = prune(found, data, lambda a, b: drives_on(a, b, region), criterion)
+    learned, refitted, dropped = concluded(kept, data, prior)
+    advance("fit to predictions")
+    changed = bool(learned.effects) or refitted
+    fit = to_predictions(learned, train, prior, changed)
+    if data.validate and harms(data, fit.findings.model, start):
+        # The fit by the model error was compared with these runs already.
+        fit = fit.about(learned)
+    left = {f.id for f in fit.findings.effects}
+    withdrawn += [Withdrawn(f.id, NOTHING) for f in learned.effects if f.id not in left]
+    refitted = refitted or (changed and not left)
+    if calibrates and not any_finding(fit.findings, start):
+        advance("calibration")
+        alone = calibrated(fit.findings, data, prior)
+        if alone is not None:
+            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, alone
+    advance("residual")
+    # What fails at times of its own in a validation run says nothing of what was learned of others.
+    judged = train if fit.findings.model.runs else data.runs
+    remainder = remainder_of(judged, start, fit.findings, changed)
+    learned = with_confidence(fit.findings, remainder, start)
+    return Verdict(
+        learned,
+        withdrawn,
+        remainder,
+        refitted,
+        dropped,
+        shares(learned, start, data.validate),
+        unique_shares(learned, start, train, data.validate),
+        fit.posterior,
+        fit.unrecorded,
+    )
+
+
+def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Findings:
+    """The findings with their confidence: the one place where it is set.
+
+    A significant residual on the axes of an effect makes it even odds at the most; waves that are found
+    account for the one that is left in addition to them.
+    """
+    axes: Collection[str] = {axis for axis, r in remainder.axes.items() if r.significant}
+    waves = [f for f in found.effects if start.ship.effects[f.id].search.by == "spectrum"]
+    if any(confidence_of(f, start).own >= FOUND for f in waves):
+        axes = ()
+    effects = []
+    for f in found.effects:
+        c = confidence_of(f, start, axes)
+        effects.append(replace(f, confidence=c.own, together=c.of_set, doubt=c.doubt))
+    return replace(found, effects=effects)
+
+
+def remainder_of(
+    runs: Sequence[WeakWindows], start: Model, learned: Findings, changed: bool
+) -> Remainder:
+    """What the learned model leaves, in numbers and words.
+
+    Args:
+        runs: that decide.
+        start: the initial model.
+        learned: the findings.
+        changed: whether the learned model differs from the initial one.
+    """
+    model = learned.model if changed else start
+    axes, left = remaining(runs, start, model), [omega(w, model) for w in runs]
+    significant = any(axis.significant for axis in axes.values())
+    how = recurrence(runs, np.concatenate(left)) if significant else None
+    regions = find_regions(runs, left, [omega_std(w, start) for w in runs]).regions
+    effects = learned.model.ship.effects
+    waves = any(effects[f.id].search.by == "spectrum" for f in learned.effects)
+    return Remainder(axes, remainder_sentence(axes, how, regions, waves, runs[0].scale))

@@ -1,0 +1,48 @@
+"""Harm by paired errors: two models compared block by block and window by window, on the same data."""
+
+import numpy as np
+
+from ..predictors import Model
+from ..search.findings import Findings
+from ..search.significance import worse
+from .validation_data import Losses, ValidationData
+
+FITS = "the model fits {where} worse"
+PREDICTS = "predictions of {where} are worse"
+
+
+def harm(its: Losses, others: Losses, more: int = 0) -> str:
+    """In which loss a model is worse than another by more than two paired standard errors.
+
+    Where it predicts positions better and headings worse by as much, or the reverse, the relative
+    changes of both mean squares count together.
+
+    Args:
+        its, others: losses of both models on the data that decide.
+        more: number of parameters that the first has in addition; not used, as the data were not fitted.
+
+    Returns:
+        Part of a sentence, with ``{where}`` in place of the data; empty: in none.
+    """
+    if worse(its.omega, others.omega):
+        return FITS
+    pairs = [(its.position, others.position), (its.heading, others.heading)]
+    if not its.position.size or not any(worse(a, b) for a, b in pairs):
+        return ""
+    if any(worse(b, a) for a, b in pairs):
+        change = sum(np.sum(a) / np.sum(b) - 1.0 for a, b in pairs)
+        return PREDICTS if change > 0.0 else ""
+    return PREDICTS
+
+
+def harms(data: ValidationData, found: Findings | Model, other: Findings | Model) -> str:
+    """The same of findings or a model compared with another, on the data that decide."""
+    its, others = data.losses(found, other)
+    return harm(its, others)
+
+
+def gain(its: Losses, others: Losses) -> float:
+    """Fall of the losses from a model to another: logarithms of their ratios, summed over the three."""
+    pairs = [(a, b) for a, b in zip(its, others, strict=True) if np.size(a)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(sum(np.log(np.sum(a) / np.sum(b)) for a, b in pairs)))

@@ -1,0 +1,59 @@
+"""Criteria of pruning behind one interface, and the table of those that there are."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from cosim import InputError
+from cosim.errors import nearest
+
+from ..execution.user_files import from_file
+
+if TYPE_CHECKING:
+    from .validation_data import Losses
+
+
+class Harm(Protocol):
+    """Whether an effect does harm on the data that decide.
+
+    A criterion is a pure function of the losses. It guarantees that a model does itself no harm: with
+    the same losses twice and no further parameters the answer is empty.
+    """
+
+    def __call__(self, its: "Losses", others: "Losses", more: int) -> str:
+        """In what a model with an effect is worse than one without.
+
+        Args:
+            its, others: losses of the models with and without the effect.
+            more: number of parameters that the first has in addition.
+
+        Returns:
+            Part of a sentence, with ``{where}`` in place of the data; empty: in nothing.
+        """
+        ...
+
+
+# Name -> module of this room with a function ``harm``.
+CRITERIA = {"paired": "paired_errors", "bic": "information_criterion"}
+USUAL = "paired"
+
+
+def criterion(name: str = USUAL) -> Harm:
+    """A criterion of pruning by its name.
+
+    Args:
+        name: one of :data:`CRITERIA`, or a user's Python file with a function ``harm`` as in
+        :class:`Harm`.
+
+    Raises:
+        InputError: there is none of this name, or the file fails.
+    """
+    if name.endswith(".py"):
+        found: Any = from_file(Path(name), "harm", "a criterion of pruning")
+        if not callable(found):
+            raise InputError(f"'{name}' has no function harm(its, others, more)")
+        return cast(Harm, found)
+    if name not in CRITERIA:
+        known = ", ".join(CRITERIA)
+        raise InputError(f"no criterion of pruning '{name}'{nearest(name, CRITERIA)}; there are {known}")
+    return import_module(f".{CRITERIA[name]}", __package__).harm
