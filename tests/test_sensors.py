@@ -19,7 +19,7 @@ from diagnosis.runs.sensors import motion
 from diagnosis.runs.sensors.clock_path import integral_of
 from diagnosis.runs.sensors.further_channels import accelerations, receivers
 from diagnosis.runs.sensors.wraps import unwrapped
-from diagnosis.runs.smoothing import measured_rates
+from diagnosis.runs.smoothing import smoother
 from fmus.frames import rotate_to_earth
 from fmus.scale import REFERENCE, Scale
 
@@ -322,15 +322,15 @@ def test_stretches_of_a_clock_are_off_in_one_sense_and_have_the_mean_of_their_ti
 def test_rates_count_where_all_that_agree_are_there(monkeypatch):
     run = made()
     run.measured["r"][40] = np.nan
-    monkeypatch.setattr(measured_rates, "basis", lambda grid, t, derivative: t)
+    monkeypatch.setattr(smoother, "basis", lambda grid, t, derivative: t)
     rows, psi = np.arange(0, run.time.size, 2), run.pose[:, 2]
     track = SimpleNamespace(run=run)
-    at, rates = measured_rates.measured_rates(track, rows, psi, {"r": 0.5}, None)
+    at, rates = smoother.measured_rates(track, rows, psi, {"r": 0.5}, None)
     assert at.tolist() == [row for row in rows if row != 40]
     assert rates.z[:, 2] == pytest.approx(run.measured["r"][at])
     assert rates.sigma.tolist() == [np.inf, np.inf, 0.5]
-    assert measured_rates.measured_rates(track, rows, psi, {}, None) is None
-    assert measured_rates.measured_rates(track, np.array([40]), psi, {"r": 0.5}, None) is None
+    assert smoother.measured_rates(track, rows, psi, {}, None) is None
+    assert smoother.measured_rates(track, np.array([40]), psi, {"r": 0.5}, None) is None
 
 
 def test_the_smoother_is_sharper_with_channels_that_agree():

@@ -9,9 +9,10 @@ fault of a single channel does. Unknown are pose and c at nodes and the constant
     P_(j+1) - P_j = c_j (D_j + constants) + a random walk of the velocity's and of the rate's error,
     c_(j+1) - c_j   a random walk.
 
-All is linear but for c times a constant, which is iterated: banded least squares with a variance for each
-group of equations, as those of the smoother (:mod:`..smoothing.penalised`). The variances are those of
-restricted maximum likelihood, by the fixed point of Harville (1977), J. Am. Stat. Assoc. 72, 320-338.
+All is linear but for c times a constant, which is iterated: banded least squares with a variance for
+each group of equations, as those of the smoother (:mod:`..smoothing.penalised`). The variances are
+those of restricted maximum likelihood, by the fixed point of Harville (1977), J. Am. Stat. Assoc. 72,
+320-338.
 """
 
 from collections.abc import Sequence
@@ -32,18 +33,14 @@ SPACING = 1.0
 # Nodes, and samples between two of them, evenly chosen of more: memory and time. Chosen: a hundred MB.
 MOST_NODES, MOST_SAMPLES = 20_000, 8
 # Prior standard deviation of c about 1 at each node: of a clock that may be off, none of which runs at
-# half or double rate, and of one that may not.
-ANCHOR, EVEN = 0.5, 1e-6
-HOLD = (
-    1e-6  # 1/m, 1/rad; inverse of the prior standard deviation of a pose that nothing measures (chosen)
-)
+# half or double rate, and of one that may not; also the inverse [m, rad] of that of a pose (chosen).
+ANCHOR = 0.5
+EVEN = 1e-6
 SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
 BEGIN = 0.1  # of the walks in a second, times the noise or the rate; first guess
-LEAST = 1e-3  # of the noise, and of the walks over the whole run; less makes no difference to a path (chosen)
+LEAST = 1e-3  # of the noise, and of the walks over the whole run; less changes no path (chosen)
 SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
-STILL = (
-    1e-6  # relative change of all deviations in a sweep that ends them; chosen: no digit told changes
-)
+STILL = 1e-6  # relative change of all deviations in a sweep that ends them (chosen)
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 
@@ -128,7 +125,7 @@ class PathProblem:
         add(CLOCK, of, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
         add(RATE, [(STATES * np.arange(m) + clock, one)], np.ones(m), one)
         for i in range(clock):
-            add(FIXED, [(STATES * np.arange(m) + i, np.array([HOLD]))], np.zeros(m), one)
+            add(FIXED, [(STATES * np.arange(m) + i, np.array([EVEN]))], np.zeros(m), one)
         equation, unknown, factor = (np.concatenate(each) for each in zip(*entries, strict=True))
         self.right, group = np.concatenate(right), np.concatenate(groups)
         matrix = csr_array((factor, (equation, unknown)), shape=(group.size, STATES * m))

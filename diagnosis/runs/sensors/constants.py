@@ -1,7 +1,7 @@
-"""What may be constantly wrong between two channels: how it would move or turn the ship that they tell.
+"""Constant faults between two channels: how each would move or turn the ship.
 
-Each fault is a column: the path that one unit of it adds to what velocity and yaw rate say, so that it is
-found by least squares together with all others.
+Each fault is a column: the path that one unit of it adds to what velocity and yaw rate say, so that it
+is found by least squares together with all others.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,8 +24,8 @@ DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
     "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
     "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
 }
-# Smaller faults are not reported, as they matter in no manoeuvre; metres and seconds are those of CyberShip
-# Enterprise 1, times the scale of the ship. All chosen.
+# Smaller faults are not reported, as they matter in no manoeuvre; metres and seconds are those of
+# CyberShip Enterprise 1, times the scale of the ship. All chosen.
 LEAST_SCALE = 0.005  # of the channel
 LEAST_ANGLE = 0.0035  # rad, 0.2 deg
 LEAST_RATE = 1e-3  # rad/s: half a degree in a window of prediction

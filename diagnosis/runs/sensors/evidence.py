@@ -126,7 +126,7 @@ def spread_of(values: np.ndarray) -> float:
 def blocked_fit(
     columns: np.ndarray, right: np.ndarray, time: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares on a run whose errors last, and the standard deviation by the jackknife over its parts.
+    """Least squares where errors last, and the standard deviation by the jackknife over the run's parts.
 
     Args:
         columns: (d n, k), what one unit of each unknown gives.

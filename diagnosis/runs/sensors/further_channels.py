@@ -1,9 +1,9 @@
-"""Channels in addition to pose, velocity and yaw rate, each fitted to these by least squares over the run.
+"""Channels in addition to pose, velocity and yaw rate, each fitted to these by least squares.
 
 A second receiver of the pose: where its antenna is, and which is late or turned. Acceleration: in the
-ship's axes u' = a_x + v r and v' = a_y - u r. Over a window the change of the velocity, less what turning
-makes of it, is the integral of the true acceleration, and so of the measured one but for scale, offsets,
-axes and place. The integral is nearly free of noise, so that least squares is not biased by it. Speed
+ship's axes u' = a_x + v r and v' = a_y - u r. Over a window the change of the velocity, less what
+turning makes of it, is the integral of the true acceleration, and so of the measured one but for scale,
+offsets, axes and place. The integral is nearly free of noise and does not bias least squares. Speed
 through the water: nu = nu_water / scale + R(psi)^T V with a current V that is constant over the run; on
 several headings the two differ. The current is not a fault; a note states it.
 """

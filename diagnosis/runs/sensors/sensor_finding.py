@@ -52,7 +52,7 @@ class SensorFinding:
         alike: tuple[str, ...] = (),
         repaired: bool = True,
     ) -> "SensorFinding":
-        """A fault (channel, kind, unit) with a normal error, between the first and last of some times [s]."""
+        """A fault (channel, kind, unit) with a normal error, from the first to the last of times [s]."""
         interval, (channel, kind, unit) = (value - Z95 * std, value + Z95 * std), fault
         ends = float(time[0]), float(time[-1])
         return cls(channel, kind, value, unit, interval, *ends, sentence, alike, repaired)

@@ -26,8 +26,6 @@ from .penalised import Fit, Problem, solve
 ROUNDS = 3  # of gains and smoothness in turn; further ones change neither (chosen)
 # Least fall of -2 log L by gains and delay: twice their number, 9 + 1 (Akaike's criterion).
 PARAMETERS = 20.0
-# Least fall of -2 log L by another round: far above rounding, and far below what any parameter is worth.
-BETTER = 1e-3
 
 
 def with_commands(
@@ -56,7 +54,7 @@ def with_commands(
         cost = deviance(rest, weights, near)
         if cost >= least:
             break
-        found, least = (rest, near, response._replace(sure=sure)), cost - BETTER
+        found, least = (rest, near, response._replace(sure=sure)), cost
         fit = solve(rest, near, weights)
     if found is None:
         return alone.problem, alone.smoothness, CommandResponse.none(commands.psi.size)

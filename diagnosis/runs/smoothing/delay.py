@@ -22,7 +22,6 @@ from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
 from .spline import basis, knots, middles
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-COARSE = 0.2  # s, between the delays that are tried first
 LONGEST = 1.0  # s, of these; the ship has 0.4 s (docs/studies/measured_ship)
 FINE = 0.01  # s, to which a delay is found, or a sampling period if that is longer
 NOTICED = 0.1  # s; a shorter delay is as good as none, and not reported (chosen)
@@ -30,9 +29,8 @@ RANK = 1e-9  # of the largest singular value; below, commands do not differ and 
 # s, lags of motions that are no delay's. Chosen: a ship's own time constants, by factors of four; no
 # shorter one, as a thruster's lag of half a second is a delay for what follows.
 LAGS = (1.0, 4.0, 16.0)
-LATENESS_BLOCK = (
-    5.0  # s; chosen: residuals of a spline are correlated over less than its time constant, a second
-)
+# s; chosen: residuals of a spline are correlated over less than its time constant, a second.
+LATENESS_BLOCK = 5.0
 CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
 
 
@@ -85,7 +83,7 @@ class Regression:
         return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
 
     def thinned(self) -> "Regression":
-        """The same on means of the pose over :data:`NOTICED` seconds, where a spline with such knots does.
+        """The same on means of the pose over NOTICED seconds, where a spline with such knots does.
 
         It does if its time constant, its spacing times the sixth root of its smoothness, is no shorter.
         """
@@ -165,9 +163,8 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     logarithm of their number) is zero.
     """
     period, lateness = regression.commands.track.period, Lateness(regression.thinned())
-    coarse, longest, fine, noticed = (
-        x * regression.time_scale for x in (COARSE, LONGEST, FINE, NOTICED)
-    )
+    longest, fine, noticed = (x * regression.time_scale for x in (LONGEST, FINE, NOTICED))
+    coarse = 2.0 * noticed  # between the delays that are tried first
 
     @cache
     def blocks(periods: int) -> Any:

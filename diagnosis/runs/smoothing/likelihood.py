@@ -10,8 +10,8 @@ As the minimum over c does not move to first order, its derivative is
     d(-2 log L) / d(log s) = s tr(A^-1 K) - rank(K) + s c^T K c / sigma^2.
 
 It is zero where the roughness s c^T K c / sigma^2 has its expected value rank(K) - s tr(A^-1 K). The
-logarithm of their ratio is nearly linear in log s, and its root, the bottom of a valley of -2 log L, is found
-to rounding.
+logarithm of their ratio is nearly linear in log s: its root, the bottom of a valley of -2 log L, takes
+three or four evaluations.
 """
 
 from functools import cache
@@ -30,12 +30,13 @@ ADAPTIONS = 2  # rounds of adapting the penalty; a third changes less than the n
 LEAST_JERK = 0.2  # of the mean square: where there is none, it may yet begin (chosen)
 # Decades of the smoothness: from none at all to motions slower than 7 s at knots of 0.05 s.
 DECADES = (-8.0, 8.0)
-# By decade, growth of the logarithm of the roughness over its expected value for white jerk: 5/6 log 10, the
-# ratio of the integrals of h^2 and h over all frequencies w, with h = 1 / (1 + w^6).
-GROWTH = 1.9
+# Growth by decade of the logarithm of the roughness over its expected value, at the least. For white
+# jerk it is 5/6 log 10, the ratio of the integrals of h^2 and h over all frequencies w, with h = 1 / (1
+# + w^6); with less the root lies between both ends of the first step (chosen: two thirds).
+GROWTH = 1.3
 COARSE = 1.0  # decades, of the search for the valley and of the first step in it (chosen)
-BEYOND = 1.5  # times the distance that this tells: the root then lies between (chosen)
-# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three errors, 1e-8.
+# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three
+# errors, 1e-8.
 LAST_STEP = 1e-4
 MOST_STEPS = 10  # of it, before the slower method of Brent; three are the rule (chosen)
 
@@ -113,7 +114,7 @@ class Criterion:
             )
             near = float(found.x)
         excess = cache(self.excess)
-        before, step = near, float(np.clip(-BEYOND / GROWTH * excess(near), -COARSE, COARSE))
+        before, step = near, float(np.clip(-excess(near) / GROWTH, -COARSE, COARSE))
         if abs(step) < LAST_STEP**2:
             return near
         while True:

@@ -6,6 +6,7 @@ import numpy as np
 
 from .likelihood import adapt, likeliest
 from .penalised import Problem, solve
+from .spline import WIDTH
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
 # Standard deviations from which on the loss of Huber (1964) is linear. Chosen: 95 % of normal noise
@@ -15,7 +16,6 @@ HUBER = 2.0
 FAR = 10.0
 REWEIGHTINGS = 10  # most rounds of reweighting, and of the outlier test; two or three are the rule
 SAME_WEIGHT = 0.02  # change of a robust weight that ends the reweighting; the outlier test follows it
-FEWEST_INLIERS = 6  # samples of a stretch: a spline of degree 5 follows any six
 
 
 class TooFewError(Exception):
@@ -93,7 +93,7 @@ def outlier_test(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> np.
         kept = (off <= OUTLIER * expected).all(axis=1).astype(float)
         if (kept == weights).all():
             break
-        few = np.bincount(stretch, kept) < FEWEST_INLIERS
+        few = np.bincount(stretch, kept) < WIDTH  # a spline of degree 5 follows any six
         if few.any():
             raise TooFewError(p.rows[few[stretch]])
         weights = kept

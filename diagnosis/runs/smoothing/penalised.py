@@ -2,17 +2,17 @@
 
     c = argmin  sum_g p_g sum_i w_i (y_i - (M c)_i)^2,        A = sum_g p_g N_g,   N_g = M_g^T W M_g,
 
-for precisions p_g. The sensors' checks estimate a path so (:mod:`..sensors.clock_path`), and the smoother
-each channel of the pose, z = B c + noise of standard deviation sigma, with the rows R of a penalty
-K = R^T R as a second group, of precision s / sigma^2: the mean of a process whose jerk is white, of density
-sigma^2 / (s h^5) (Kimeldorf and Wahba 1970). All sums of squares are those of residuals, and each solution
-is refined once, so that neither rounding in M^T M nor an origin far away shows (corrected seminormal
-equations, Bjorck 1987).
+for precisions p_g. The sensors' checks estimate a path so (:mod:`..sensors.clock_path`), and the
+smoother each channel of the pose, z = B c + noise of standard deviation sigma, with the rows R of a
+penalty K = R^T R as a second group, of precision s / sigma^2: the mean of a process whose jerk is
+white, of density sigma^2 / (s h^5) (Kimeldorf and Wahba 1970). All sums of squares are those of
+residuals, and each solution is refined once, so that neither rounding in M^T M nor an origin far away
+shows (corrected seminormal equations, Bjorck 1987).
 
-A Kalman filter and smoother give the same. Those of statsmodels 0.15 take 17 ms for the likelihood of one
-channel of 11,651 samples at 50 Hz (9 ms once the gain is taken as constant) and 40 ms for the smoothed
-states and their variances, where this takes 1.8 ms and 22 ms (one of two cores of an AMD EPYC). Therefore
-they are not used here.
+A Kalman filter and smoother give the same. Those of statsmodels 0.15 take 17 ms for the likelihood of
+one channel of 11,651 samples at 50 Hz (9 ms once the gain is taken as constant) and 40 ms for the
+smoothed states and their variances, where this takes 1.8 ms and 22 ms (one of two cores of an AMD
+EPYC). Therefore they are not used here.
 """
 
 from dataclasses import dataclass, replace
@@ -95,7 +95,7 @@ class System:
     def trace(self, group: int) -> float:
         """p_g tr(A^-1 N_g) = d log |A| / d log p_g, by a complex step (Squire and Trapp 1998).
 
-        It is the imaginary part of log |A + i p_g N_g|: exact to rounding, in the time of one factorisation.
+        It is the imaginary part of log |A + i p_g N_g|: exact to rounding, by one factorisation.
         """
         lower = self.normal + 1j * NUDGE * self.precision[group] * self.equations.normals[group]
         width, size = lower.shape

@@ -7,6 +7,7 @@ the jerk by restricted maximum likelihood, and how it varies over time from the 
 is a spike.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,13 +18,13 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import Counts, Track, noise
+from ..cleaning import SHORTEST, Counts, Track, noise
+from ..sensors.evidence import VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
 from .delay import NOTICED
 from .likelihood import adapt
-from .measured_rates import ALONE, Agreeing, measured_rates
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
 from .spline import Knots, basis, knots
@@ -32,13 +33,17 @@ from .spline import Knots, basis, knots
 # s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
 BREAK = 3.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
-AVERAGE = 8.0  # s over which the squared jerk is averaged; chosen, as long as a prediction window
 FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
 # The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
 # has a time constant of two sampling periods, 64 = 2^6.
 LOCAL = 64.0
+
+
+# Channel -> standard deviation of what it says over a sampling period, in SI.
+Agreeing = Mapping[str, float]
+ALONE: Agreeing = {}
 
 
 class PoseOnly(NamedTuple):
@@ -184,7 +189,8 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     z = track.pose[dense] - origin
     sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
-    average = max(1, round(AVERAGE * scale.time / grid.spacing))
+    # The squared jerk is averaged over a prediction window.
+    average = max(1, round(SHORTEST * scale.time / grid.spacing))
     spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
     return Problem(dense, z, sigma, average, spline), origin
 
@@ -243,6 +249,40 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         response.sure,
         pose_only,
     )
+
+
+def measured_rates(
+    track: Track, rows: np.ndarray, psi: np.ndarray, agreeing: Agreeing, grid: Knots
+) -> tuple[np.ndarray, Rates] | None:
+    """Measured derivatives at samples of the pose.
+
+    Args:
+        track: the run.
+        rows: of the samples of the pose.
+        psi: (n,), heading [rad].
+        agreeing: channels that count, with their noise; no noise is less than that of third differences.
+        grid: knots of the spline.
+
+    Returns:
+        The rows that have them all, and the derivatives; None: there are none.
+    """
+    run = track.run
+    by = next((pair for pair in VELOCITIES if pair[0] in agreeing), None)
+    names = [*(by or ()), *(["r"] if "r" in agreeing else [])]
+    if not names:
+        return None
+    at = rows[np.all([np.isfinite(run.measured[name][rows]) for name in names], axis=0)]
+    if not at.size:
+        return None
+    z, sigma = np.zeros((at.size, 3)), np.full(3, np.inf)
+    if by is not None:
+        z[:, :2] = velocity_over_ground(run.rows(at), by, psi[at])
+        sigma[:2] = max(agreeing[by[0]], run.noise.get(by[0], 0.0))
+    if "r" in agreeing:
+        z[:, 2] = run.measured["r"][at]
+        sigma[2] = max(agreeing["r"], run.noise.get("r", 0.0))
+    sigma = np.maximum(sigma, noise(z))
+    return at, Rates(z, basis(grid, run.time[at] - run.time[0], 1), sigma)
 
 
 def breaks(rows: np.ndarray, track: Track) -> np.ndarray:

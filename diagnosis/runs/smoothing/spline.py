@@ -47,9 +47,8 @@ def _products(pieces: np.ndarray) -> np.ndarray:
 
 
 PARABOLAS = _products(_pieces(DEGREE - 3))  # of the third derivative
-DIFFERENCE = np.array(
-    [-1.0, 3.0, -3.0, 1.0]
-)  # third difference of coefficients: those of the third derivative
+# Third difference of coefficients: a coefficient of the third derivative.
+DIFFERENCE = np.diff(np.eye(DEGREE - 1), 3, axis=0)[0]
 
 
 class Knots(NamedTuple):
@@ -125,7 +124,7 @@ class Basis:
         return (self._pairs.T @ weights).reshape(WIDTH, self.size)
 
     def variance(self, inverse: np.ndarray) -> np.ndarray:
-        """(n, channels): variance of a spline whose coefficients have this covariance (6, size, channels)."""
+        """(n, channels): variance of a spline, by that (6, size, channels) of its coefficients."""
         twice = np.where(np.arange(WIDTH) == 0, 1.0, 2.0)[:, None, None] * inverse
         return self._pairs @ twice.reshape(WIDTH * self.size, -1)
 
