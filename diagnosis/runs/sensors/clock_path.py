@@ -214,7 +214,8 @@ class Path:
         self.constants = self.covariance @ (border.T @ left)
         self.clock = (found[:, 0] - self._by_constants @ self.constants)[CLOCKS][:-1]
         self.residual = left - border @ self.constants
-        prior = sum(self.system.precision[g] * problem.equations.normals[g] for g in (CLOCK, RATE))
+        clocks = [CLOCK, RATE]
+        prior = np.tensordot(self.system.precision[clocks], problem.equations.normals[clocks], 1)
         factor = cholesky_banded(prior[::STATES, CLOCKS], lower=True)
         self.criterion = self.system.deviance(self.residual) - 2.0 * float(np.log(factor[0]).sum())
 
@@ -236,10 +237,8 @@ class Path:
 def _normal(matrix: csr_array, root: np.ndarray) -> np.ndarray:
     """(band, unknowns): lower band of M^T W M, in which two neighbouring nodes lie."""
     normal = matrix.T @ (matrix * (root**2)[:, None])
-    band = np.zeros((2 * STATES, matrix.shape[1]))
-    for k in range(len(band)):
-        band[k, : band.shape[1] - k] = normal.diagonal(-k)
-    return band
+    bands = [np.pad(normal.diagonal(-k), (0, k)) for k in range(2 * STATES)]
+    return np.array(bands)
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:

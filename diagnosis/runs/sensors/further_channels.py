@@ -39,7 +39,7 @@ class _Fault(NamedTuple):
 
 
 def _findings(
-    faults: Sequence[_Fault], values: Sequence[float], std: Sequence[float], time: np.ndarray
+    faults: Sequence[_Fault], values: np.ndarray, std: np.ndarray, time: np.ndarray
 ) -> list[SensorFinding]:
     """Of values and their standard deviations those that are sure and matter, at times (n,) [s]."""
     return [
@@ -57,7 +57,7 @@ def receivers(run: Run, scale: Scale) -> Examined:
     psi, two, repaired = run.pose[:, 2], run.measured, dict(run.measured)
     found: list[SensorFinding] = []
     if {"x_2", "y_2"} <= two.keys():
-        there = np.isfinite(np.column_stack([run.pose, two["x_2"], two["y_2"]])).all(axis=1)
+        there = np.all(np.isfinite([*run.pose.T, two["x_2"], two["y_2"]]), axis=0)
         if there.sum() >= FEWEST:
             found += _places(run.rows(there), scale)
             value = {(f.channel, f.kind): f.value for f in found}
@@ -138,8 +138,8 @@ def accelerations(run: Run, scale: Scale) -> Examined:
         _Fault("a_x", "place", "m", least, place + "ahead of where the velocity is"),
         _Fault("a_y", "place", "m", least, place + "to starboard of where the velocity is"),
     )
-    values = [1.0 / factor, *(-value[1:3] / factor), -turn, *value[4:]]
-    found = _findings(faults, values, [std[0] / factor**2, *std[1:]], time)
+    values = np.array([1.0 / factor, *(-value[1:3] / factor), -turn, *value[4:]])
+    found = _findings(faults, values, np.array([std[0] / factor**2, *std[1:]]), time)
     if not found:
         return Examined(run)
     true = value[0] * a + value[3] * across + value[1:3]
@@ -170,7 +170,7 @@ def through_water(run: Run, scale: Scale) -> Examined:
         )
     text = "the speed through the water is {:.4g} times what the velocity over ground says"
     fault = _Fault(WATER[given[0]], "scale", "1", LEAST_SCALE, text)
-    found = _findings([fault], [1.0 / value[0]], [std[0] / value[0] ** 2], e.time)
+    found = _findings([fault], 1.0 / value[:1], std[:1] / value[:1] ** 2, e.time)
     if not found:
         return Examined(run, notes=notes)
     measured = dict(e.run.measured)

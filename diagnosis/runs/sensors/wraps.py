@@ -33,8 +33,8 @@ def wraps(run: Run, scale: Scale) -> Examined:
         else:
             measured[name] = repaired
         text = f"{name} was interpolated where it wraps, in {rows.size} rows"
-        fault, many = (name, "wrap", "1"), float(rows.size)
-        findings.append(SensorFinding.estimated(fault, many, 0.0, run.time[rows], text))
+        many, time = float(rows.size), run.time[rows]
+        findings.append(SensorFinding.estimated((name, "wrap", "1"), many, 0.0, time, text))
     if not findings:
         return Examined(run)
     return Examined(replace(run, pose=pose, measured=measured), tuple(findings))

@@ -27,7 +27,8 @@ from .spline import Basis, Knots, basis, inverse_band, roughness
 
 NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
 # Cholesky factors of a banded matrix, and the solution by them.
-PBTRF, PBTRS = (get_lapack_funcs(name, dtype=float) for name in ("pbtrf", "pbtrs"))
+PBTRF: Any = get_lapack_funcs("pbtrf", dtype=float)
+PBTRS: Any = get_lapack_funcs("pbtrs", dtype=float)
 GBTRF: Any = get_lapack_funcs("gbtrf", dtype=complex)  # LU factors of a banded matrix
 POSE, JERK = range(2)  # groups of a smoothing spline
 
@@ -179,10 +180,8 @@ class Problem(NamedTuple):
 
     def data(self, channel: int, z: np.ndarray) -> np.ndarray:
         """y for measurements z (n, k) of a channel."""
-        y, many = np.zeros((self.spline.parts[channel][0].shape[0], z.shape[1])), len(z)
-        y[:many] = z
-        y[many : many + len(self.spline.rates.z)] = self.spline.rates.z[:, [channel]]
-        return y
+        rates = np.tile(self.spline.rates.z[:, [channel]], z.shape[1])
+        return np.vstack([z, rates, np.zeros((self.spline.grid.rank, z.shape[1]))])
 
     def equations(self, weights: np.ndarray) -> list[Equations]:
         """Those of each channel, in standard deviations of the pose, for weights (n,) of the samples."""
@@ -190,13 +189,11 @@ class Problem(NamedTuple):
         of_rates, found = rates.b.gram(np.ones(len(rates.z))), []
         for k, (matrix, turned, penalty) in enumerate(self.spline.parts):
             share = float(self.sigma[k] / rates.sigma[k])
-            roots = np.sqrt(weights), np.full(len(rates.z), share)
-            many = weights.size + len(rates.z)
-            root = np.concatenate([*roots, np.ones(matrix.shape[0] - many)])
-            group = np.where(np.arange(root.size) < many, POSE, JERK)
+            many, rank = weights.size + len(rates.z), self.spline.grid.rank
+            root = np.concatenate([np.sqrt(weights), np.full(len(rates.z), share), np.ones(rank)])
+            group = np.repeat([POSE, JERK], [many, rank])
             normals = np.array([of_pose + share**2 * of_rates, penalty])
-            counts = np.array([many, self.spline.grid.rank])
-            found.append(Equations(matrix, turned, root, group, normals, counts))
+            found.append(Equations(matrix, turned, root, group, normals, np.array([many, rank])))
         return found
 
     def precision(self, channel: int, smoothness: float) -> np.ndarray:
