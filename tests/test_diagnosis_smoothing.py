@@ -249,13 +249,12 @@ def test_spline_is_exact_for_a_quintic():
     np.testing.assert_allclose(full(band), dense.T @ dense, atol=1e-12)
     square = (wanted.deriv(3) ** 2).integ()
     integral = square(5.0) - square(2.0) + square(10.0) - square(9.0)
-    rough, at = roughness(grid, np.ones(16))
-    stiff = full(rough.gram(np.ones(at.size))) / 0.25**5
+    rough, band = roughness(grid, np.ones(16))
+    stiff = full(band) / 0.25**5
+    np.testing.assert_allclose(band, rough.gram(np.ones(20)), atol=1e-12)
     np.testing.assert_allclose((rough(c)[:, 0] ** 2).sum() / 0.25**5, integral, rtol=1e-6)
     assert (c.T @ stiff @ c).item() == pytest.approx(integral, rel=1e-5)
     assert np.linalg.matrix_rank(stiff, tol=1e-9 * np.abs(stiff).max()) == grid.rank
-    assert (at >= grid.start[0]).all()
-    assert np.diff(at)[:13] == pytest.approx(0.25), "of the first stretch"
 
 
 def full(band):
@@ -270,8 +269,7 @@ def test_band_of_the_inverse_is_that_of_the_inverse():
     time = np.sort(rng.uniform(0.0, 40.0, 1500))
     b = basis(grid, time[(time < 20.0) | (time > 22.5)])
     bands = [
-        b.gram(np.ones(b.first.size)) + s * roughness(grid, np.ones(800))[0].gram(np.ones(802))
-        for s in (1e-2, 1.0, 1e4)
+        b.gram(np.ones(b.first.size)) + s * roughness(grid, np.ones(800))[1] for s in (1e-2, 1.0, 1e4)
     ]
     found = inverse_band(np.array([cholesky_banded(band, lower=True) for band in bands]))
     for c, band in enumerate(bands):

@@ -135,8 +135,8 @@ def test_a_compass_off_by_heading_is_no_clock_that_wanders():
 
 @pytest.mark.parametrize("either", [True, False])
 def test_a_clock_that_a_compass_would_look_like_is_told_with_it(monkeypatch, either):
-    monkeypatch.setattr(motion, "_stretches", lambda found: [(0.0, 60.0, 1.1, 0.01)])
-    (found,) = motion._clock(SimpleNamespace(wanders=True, either=either))
+    monkeypatch.setattr(motion, "_stretches", lambda path: [(0.0, 60.0, 1.1, 0.01)])
+    (found,) = motion._clock(SimpleNamespace(wanders=True, either=either, path=None))
     assert ("compass" in found.sentence) == ("deviation_sin" in found.alike) == either
     assert found.repaired != either
 
@@ -312,7 +312,7 @@ def test_a_second_antenna_has_its_place_and_delay_and_a_second_heading_its_offse
 def test_stretches_of_a_clock_are_off_in_one_sense_and_have_the_mean_of_their_time(monkeypatch):
     mean, std = np.array([1.0, 1.1, 1.2, 1.0, 0.9, 1.1]), np.full(6, 0.001)
     first, last = np.array([0.0, 1.0, 2.0, 6.0, 7.0, 8.0]), np.array([1.0, 2.0, 6.0, 7.0, 8.0, 9.0])
-    monkeypatch.setattr(motion, "_blocks", lambda found: motion._Blocks(mean, std, first, last))
+    monkeypatch.setattr(motion, "_blocks", lambda path: motion._Blocks(mean, std, first, last))
     fast, slow, again = motion._stretches(None)
     assert fast == pytest.approx((1.0, 6.0, 1.18, 0.001 / np.sqrt(2.0)))
     assert slow == pytest.approx((7.0, 8.0, 0.9, 0.001))

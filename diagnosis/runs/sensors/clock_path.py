@@ -53,7 +53,6 @@ class PathProblem:
 
     Args:
         e: what its channels say.
-        constants: faults that are looked for.
         noise: (2,), of the samples' positions and headings [m, rad], to begin with.
         gaps: pairs of times [s] of the log between which it jumps.
         without: samples left out.
@@ -62,13 +61,11 @@ class PathProblem:
     def __init__(
         self,
         e: Evidence,
-        constants: Sequence[Column],
         noise: Sequence[float],
         gaps: Sequence[tuple[float, float]] = (),
         without: frozenset[int] = frozenset(),
     ) -> None:
-        self.evidence, self.constants, self.noise = e, constants, noise
-        self.gaps, self.without = gaps, without
+        self.evidence, self.noise, self.gaps, self.without = e, noise, gaps, without
         time, rows = e.time, e.rows
         for start, end in gaps:
             rows = rows[(time[rows] <= start) | (time[rows] >= end)]
@@ -142,11 +139,11 @@ class PathProblem:
         counts = np.array([np.sum(group == g) if g < CLOCK else 0 for g in range(FIXED + 1)])
         self.equations = Equations(matrix, matrix.T, root, group, normals, counts)
 
-    def border(self, clock: np.ndarray) -> np.ndarray:
+    def border(self, constants: Sequence[Column], clock: np.ndarray) -> np.ndarray:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
-        made = np.zeros((self.right.size, len(self.constants)))
+        made = np.zeros((self.right.size, len(constants)))
         run = np.interp(self.evidence.time, self.edges, integral_of(self.edges, clock))
-        for k, fault in enumerate(self.constants):
+        for k, fault in enumerate(constants):
             path = fault.path
             if fault.clocked:
                 steps = np.diff(path, axis=0) * (np.diff(run) / np.diff(self.evidence.time))[:, None]
@@ -155,17 +152,18 @@ class PathProblem:
                 made[begin : begin + end.size, k] = np.einsum("ij,ij->i", a, path[end] - path[start])
         return made
 
-    def solve(self, fixed_clock: bool = False) -> "Path":
+    def solve(self, constants: Sequence[Column], fixed_clock: bool = False) -> "Path":
         """The likeliest path.
 
         Args:
+            constants: faults that are looked for.
             fixed_clock: whether the clock is taken to run evenly at rate 1.
         """
         place, angle = self.noise
         samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
         std = np.array([*samples, *(BEGIN * walk), EVEN if fixed_clock else ANCHOR, 1.0])
         least = LEAST * np.array([*samples, *(walk / np.sqrt(self.edges[-1] - self.edges[0]))])
-        path = Path(self, std, np.ones(self.nodes.size - 1))
+        path = Path(self, constants, std, np.ones(self.nodes.size - 1))
         for _ in range(SWEEPS):
             std = path.std.copy()
             for g in self.present:
@@ -175,7 +173,7 @@ class PathProblem:
                 free = max(off.size - path.system.trace(g), 1.0)
                 std[g] = max(std[g] * float(np.sqrt((off**2).sum() / free)), least[g])
             changed = (np.abs(std - path.std) > STILL * path.std).any()
-            path = Path(self, std, path.clock)
+            path = Path(self, constants, std, path.clock)
             if not changed:
                 break
         return path
@@ -193,7 +191,8 @@ class Path:
     """The likeliest path for some variances.
 
     Args:
-        p: its equations.
+        problem: its equations.
+        columns: constant faults that are looked for.
         std: (8,), standard deviations of the groups.
         clock: (m - 1,), rate of the clock between the nodes, by which the constants act.
 
@@ -201,14 +200,16 @@ class Path:
         clock: (m - 1,), rate c between the nodes.
         constants: (k,), value of each constant fault.
         covariance: (k, k), of these.
-        std: (8,), standard deviations of the groups.
         residual: standardised, of each equation.
         criterion: -2 log of the likelihood, restricted to all but the constants.
     """
 
-    def __init__(self, p: PathProblem, std: np.ndarray, clock: np.ndarray) -> None:
-        self.std, self.system = std, System(p.equations, std**-2.0)
-        data = np.column_stack([p.right, p.border(clock)])
+    def __init__(
+        self, problem: PathProblem, columns: Sequence[Column], std: np.ndarray, clock: np.ndarray
+    ) -> None:
+        self.problem, self.columns, self.std = problem, columns, std
+        self.system = System(problem.equations, std**-2.0)
+        data = np.column_stack([problem.right, problem.border(columns, clock)])
         found = self.system.solve(data)
         off = self.system.residual(data, found)
         left, border, self._by_constants = off[:, 0], off[:, 1:], found[:, 1:]
@@ -216,9 +217,14 @@ class Path:
         self.constants = self.covariance @ (border.T @ left)
         self.clock = (found[:, 0] - self._by_constants @ self.constants)[CLOCKS][:-1]
         self.residual = left - border @ self.constants
-        prior = sum(self.system.precision[g] * p.equations.normals[g] for g in (CLOCK, RATE))
+        prior = sum(self.system.precision[g] * problem.equations.normals[g] for g in (CLOCK, RATE))
         factor = cholesky_banded(prior[::STATES, CLOCKS], lower=True)
         self.criterion = self.system.deviance(self.residual) - 2.0 * float(np.log(factor[0]).sum())
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """(k,), standard deviation of the constants."""
+        return np.sqrt(np.diag(self.covariance))
 
     def mean_clock(self, weights: np.ndarray) -> np.ndarray:
         """(k,): standard deviation of weighted means (k, m) of the clock's rate at the nodes."""

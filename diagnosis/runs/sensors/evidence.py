@@ -146,3 +146,9 @@ def blocked_fit(
     parts = np.array([solved(block != k) for k in range(BLOCKS)])
     std = np.sqrt((BLOCKS - 1) / BLOCKS * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
     return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
+
+
+def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
+    """First index, and the one after the last, of each group of successive true values (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))

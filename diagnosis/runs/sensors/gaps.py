@@ -1,11 +1,9 @@
 """Jumps of the log's clock: between two samples the ship goes as far as it does in another time."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..cleaning import LONG
-from .evidence import AGREED, Evidence, spread_of
+from .evidence import AGREED, Evidence, groups_of, spread_of
 from .sensor_finding import Z95, SensorFinding
 
 FAR = 8.0  # robust standard deviations of how far steps differ from what the speed says (chosen)
@@ -22,40 +20,13 @@ AROUND = 5  # samples before and after, in which a spike returns, and whose spee
 SPEED = 0.01  # relative uncertainty of a speed that does not change (chosen)
 
 
-class Gap(NamedTuple):
-    """A jump of the clock.
-
-    Attributes:
-        start, end: the log's time before and after [s].
-        missing: true time that passed, less the log's [s].
-        interval: in which that is, 95 % [s].
-    """
-
-    start: float
-    end: float
-    missing: float
-    interval: tuple[float, float]
-
-    @property
-    def finding(self) -> SensorFinding:
-        """The same as a finding."""
-        start, end = self.start, self.end
-        many = "are missing in" if self.missing > 0.0 else "were never in"
-        text = f"{abs(self.missing):.3g} s {many} the log near {0.5 * (start + end):.1f} s"
-        return SensorFinding("time", "clock_gap", self.missing, "s", self.interval, start, end, text)
-
-
-def gaps(e: Evidence) -> list[Gap]:
-    """Jumps of the clock, found by position and velocity."""
+def gaps(e: Evidence) -> list[SensorFinding]:
+    """Jumps of the clock, found by position and velocity: true time that passed, less the log's [s]."""
     if e.velocity is None:
         return []
     rows, time = e.rows, e.time[e.rows]
-    step, moved, said = (
-        np.diff(time),
-        np.diff(e.run.pose[rows, :2], axis=0),
-        np.diff(e.gone[rows], axis=0),
-    )
-    speed = np.hypot(*e.velocity[rows].T)
+    place, psi, speed = e.run.pose[rows, :2], e.psi[rows], np.hypot(*e.velocity[rows].T)
+    step, moved, said = np.diff(time), np.diff(place, axis=0), np.diff(e.gone[rows], axis=0)
     way = np.hypot(*moved.T)
     mean = 0.5 * (speed[1:] + speed[:-1])
     going = mean > 0.2 * float(np.median(speed))
@@ -64,7 +35,7 @@ def gaps(e: Evidence) -> list[Gap]:
     beyond = late * mean  # m; where a ship is slow, noise of the position is a long time
     noise = spread_of(beyond)
     aligned = (moved * said).sum(axis=1) > AGREED * way * np.hypot(*said.T)
-    turned = np.diff(e.psi[rows]) - np.diff(e.turned[rows])
+    turned = np.diff(psi) - np.diff(e.turned[rows])
     least = FAR * spread_of(turned)
     # Position and heading jump together in time alone, however the ship went meanwhile.
     missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
@@ -72,32 +43,30 @@ def gaps(e: Evidence) -> list[Gap]:
     shortest = max(SHORTEST, 2.0 * period)
     jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > shortest)
     jumps &= going & (missing | ahead)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], jumps, [0]]).astype(int)))
     found = []
-    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for a, b in groups_of(jumps):
         before, after = max(0, a - AROUND), min(time.size - 1, b + AROUND)
-        net = np.hypot(*(e.run.pose[rows[after], :2] - e.run.pose[rows[before], :2]))
+        net = np.hypot(*(place[after] - place[before]))
         at = np.median(speed[before : a + 1]), np.median(speed[b : after + 1])
-        u = float(np.mean(at))
-        arc = float(
-            _arc(e.run.pose[rows[b], :2] - e.run.pose[rows[a], :2], e.psi[rows[b]] - e.psi[rows[a]])
-        )
+        u, arc = float(np.mean(at)), _arc(place[b] - place[a], psi[b] - psi[a])
         value = float(arc / u - (time[b] - time[a]))
-        if abs(value) <= shortest or (
-            value > 0.0 and net / u - (time[after] - time[before]) < 0.5 * value
-        ):
-            continue  # a spike of the position, which comes back
+        returns = value > 0.0 and net / u - (time[after] - time[before]) < 0.5 * value
+        if abs(value) <= shortest or returns:  # a spike of the position
+            continue
         reach = max(abs(value), 2.0 * period)
         near = (time > time[a] - reach) & (time < time[b] + reach)
         share = float(np.hypot((at[1] - at[0]) / 2.0, np.std(speed[near])) / u)
-        share += 1.0 - float(np.exp(-0.5 * np.var(e.psi[rows[near]])))  # of a way that bends
+        share += 1.0 - float(np.exp(-0.5 * np.var(psi[near])))  # of a way that bends
         half = Z95 * float(np.hypot(noise / u, value * (share + SPEED)))
         low, high = value - half, value + half
         if value > 0.0:
             by_speed = value, max(low, 0.0), high
             likely = _elsewhere(e, speed, (a, b), value) or by_speed
             value, low, high = min(likely, by_speed, key=lambda each: each[2] - each[1])
-        found.append(Gap(float(time[a]), float(time[b]), value, (low, high)))
+        start, end = float(time[a]), float(time[b])
+        many = "are missing in" if value > 0.0 else "were never in"
+        text = f"{abs(value):.3g} s {many} the log near {0.5 * (start + end):.1f} s"
+        found.append(SensorFinding("time", "clock_gap", value, "s", (low, high), start, end, text))
     return found
 
 

@@ -16,7 +16,7 @@ from ..files.reading import Run
 from .clock_path import DRIFT, HEADING, TURN, Path, PathProblem, integral_of
 from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
 from .evidence import SURE, Evidence, evidence, straight
-from .gaps import Gap, gaps
+from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
@@ -43,25 +43,16 @@ class Motion(NamedTuple):
     """Faults that were found.
 
     Attributes:
-        problem: the equations.
-        solution: with a clock that wanders, or without.
+        path: with the constant faults that are sure and matter, with a clock that wanders or without.
         wanders: whether it does.
-        kept: constant faults that are sure and matter.
         either: whether a compass that is off by heading would look like that clock.
         torn: whether way and turn would each need a clock of its own.
     """
 
-    problem: PathProblem
-    solution: Path
+    path: Path
     wanders: bool
-    kept: list[Column]
     either: bool = False
     torn: bool = False
-
-    @property
-    def std(self) -> np.ndarray:
-        """(k,), of the constants."""
-        return np.sqrt(np.diag(self.solution.covariance))
 
 
 def motion(run: Run, scale: Scale) -> Examined:
@@ -74,8 +65,7 @@ def motion(run: Run, scale: Scale) -> Examined:
         found = _estimated(e, columns(e, scale), jumps)
     except LinAlgError:
         return Examined(run, notes=("the channels beside the pose do not determine a motion",))
-    findings = [jump.finding for jump in jumps]
-    findings += _clock(found) + _constants(found, e)
+    findings = [*jumps, *_clock(found), *_constants(found, e)]
     late = [f for f in findings if f.kind == "delay"]
     if late:  # its column is a tangent: all else is estimated once it is gone
         first = corrected(e, Correction({(f.channel, f.kind): f.value for f in late}))
@@ -101,72 +91,61 @@ def _added(late: Sequence[SensorFinding], rest: Sequence[SensorFinding]) -> Iter
             yield replace(f, value=f.value + more, ci95=(low, high))
 
 
-def _correction(found: Motion, jumps: Sequence[Gap], fixes: Sequence[SensorFinding]) -> Correction:
+def _correction(
+    found: Motion, jumps: Sequence[SensorFinding], fixes: Sequence[SensorFinding]
+) -> Correction:
     """What findings say of the run."""
     values = {(f.channel, f.kind): f.value for f in fixes if f.channel != "time"}
     rates = [f.value for f in fixes if f.kind == "clock_rate"]
     wanders = found.wanders and not found.either
     if not (wanders or rates or jumps):
         return Correction(values)
-    problem, clock = found.problem, found.solution.clock
+    problem, clock = found.path.problem, found.path.clock
     if not wanders:
         clock = np.full_like(clock, rates[0] if rates else 1.0)
     true = problem.edges[0] + integral_of(problem.edges, np.where(problem.cut, 1.0, clock))
     return Correction(values, problem.edges, true, jumps)
 
 
-def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[Gap]) -> Motion:
+def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFinding]) -> Motion:
     """The likeliest clock and the constants that are sure."""
     cut = [(jump.start, jump.end) for jump in jumps]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
     sizes = max(float(np.hypot(*sigma[:2])), LEAST_NOISE), max(float(sigma[2]), LEAST_NOISE)
-    free = _without_level(e, every)
-    wandering = PathProblem(e, free, sizes, cut)
-    loose = wandering.solve()
-    if without := wandering.outliers(loose):
-        wandering = PathProblem(e, free, sizes, cut, without)
-        loose = wandering.solve()
-    problem = PathProblem(e, every, sizes, cut, without)
-    columns, solution = list(every), problem.solve(fixed_clock=True)
+    # Where the mean rate of the clock is free, there is one scale less.
+    level = "r" if e.rate is not None else (e.by or ("",))[0]
+    free = [c for c in every if (c.channel, c.kind) != (level, "scale")]
+    problem = PathProblem(e, sizes, cut)
+    loose = problem.solve(free)
+    if without := problem.outliers(loose):
+        problem = PathProblem(e, sizes, cut, without)
+        loose = problem.solve(free)
+    path = problem.solve(every, fixed_clock=True)
     likelier, deviates = (float(chdtri(k, CHANCE)) for k in (1, len(DEVIATIONS)))
-    wanders = solution.criterion - loose.criterion > likelier
-    wanders = wanders and _uneven(Motion(wandering, loose, True, []))
+    wanders = path.criterion - loose.criterion > likelier and _uneven(loose)
     if wanders:
-        problem, columns, solution = wandering, free, loose
+        path = loose
     swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
     # A compass that is off by heading looks like a wandering clock.
     if e.rate is not None and (swung or wanders):
-        deviating = [*every, *deviations(e)]
-        even = PathProblem(e, deviating, sizes, cut, without)
-        told = even.solve(fixed_clock=True)
-        either = told.criterion + deviates < solution.criterion + likelier * wanders
+        deviating = problem.solve([*every, *deviations(e)], fixed_clock=True)
+        either = deviating.criterion + deviates < path.criterion + likelier * wanders
         if either and swung:
-            problem, columns, solution, wanders, either = even, deviating, told, False, False
+            path, wanders, either = deviating, False, False
     either = either or (wanders and e.velocity is None)  # nor does a way tell of it
-    torn = wanders and not either and _two_clocks(Motion(problem, solution, True, columns))
+    torn = wanders and not either and _two_clocks(path)
     if torn:  # nor is what is wrong a constant: of these a delay alone may have torn them
-        wanders, columns = False, [c for c in every if c.kind == "delay"]
-        problem = PathProblem(e, columns, sizes, cut, without)
-        solution = problem.solve(fixed_clock=True)
-    while len(kept := _sure(columns, solution)) < len(columns):
-        problem, columns = PathProblem(e, kept, sizes, cut, without), kept
-        solution = problem.solve(fixed_clock=not wanders)
-    return Motion(problem, solution, wanders, columns, either, torn)
+        wanders = False
+        path = problem.solve([c for c in every if c.kind == "delay"], fixed_clock=True)
+    while len(kept := _sure(path)) < len(path.columns):
+        path = problem.solve(kept, fixed_clock=not wanders)
+    return Motion(path, wanders, either, torn)
 
 
-def _without_level(e: Evidence, every: Sequence[Column]) -> list[Column]:
-    """The constants that can be told beside a clock whose mean rate is free: one scale less."""
-    named = "r" if e.rate is not None else (e.by or ("",))[0]
-    return [c for c in every if (c.channel, c.kind) != (named, "scale")]
-
-
-def _sure(every: Sequence[Column], solution: Path) -> list[Column]:
-    std = np.sqrt(np.diag(solution.covariance))
-    return [
-        c
-        for c, value, s in zip(every, solution.constants, std, strict=True)
-        if abs(value) > max(SURE * s, c.least) and s > 0.0
-    ]
+def _sure(path: Path) -> list[Column]:
+    """Constants that are sure and matter."""
+    found = zip(path.columns, path.constants, path.deviation, strict=True)
+    return [c for c, value, s in found if abs(value) > max(SURE * s, c.least) and s > 0.0]
 
 
 def _clock(found: Motion) -> list[SensorFinding]:
@@ -178,10 +157,10 @@ def _clock(found: Motion) -> list[SensorFinding]:
             return []
         text = text.format(scales[0]) + ", by speed and turn"
         alike = ("scale of all speeds and rates",)
-        return [SensorFinding.estimated(clock, *scales, found.problem.edges, text, alike)]
+        return [SensorFinding.estimated(clock, *scales, found.path.problem.edges, text, alike)]
     alike, or_else = (tuple(DEVIATIONS), f"; {CLOCK_OR_COMPASS}") if found.either else ((), "")
     made = []
-    for begin, end, value, s in _stretches(found):
+    for begin, end, value, s in _stretches(found.path):
         way = "slow" if value > 1.0 else "fast"
         text = f"the log's clock runs {way}: {value:.3g} s pass in a second of it{or_else}"
         ends = np.array([begin, end])
@@ -191,10 +170,10 @@ def _clock(found: Motion) -> list[SensorFinding]:
 
 def _even(found: Motion) -> tuple[float, float] | None:
     """Rate of a clock that runs evenly, and its standard deviation; None: channels agree on none."""
-    at = [k for k, c in enumerate(found.kept) if c.kind == "scale"]
+    at = [k for k, c in enumerate(found.path.columns) if c.kind == "scale"]
     if found.wanders or len(at) < 2:
         return None
-    values, variances = found.solution.constants[at], found.std[at] ** 2
+    values, variances = found.path.constants[at], found.path.deviation[at] ** 2
     if abs(values[0] - values[1]) > max(SURE * np.sqrt(variances.sum()), LEAST_SCALE):
         return None
     weights = 1.0 / variances
@@ -203,9 +182,11 @@ def _even(found: Motion) -> tuple[float, float] | None:
 
 def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
     by_clock = _even(found) is not None
-    turns = e.rate is not None and _turning(found)
-    made = []
-    for c, x, s in zip(found.kept, found.solution.constants.tolist(), found.std.tolist(), strict=True):
+    path, made, edges = found.path, [], found.path.problem.edges
+    # Whether the run turns so much that its turns tell the rate of the clock.
+    drift = path.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
+    turns = e.rate is not None and np.hypot(drift, path.std[HEADING]) < TURNS * np.ptp(e.psi)
+    for c, x, s in zip(path.columns, path.constants.tolist(), path.deviation.tolist(), strict=True):
         value, std, text, alike = x, s, "", ()
         if c.kind == "scale":
             if by_clock:
@@ -215,17 +196,10 @@ def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
             only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
             if not found.wanders and (only or not turns):
                 alike, text = ("clock_rate",), f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}"
-        fault, edges = (c.channel, c.kind, c.unit), found.problem.edges
+        fault = c.channel, c.kind, c.unit
         text = _told(c, value, e) + text
         made.append(SensorFinding.estimated(fault, value, std, edges, text, alike, not alike))
     return made
-
-
-def _turning(found: Motion) -> bool:
-    """Whether the run turns so much that its turns tell the rate of the clock."""
-    e = found.problem.evidence
-    drift = found.solution.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
-    return float(np.hypot(drift, found.solution.std[HEADING])) < TURNS * float(np.ptp(e.psi))
 
 
 def _told(c: Column, value: float, e: Evidence) -> str:
@@ -255,52 +229,50 @@ class _Blocks(NamedTuple):
     last: np.ndarray
 
 
-def _blocks(found: Motion) -> _Blocks:
-    edges, clock = found.problem.edges, found.solution.clock
-    steps = np.where(found.problem.cut, 0.0, np.diff(edges))
+def _blocks(path: Path) -> _Blocks:
+    edges = path.problem.edges
+    steps = np.where(path.problem.cut, 0.0, np.diff(edges))
     wide = max(STRETCH, (edges[-1] - edges[0]) / MOST_STRETCHES)
     part = ((edges[:-1] - edges[0]) / wide).astype(int)
     weights = np.zeros((part.max() + 1, edges.size))
     weights[part, np.arange(part.size)] = steps
     weights = weights[weights.sum(axis=1) > 0.5 * wide]
     weights /= weights.sum(axis=1)[:, None]
-    first = np.array([edges[np.flatnonzero(w)[0]] for w in weights])
-    last = np.array([edges[np.flatnonzero(w)[-1] + 1] for w in weights])
-    return _Blocks(weights[:, :-1] @ clock, found.solution.mean_clock(weights), first, last)
+    ends = np.array([np.flatnonzero(w)[[0, -1]] for w in weights]).T
+    return _Blocks(
+        weights[:, :-1] @ path.clock, path.mean_clock(weights), edges[ends[0]], edges[ends[1] + 1]
+    )
 
 
-def _uneven(found: Motion) -> bool:
+def _uneven(path: Path) -> bool:
     """Whether the clock is off its own mean somewhere, so that no constant fault can be it."""
-    b = _blocks(found)
+    b = _blocks(path)
     off = np.abs(b.mean - np.average(b.mean, weights=b.std**-2.0))
     return bool((off > np.maximum(SURE * b.std, LEAST_CLOCK)).any())
 
 
-def _two_clocks(found: Motion) -> bool:
+def _two_clocks(path: Path) -> bool:
     """Whether way and turn contradict a clock: it acts alike on both, so that each alone tells it."""
-    p, e = found.problem, found.problem.evidence
+    p, e = path.problem, path.problem.evidence
     if e.velocity is None or e.rate is None:
         return False
-    alone = []
-    for needs, part in (
-        ("velocity", replace(e, rate=None)),
-        ("rate", replace(e, velocity=None, by=None)),
-    ):
-        # A scale of the speed is the mean rate of the way's own clock, which does not count here.
-        own = [c for c in found.kept if c.needs == needs and (needs == "rate" or c.kind != "scale")]
-        problem = PathProblem(part, own, p.noise, p.gaps, p.without)
-        alone.append(_blocks(Motion(problem, problem.solve(), True, own)))
-    way, turn = alone
+    # A scale of the speed is the mean rate of the way's own clock, which does not count here.
+    by_way = [c for c in path.columns if c.needs == "velocity" and c.kind != "scale"]
+    by_turn = [c for c in path.columns if c.needs == "rate"]
+    parts = (replace(e, rate=None), by_way), (replace(e, velocity=None, by=None), by_turn)
+    way, turn = (
+        _blocks(PathProblem(part, p.noise, p.gaps, p.without).solve(own)) for part, own in parts
+    )
     weight = 1.0 / (way.std**2 + turn.std**2)
-    rates = np.array([way.mean - turn.mean, _blocks(found).mean])
+    rates = np.array([way.mean - turn.mean, _blocks(path).mean])
     rates -= np.average(rates, axis=1, weights=weight)[:, None]
     apart, off = (weight * rates**2).sum(axis=1).tolist()
     return apart - weight.size > MOST_APART * off
 
 
-def _stretches(found: Motion) -> list[tuple[float, float, float, float]]:
+def _stretches(path: Path) -> list[tuple[float, float, float, float]]:
     """Begin, end [s] and mean rate of the clock with its standard deviation, where it is off."""
-    mean, std, first, last = _blocks(found)
+    mean, std, first, last = _blocks(path)
     off = np.where(np.abs(mean - 1.0) > np.maximum(SURE * std, LEAST_CLOCK), np.sign(mean - 1.0), 0.0)
     made = []
     for way, group in groupby(range(off.size), key=lambda k: off[k]):
@@ -334,7 +306,7 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
 def _agreeing(found: Motion, e: Evidence) -> dict[str, float]:
     """Channels that the pose agrees with, and how far in one sampling period."""
     period = float(np.median(np.diff(e.time[e.rows])))
-    std = found.solution.std
+    std = found.path.std
     agreed = {name: float(std[DRIFT] / np.sqrt(period)) for name in (e.by or ()) if name != "course"}
     if e.rate is not None:
         agreed["r"] = float(std[TURN] / np.sqrt(period))

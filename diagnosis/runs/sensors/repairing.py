@@ -10,7 +10,7 @@ from fmus.frames import rotate_to_body, rotate_to_earth
 from ..files.reading import Run
 from .constants import DEVIATIONS
 from .evidence import Evidence, straight
-from .gaps import Gap
+from .sensor_finding import SensorFinding
 
 TWICE = 2.0  # times nearer to no leeway, from which on an axis is taken as the right one (chosen)
 
@@ -29,7 +29,7 @@ class Correction:
     values: Mapping[tuple[str, str], float]
     log: np.ndarray | None = None
     true: np.ndarray | None = None
-    gaps: Sequence[Gap] = ()
+    gaps: Sequence[SensorFinding] = ()
 
     def of(self, channel: str, kind: str, usual: float = 0.0) -> float:
         """Size of a fault; some usual value where there is none."""
@@ -125,7 +125,7 @@ def _retimed(run: Run, e: Evidence, fix: Correction) -> Run:
     clock += np.minimum(run.time - fix.log[0], 0.0) + np.maximum(run.time - fix.log[-1], 0.0)
     keep = np.ones(run.time.size, bool)
     for gap in fix.gaps:
-        clock += np.where(run.time >= gap.end, gap.missing, 0.0)
+        clock += np.where(run.time >= gap.end, gap.value, 0.0)
         keep &= (run.time <= gap.start) | (run.time >= gap.end)
     pose = np.where(e.filled[:, None], np.nan, run.pose)
     return replace(run, time=clock, pose=pose).rows(keep)

@@ -7,6 +7,7 @@ import numpy as np
 from fmus.scale import Scale
 
 from ..files.reading import Run
+from .evidence import groups_of
 from .sensor_finding import Examined, SensorFinding
 
 ANGLES = ("psi", "psi_2", "course")
@@ -46,9 +47,8 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     usual = float(np.median(np.abs(step))) if step.size else 0.0
     large = np.abs(step) > max(LARGE * usual, LEAST)
     same = large[1:] & large[:-1] & (np.sign(step[1:]) == np.sign(step[:-1]))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same, [0]]).astype(int)))
     changed = []
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for begin, end in groups_of(same):
         a, b = begin, end + 1  # rows before and after all those large steps
         total = angle[b] - angle[a]
         turn = float(np.angle(np.exp(1j * total)))

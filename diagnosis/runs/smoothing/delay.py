@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from .command_motion import Commands
 from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
-from .spline import basis, knots, middles, roughness
+from .spline import basis, knots, middles
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 COARSE = 0.2  # s, between the delays that are tried first
@@ -81,8 +81,7 @@ class Regression:
     @property
     def block(self) -> np.ndarray:
         """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
-        spline = self.problem.spline
-        rows = np.concatenate([self.time, roughness(spline.grid, spline.stiffness[0])[1]])
+        rows = np.concatenate([self.time, middles(self.problem.spline.grid, 2)])
         return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
 
     def thinned(self) -> "Regression":

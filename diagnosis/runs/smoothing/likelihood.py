@@ -35,8 +35,8 @@ DECADES = (-8.0, 8.0)
 GROWTH = 1.9
 COARSE = 1.0  # decades, of the search for the valley and of the first step in it (chosen)
 BEYOND = 1.5  # times the distance that this tells: the root then lies between (chosen)
-# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three errors, 1e-7.
-LAST_STEP = 3e-4
+# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three errors, 1e-8.
+LAST_STEP = 1e-4
 MOST_STEPS = 10  # of it, before the slower method of Brent; three are the rule (chosen)
 
 
@@ -81,7 +81,7 @@ class Criterion:
     def _solved(self, decades: float) -> tuple[System, np.ndarray]:
         """The system, and its residuals (rows, 1)."""
         system = System(self._equations, self._problem.precision(self._channel, 10.0**decades))
-        return system, system.residual(self._y, system.estimate(self._y))
+        return system, system.residual(self._y, system.solve(self._y))
 
     def cost(self, decades: float) -> float:
         """-2 log L, infinite where the spline is not determined."""

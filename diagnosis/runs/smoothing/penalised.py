@@ -75,16 +75,13 @@ class System:
         """A^-1 times columns (size, k)."""
         return PBTRS(self.factor, right, lower=1)[0]
 
-    def estimate(self, y: np.ndarray) -> np.ndarray:
-        """Unknowns (size, k) for data (n, k), by the normal equations."""
+    def solve(self, y: np.ndarray) -> np.ndarray:
+        """Unknowns (size, k) for data (n, k), by corrected seminormal equations."""
         if not np.isfinite(y).all():
             raise LinAlgError("the motion is not finite")
-        return self.inverse(self.equations.turned @ (self.root**2 * y))
-
-    def solve(self, y: np.ndarray) -> np.ndarray:
-        """The same, corrected once: to rounding."""
-        c = self.estimate(y)
-        return c + self.inverse(self.equations.turned @ (self.root * self.residual(y, c)))
+        turned = self.equations.turned
+        c = self.inverse(turned @ (self.root**2 * y))
+        return c + self.inverse(turned @ (self.root * self.residual(y, c)))
 
     def residual(self, y: np.ndarray, c: np.ndarray) -> np.ndarray:
         """(n, k), y - M c in standard deviations: the sum of its squares is what c minimises."""
@@ -151,10 +148,11 @@ class Spline:
         """Of each channel M, with the rows of the penalty last, its transpose, and N of the penalty."""
         found = []
         for weights in self.stiffness:
-            rows = self.b, self.rates.b, roughness(self.grid, weights)[0]
+            rough, normal = roughness(self.grid, weights)
+            rows = self.b, self.rates.b, rough
             first = np.concatenate([b.first for b in rows])
             matrix = Basis(first, np.vstack([b.values for b in rows]), self.grid.size).matrix
-            found.append((matrix, matrix.T, rows[-1].gram(np.ones(rows[-1].first.size))))
+            found.append((matrix, matrix.T, normal))
         return found
 
 

@@ -141,7 +141,7 @@ def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
 
 
 def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
-    """R with R^T R = K, the integral of squared third derivatives times the spacing^5, and where it is.
+    """R and K = R^T R with c^T K c the integral of squared third derivatives times the spacing^5.
 
     The third derivative is a spline of degree two with the third differences of the coefficients: R is a
     Cholesky factor of its Gram matrix times these differences. |R c|^2 is a sum of squares that loses no
@@ -152,7 +152,7 @@ def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
         weights: (intervals,), of each interval, those of all stretches in a row.
 
     Returns:
-        R, and the time [s] of each of its rows, two more than intervals in each stretch.
+        R, with two more rows than intervals in each stretch, and the lower band (6, size) of K.
     """
     rows = grid.intervals + 2
     band = np.zeros((3, int(rows.sum())))
@@ -163,12 +163,13 @@ def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
     values = np.zeros((band.shape[1], WIDTH))
     for j, factor in enumerate(cholesky_banded(band, lower=True)):
         values[:, j : j + 4] += factor[:, None] * DIFFERENCE
-    row = successive(0 * rows, rows)
-    beyond = np.maximum(row - np.repeat(grid.intervals - 1, rows), 0)  # entries there are zero
-    for k in (1, 2):
-        values[beyond == k] = np.roll(values[beyond == k], k, axis=1)
-    time = np.repeat(grid.start, rows) + (row + 0.5) * grid.spacing
-    return Basis(successive(grid.first, rows) - beyond, values, grid.size), time
+    first, normal = successive(grid.first, rows), np.zeros((WIDTH, grid.size + 2))
+    for j, k in zip(FIRST, SECOND, strict=True):
+        normal[k - j, first + j] += values[:, j] * values[:, k]
+    for k in (1, 2):  # entries beyond a stretch are zero
+        of = np.cumsum(rows) - 3 + k
+        first[of], values[of] = first[of] - k, np.roll(values[of], k, axis=1)
+    return Basis(first, values, grid.size), normal[:, : grid.size]
 
 
 def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -176,10 +177,10 @@ def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
-def middles(grid: Knots) -> np.ndarray:
-    """(intervals,): times [s] in the middle of all intervals."""
-    row = successive(0 * grid.intervals, grid.intervals)
-    return np.repeat(grid.start, grid.intervals) + (row + 0.5) * grid.spacing
+def middles(grid: Knots, more: int = 0) -> np.ndarray:
+    """(intervals,): times [s] in the middle of all intervals, and of some more after each stretch."""
+    counts = grid.intervals + more
+    return np.repeat(grid.start, counts) + (successive(0 * counts, counts) + 0.5) * grid.spacing
 
 
 def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
