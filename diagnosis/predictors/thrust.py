@@ -256,12 +256,14 @@ class Integral:
 
     def __call__(self, time: np.ndarray) -> np.ndarray:
         """The integral from the first edge to times (...) [s]."""
-        time = np.asarray(time)
-        k = np.clip(np.searchsorted(self.edges, time, side="right") - 1, 0, len(self.values) - 1)
-        left = time - self.edges[k]
+        time, first, last = np.asarray(time), self.edges[0], self.edges[-1]
+        columns = self._sums.reshape(len(self._sums), -1).T
+        inside = np.stack([np.interp(time, self.edges, column) for column in columns], axis=-1)
         further = self.before.ndim
-        slope = np.where(like(left < 0.0, further), self.before, self.values[k])
-        return self._sums[k] + slope * like(left, further)
+        found = inside.reshape(*time.shape, *self.before.shape)
+        found += like(np.minimum(time - first, 0.0), further) * self.before
+        found += like(np.maximum(time - last, 0.0), further) * self.values[-1]
+        return found
 
 
 def like(x: np.ndarray, further: int) -> np.ndarray:
