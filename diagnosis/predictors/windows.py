@@ -16,7 +16,7 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import LONGEST_STEP, Starts, by_clock, predict
+from .prediction import JOINED, LONGEST_STEP, Starts, by_clock, predict
 from .ship_model import Model
 from .weak_form import HORIZON
 
@@ -92,7 +92,8 @@ class Windows:
         for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
             members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
+            steps = JOINED * int(np.ceil(self.length / (JOINED * h) - 1e-6))
+            group = Starts(starts, h, steps, JOINED)
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -140,7 +141,7 @@ class Windows:
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
             steps = predict(starts, model)
-            pose = between_steps(steps, column, self.since[mine] / starts.h)
+            pose = between_steps(steps, column, self.since[mine] / (starts.h * starts.joined))
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
         return found if models else found[0]
@@ -188,11 +189,10 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s], a part or a multiple of the sample period; names of the commands."""
+        """Step of the thrusters [s], which divides the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
-        most = LONGEST_STEP * self.smoothed.scale.time
-        step = row / np.ceil(row / most - 1e-6) if row > most else row * np.floor(most / row + 1e-6)
-        return float(step), self.smoothed.track.run.signals
+        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
+        return row / parts, self.smoothed.track.run.signals
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
