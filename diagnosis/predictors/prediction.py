@@ -168,7 +168,7 @@ def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
 def propagate(
     starts: Starts, model: Model, thrust: tuple[np.ndarray, np.ndarray]
 ) -> Iterator[vessel.State]:
-    """The state at the start, and after each step of the integration; arrays (p, w) or what broadcasts to that.
+    """The state at the start and after each step of the integration; arrays (p, w) or like them.
 
     Args:
         starts: where to begin.
@@ -181,14 +181,17 @@ def propagate(
     thrusters, beside, n = drive, starts.given(model), starts.joined
     s = first_state(starts, body)
     yield s
-    later = h * np.arange(1.0, n + 1.0)[:, None, None]
+    share, met = np.arange(n)[:, None, None] / n, inflow(s, model)
     for k in range(0, starts.steps, n):
         now = slice(k, k + n)
         given, shares = (tuple(np.moveaxis(signal[now], 1, 0)) for signal in thrust)
         with np.errstate(all="ignore"):
             if power is not None:
                 thrusters = layout.powered(drive, np.moveaxis(power[now], 1, 0)[:, :, None])
-            running = layout.running(s.t + later, *inflow(s, model), given, thrusters)
+            # Within a step the velocity goes on to change as before it.
+            before, met = met, inflow(s, model)
+            nu = (x + share * (x - y) for x, y in zip(met, before, strict=True))
+            running = layout.running(s.t + h + share * n * h, *nu, given, thrusters)
             each = layout.act(shares, running, thrusters)
             tau = Force(*(np.mean(f, axis=0) if np.ndim(f) > 2 else f for f in each))
             if beside is None:
