@@ -16,7 +16,7 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import LONGEST_STEP, Starts, by_clock, predict
+from .prediction import JOINED, LONGEST_STEP, Starts, by_clock, predict
 from .ship_model import Model
 from .thrust import STEP
 from .weak_form import HORIZON
@@ -95,7 +95,8 @@ class Windows:
         for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
             members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
+            steps = JOINED * int(np.ceil(self.length / (JOINED * h) - 1e-6))
+            group = Starts(starts, h, steps, JOINED)
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -167,7 +168,7 @@ class Windows:
         """Residuals (p, samples, 3) of p models.
 
         Args:
-            poses: gives the predicted pose (steps + 1, 3, p, w) at each step of windows.
+            poses: gives the predicted pose (steps + 1, 3, p, w) at equal distances in windows.
             models: p.
         """
         found = np.empty((models, *self.measured.shape))
@@ -176,7 +177,9 @@ class Windows:
             place[windows] = np.arange(windows.size)
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
-            pose = between_steps(poses(starts), column, self.since[mine] / starts.h)
+            steps = poses(starts)
+            every = starts.h * starts.steps / (len(steps) - 1)
+            pose = between_steps(steps, column, self.since[mine] / every)
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
         return found
@@ -224,11 +227,10 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s], a part or a multiple of the sample period; names of the commands."""
+        """Step of the thrusters [s], which divides the sample period; names of the commands."""
         row = round(float(np.median(np.diff(self.time))), 9)
-        most = LONGEST_STEP * self.smoothed.scale.time
-        step = row / np.ceil(row / most - 1e-6) if row > most else row * np.floor(most / row + 1e-6)
-        return float(step), self.smoothed.track.run.signals
+        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
+        return row / parts, self.smoothed.track.run.signals
 
 
 def step_of(smoothed: Smoothed) -> float:
