@@ -14,7 +14,7 @@ import pytest
 from support.command import command
 
 import cosim
-import diagnosis
+import diagnosis.predictors
 import fmus
 from fmus.build.finding import load
 
