@@ -46,7 +46,7 @@ def test_a_unit_of_another_quantity_is_refused(tmp_path):
     path = tmp_path / "a.csv"
     table(r=T).to_csv(path, index=False)
     path.with_name("a.csv.json").write_text('{"columns": {"r": {"name": "r", "unit": "m/s"}}}')
-    with pytest.raises(InputError, match="no unit of r"):
+    with pytest.raises(InputError, match="is not a unit of r"):
         diagnosis.read(path)
 
 

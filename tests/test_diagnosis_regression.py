@@ -244,10 +244,10 @@ def test_an_interval_ends_where_the_cost_passes_its_least_by_the_quantile():
             return SimpleNamespace(cost=7.0 + ((x - best) / std) ** 2)
 
         for size in (-abs(best), abs(best)):
-            end = profile._end(trial, 7.0, best, size)
+            end = profile._end(trial, 7.0, best, best + 1.5 * size)
             assert end - best == pytest.approx(np.sign(size) * np.sqrt(3.841) * std, rel=0.02)
-    flat = profile._end(lambda x: SimpleNamespace(cost=0.0), 0.0, 1.0, 1.0)
-    assert 1.5 < flat - 1.0 < 4.0, "beyond the reach of the search there is no end"
+    flat = profile._end(lambda x: SimpleNamespace(cost=0.0), 0.0, 1.0, 2.5)
+    assert flat == 2.5, "where the cost passes nowhere the interval ends with the search"
 
 
 @pytest.mark.parametrize(("most", "full"), [(1e9, 1.0), (0.2, None)])

@@ -11,6 +11,7 @@ from diagnosis.search import forward_selection, method
 from diagnosis.search.prior import NominalPrior
 from diagnosis.search.refinement import Estimate, TrainingSet
 from diagnosis.search.shortlist import NEW, novelty, rank
+from diagnosis.verdict.confidence import probability
 from fmus.effects import STANDARD
 
 
@@ -115,7 +116,7 @@ def test_interval_covers_the_truth():
     assert finding.id == "X_u"
     assert low < -3.0 < high
     assert high - low < 0.2
-    assert finding.confidence > 0.9
+    assert probability(finding.evidence) > 0.9
 
 
 @pytest.mark.numerical
