@@ -90,8 +90,10 @@ class Regression:
         p, spline = self.problem, self.problem.spline
         systems, grid = self.fit.systems, spline.grid
         many = int(NOTICED * self.time_scale / grid.spacing)
+        if many < 2:
+            return self
         smoothness = np.array([s.precision[JERK] / s.precision[POSE] for s in systems]) / many**5.0
-        if many < 2 or (smoothness < 1.0).any():
+        if (smoothness < 1.0).any():
             return self
         coarse = knots(grid.start, grid.end, many * grid.spacing)
         part = np.unique(basis(coarse, self.time).first, return_inverse=True)[1]
