@@ -21,9 +21,9 @@ from ..runs.files.reading import Run
 from .ship_model import Model
 from .thrust import Integral, Response, commanded_shares, drive_of, inflow
 
-# s, times the scale of the ship; of the thrusters in a prediction, and how many of these the integration
-# joins. One: with three the predicted heading of a manoeuvre differs from that of an FMU by 0.2 %.
-LONGEST_STEP, JOINED = 0.02, 1
+# s, times the scale of the ship; of the integration, where its error is far below the noise of any
+# measurement
+LONGEST_STEP = 0.02
 COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
 HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 UNSURE = 3.0  # standard deviations of a speed within which it may be none
@@ -39,13 +39,11 @@ class Starts:
         runs: each run with the rows of the first samples of its windows.
         h: step of the thrusters [s], a whole part of the time between two rows.
         steps: of these in a window.
-        joined: how many of these are one step of the integration, in which their mean force acts.
     """
 
     runs: tuple[tuple[Smoothed, np.ndarray], ...]
     h: float
     steps: int
-    joined: int = 1
 
     def first(self, values: Callable[[Smoothed], np.ndarray]) -> np.ndarray:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
@@ -142,7 +140,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         model: its parameters may be arrays (p, 1), for p models at once.
 
     Returns:
-        (steps / joined + 1, 3, p, w): pose [m, m, rad] at each step of the integration.
+        (steps + 1, 3, p, w): pose [m, m, rad] at each step.
     """
     names = [smoothed.track.run.name for smoothed, _ in starts.runs]
     if model.runs.keys() & set(names):
@@ -151,7 +149,7 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         return np.concatenate(parts, axis=-1)
     body, thrust = model.hull, arriving(starts, model)
     shape = np.broadcast_shapes(*sizes(body.params, model.drive.params), thrust[1].shape[-2:])
-    found = np.empty((starts.steps // starts.joined + 1, 3, *shape))
+    found = np.empty((starts.steps + 1, 3, *shape))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
         for k, s in enumerate(propagate(starts, model, thrust)):
             found[k] = np.stack(np.broadcast_arrays(*vessel.measured(s, body)))
@@ -178,27 +176,19 @@ def propagate(
     body, drive, h = model.hull, starts.drive(model), starts.h
     layout = drive.effects.layout
     power = starts.power(model.clock) if starts.powered else None
-    thrusters, beside, n = drive, starts.given(model), starts.joined
+    thrusters, beside = drive, starts.given(model)
     s = first_state(starts, body)
     yield s
-    share, met = np.arange(n)[:, None, None] / n, inflow(s, model)
-    for k in range(0, starts.steps, n):
-        now = slice(k, k + n)
-        given, shares = (tuple(np.moveaxis(signal[now], 1, 0)) for signal in thrust)
+    for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
         with np.errstate(all="ignore"):
             if power is not None:
-                thrusters = layout.powered(drive, np.moveaxis(power[now], 1, 0)[:, :, None])
-            # Within a step the velocity goes on to change as before it.
-            before, met = met, inflow(s, model)
-            nu = (x + share * (x - y) for x, y in zip(met, before, strict=True))
-            running = layout.running(s.t + h + share * n * h, *nu, given, thrusters)
-            each = layout.act(shares, running, thrusters)
-            tau = Force(*(np.mean(f, axis=0) if np.ndim(f) > 2 else f for f in each))
+                thrusters = layout.powered(drive, power[k])
+            now = layout.running(s.t + h, *inflow(s, model), tuple(given), thrusters)
+            tau = Force(*layout.act(tuple(shares), now, thrusters))
             if beside is None:
-                s = moved(s, tau, body, n * h)
+                s = moved(s, tau, body, h)
             else:
-                parts = (np.mean(part[now], axis=0) for part in beside)
-                s = vessel.integrate(s, tau, body, n * h, _with(*parts))
+                s = vessel.integrate(s, tau, body, h, _with(beside[0][k], beside[1][k]))
         yield s
 
 

@@ -16,9 +16,8 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import JOINED, LONGEST_STEP, Starts, by_clock, predict
+from .prediction import LONGEST_STEP, Starts, by_clock, predict
 from .ship_model import Model
-from .thrust import STEP
 from .weak_form import HORIZON
 
 # Times the scale of the ship.
@@ -95,8 +94,7 @@ class Windows:
         for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
             members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
             starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            steps = JOINED * int(np.ceil(self.length / (JOINED * h) - 1e-6))
-            group = Starts(starts, h, steps, JOINED)
+            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -168,7 +166,7 @@ class Windows:
         """Residuals (p, samples, 3) of p models.
 
         Args:
-            poses: gives the predicted pose (steps + 1, 3, p, w) at equal distances in windows.
+            poses: gives the predicted pose (steps + 1, 3, p, w) at each step of windows.
             models: p.
         """
         found = np.empty((models, *self.measured.shape))
@@ -177,9 +175,7 @@ class Windows:
             place[windows] = np.arange(windows.size)
             mine = place[self.sample_window] >= 0
             column = place[self.sample_window[mine]]
-            steps = poses(starts)
-            every = starts.h * starts.steps / (len(steps) - 1)
-            pose = between_steps(steps, column, self.since[mine] / every)
+            pose = between_steps(poses(starts), column, self.since[mine] / starts.h)
             found[:, mine] = self.measured[mine] - pose
         found[..., 2] = wrap(found[..., 2])
         return found
@@ -227,16 +223,15 @@ class RunWindows(NamedTuple):
 
     @property
     def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of the thrusters [s], which divides the sample period; names of the commands."""
-        row = round(float(np.median(np.diff(self.time))), 9)
-        parts = int(np.ceil(row / (LONGEST_STEP * self.smoothed.scale.time) - 1e-6))
-        return row / parts, self.smoothed.track.run.signals
+        """Step of integration [s]; names of the commands."""
+        return step_of(self.smoothed), self.smoothed.track.run.signals
 
 
 def step_of(smoothed: Smoothed) -> float:
-    """Step of predictions by what is not a model of this project [s]; it divides the sample period."""
+    """Step of predictions [s], which divides the sample period."""
     row = round(float(np.median(np.diff(smoothed.time))), 9)
-    return row / float(np.ceil(row / (STEP * smoothed.scale.time) - 1e-6))
+    parts = int(np.ceil(row / (LONGEST_STEP * smoothed.scale.time) - 1e-6))
+    return row / parts
 
 
 def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
