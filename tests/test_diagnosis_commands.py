@@ -528,6 +528,7 @@ def test_runs_of_the_same_name_are_told_apart(runs, tmp_path):
     (tmp_path / "a.csv").write_bytes((runs / "b.csv").read_bytes())
     names = [w.run.name for w in diagnosis.gather([runs / "a.csv", tmp_path / "a.csv"])]
     assert len(set(names)) == 2
+    assert names[0] == "a", "whatever runs follow"
 
 
 @pytest.mark.slow

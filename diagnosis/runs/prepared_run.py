@@ -4,7 +4,6 @@ A run is read, repaired by its own redundant channels (:mod:`.sensors`), cleaned
 and smoothed with the velocities and rates that agree with its pose.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -111,7 +110,10 @@ def prepare(
 
 
 def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> list[Run]:
-    """Read several runs, each under a name of its own: of the same name with more of the path in it.
+    """Read several runs, each under a name of its own.
+
+    The first run of a name keeps it, a later one has more of its path in it: what training runs are called
+    does not depend on the test runs that follow them.
 
     Args:
         sources: files, folders of logs, or runs that were read.
@@ -124,6 +126,7 @@ def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> li
     runs = [source if isinstance(source, Run) else read(source, of=of) for source in sources]
     paths = [source.name if isinstance(source, Run) else source for source in sources]
     known: dict[bytes, str | Path] = {}
+    found: list[Run] = []
     for run, path in zip(runs, paths, strict=True):
         content = np.column_stack([run.time, run.pose]).tobytes()
         if content in known:
@@ -131,8 +134,6 @@ def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> li
             same = f"'{path}' holds the same measurement as '{known[content]}'"
             raise InputError(again if Path(path) == Path(known[content]) else same)
         known[content] = path
-    times = Counter(run.name for run in runs)
-    return [
-        run if times[run.name] == 1 else replace(run, name=Path(path).absolute().as_posix())
-        for run, path in zip(runs, paths, strict=True)
-    ]
+        taken = any(run.name == other.name for other in found)
+        found.append(replace(run, name=Path(path).absolute().as_posix()) if taken else run)
+    return found
