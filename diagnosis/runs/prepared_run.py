@@ -112,8 +112,8 @@ def prepare(
 def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> list[Run]:
     """Read several runs, each under a name of its own.
 
-    The first run of a name keeps it, a later one has more of its path in it: what training runs are called
-    does not depend on the test runs that follow them.
+    The first run of a name keeps it, a later one has more of its path in it: names of training runs do
+    not depend on the test runs that follow.
 
     Args:
         sources: files, folders of logs, or runs that were read.
