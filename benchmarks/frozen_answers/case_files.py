@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from diagnosis.model import ship_with
 
 from diagnosis import Run
+from diagnosis.predictors import ship_with
 
 from .. import ship_effects
 from ..hidden_effects import problems as hidden

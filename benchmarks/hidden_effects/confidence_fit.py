@@ -1,4 +1,4 @@
-"""Fits the constants of the map from evidence to confidence, ``diagnosis/search/confidence.py``.
+"""Fits the constants of the map from evidence to confidence, ``diagnosis/verdict/confidence.py``.
 
 There a finding has the confidence
 ``bagged / (1 + exp(PER_LEFT left + PER_VARIATION varies - SURE))``. The
