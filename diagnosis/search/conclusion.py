@@ -1,4 +1,4 @@
-"""The end of a search: what was found, with intervals, shares and confidence, all fitted together."""
+"""The end of a search: what was found, with intervals, shares and evidence, all fitted together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
