@@ -14,7 +14,7 @@ import numpy as np
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
-from .candidates import Candidate
+from .candidates import SLIGHT, Candidate
 from .most_likely import ridge
 
 RUN = 10_000  # blocks of a run are numbered from this times its number on
@@ -129,9 +129,11 @@ class GramTable:
 def noise(y: np.ndarray, columns: np.ndarray, floor: np.ndarray) -> np.ndarray:
     """RMS of what even all columns together leave of the model error, by axis, at least ``floor``."""
 
+    sizes = np.sum(columns**2, axis=0)  # of each column on each axis
+    acts = sizes > SLIGHT * sizes.max(axis=0)  # what is rounding would explain some by chance
+
     def left(axis: int) -> float:
-        A = columns[:, axis, :]
-        A = A[:, np.abs(A).max(axis=0) > 0.0]
+        A = columns[:, axis, acts[axis]]
         scale = np.sqrt((A**2).mean(axis=0))
         A = A / scale
         gram = A.T @ A
