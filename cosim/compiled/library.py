@@ -22,7 +22,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-import fmpy
 from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
@@ -102,6 +101,8 @@ def compiles(native: bool | str) -> bool:
 @cache
 def _compiles_itself() -> bool:
     """Asked once in a process, so that its runs have FMUs of one kind."""
+    import fmpy  # takes a while, and most programs compile nothing
+
     if fmpy.platform not in PLATFORMS:
         return False
     if any(map(shutil.which, SYSTEM)):

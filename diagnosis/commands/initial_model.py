@@ -16,7 +16,6 @@ from ..predictors import (
     UnmatchedError,
     open_model,
     refuse_map,
-    write_map,
 )
 
 
@@ -50,6 +49,8 @@ def _proposed(content: Mapping[str, Any]) -> str:
     path = Path(MAP)
     if path.exists():
         return f"; complete '{MAP}' for --map, or remove it and another one is proposed"
+    from ..predictors import write_map  # takes a while to import, and only FMUs have maps
+
     try:
         write_map(path, content)
     except OSError:

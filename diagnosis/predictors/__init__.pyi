@@ -9,7 +9,6 @@ from .evaluation import Evaluation as Evaluation
 from .evaluation import PredictionError as PredictionError
 from .evaluation import evaluate_run as evaluate_run
 from .fmu.foreign_fmu import Fmu as Fmu
-from .fmu.foreign_fmu import UnmatchedError as UnmatchedError
 from .fmu.variable_map import write_map as write_map
 from .parameter_set import read_model as read_model
 from .parameter_set import ship_with as ship_with
@@ -19,6 +18,7 @@ from .predictor import WRITTEN as WRITTEN
 from .predictor import Description as Description
 from .predictor import ModelSource as ModelSource
 from .predictor import Predictor as Predictor
+from .predictor import UnmatchedError as UnmatchedError
 from .predictor import open_model as open_model
 from .predictor import refuse_map as refuse_map
 from .python_function import PythonFunction as PythonFunction

@@ -22,6 +22,18 @@ from .weak_form import WeakWindows
 from .windows import Windows
 
 
+class UnmatchedError(InputError):
+    """Variables that are needed are not known by their names, or not in the map.
+
+    Attributes:
+        proposal: the content of a map with those that are known.
+    """
+
+    def __init__(self, message: str, proposal: Mapping[str, Any]) -> None:
+        super().__init__(message)
+        self.proposal = proposal
+
+
 @dataclass(frozen=True)
 class Description:
     """How a predictor that is not a model of this project predicts, for the report.

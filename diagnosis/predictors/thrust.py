@@ -11,13 +11,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fmus.actuators.response import Prepared, at_rest, command_response, force_response
 from fmus.effects import Memory
 from fmus.vessel.vessel import State, water_velocity
 
 from ..runs.files.reading import Run
+from ..runs.linear_filter import filtered
 from .ship_model import Model
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
@@ -212,7 +212,7 @@ class Response:
                 if memory.of == of and memory.filter is not None:
                     law = memory.filter(self.step, *self.drive.params.dynamics[member.parameters])
                     signal = signal.copy()
-                    signal[:, memory.own] = lfilter(*law, signal[:, memory.own], axis=0)
+                    signal[:, memory.own] = filtered(*law, signal[:, memory.own])
             found.append(signal + self._commands.before)
         return np.stack(found, axis=1)
 

@@ -21,7 +21,7 @@ from ...execution.progress import Advance, silent
 from ...runs import OF_UNIT, QUANTITY, UNITS, Column, Run, Smoothed, to_si
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
-from ..predictor import FOUND, MAP
+from ..predictor import FOUND, MAP, UnmatchedError
 from ..ship_model import Model
 from ..weak_form import WeakWindows
 from .instances import Begun, simulate
@@ -266,18 +266,6 @@ def _as_one(path: Path, folder: Path) -> Path:
         return made
     finally:
         system.close()
-
-
-class UnmatchedError(cosim.InputError):
-    """Variables that are needed are not known by their names, or not in the map.
-
-    Attributes:
-        proposal: the content of a map with those that are known.
-    """
-
-    def __init__(self, message: str, proposal: Mapping[str, Any]) -> None:
-        super().__init__(message)
-        self.proposal = proposal
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:

@@ -10,11 +10,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
 
 from fmus.scale import Scale
 
 from ..cleaning import Track
+from ..linear_filter import filtered
 from .spline import Knots
 
 # Of CyberShip Enterprise 1, times the scale of the ship.
@@ -140,17 +140,9 @@ class Commands:
         return x, w - x / T
 
     def _recursion(self, x: np.ndarray, kept: float) -> np.ndarray:
-        """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch.
-
-        A triangular system with two diagonals. ``scipy.signal.lfilter`` gives the same, but takes more
-        time to import than a run takes to smooth.
-        """
-        y = np.zeros_like(x)
-        (solved,) = get_lapack_funcs(("tbtrs",), (x,))
-        for rows in np.split(np.arange(len(x)), self.first):
-            diagonals = np.array([[1.0], [-kept]], x.dtype).repeat(len(rows) - 1, axis=1)
-            y[rows[1:]] = solved(diagonals, x[rows[:-1]], uplo="L", diag="U")[0]
-        return y
+        """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch."""
+        parts = np.split(x, self.first)
+        return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
     def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
         """The motion by gains (3, 3), body-fixed acceleration by a unit of each, and a delay [s]."""

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import KroghInterpolator
 from scipy.linalg import LinAlgError
-from scipy.ndimage import uniform_filter1d
 from scipy.optimize import brentq, minimize_scalar
 
 from .penalised import JERK, Equations, Problem, System, solve
@@ -154,8 +153,16 @@ def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Prob
     for _ in range(ADAPTIONS):
         square = third(p.spline.grid, solve(p, smoothness, weights).coefficients) ** 2
         mean = np.maximum(square.mean(axis=0), 1e-30)
-        local = uniform_filter1d(square, p.average, axis=0, mode="nearest")
+        local = running_mean(square, p.average)
         share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
         p = p.adapted(stiffness=1.0 / share.T)
         smoothness = likeliest(p, weights, smoothness)
     return p, smoothness
+
+
+def running_mean(x: np.ndarray, width: int) -> np.ndarray:
+    """Means of x (n, 3) over ``width`` rows around each; the ends go on."""
+    before = width // 2
+    longer = np.pad(x, ((before, width - 1 - before), (0, 0)), mode="edge")
+    steps = (longer[width:] - longer[:-width]) / width
+    return np.cumsum(np.vstack([longer[:width].mean(axis=0), steps]), axis=0)
