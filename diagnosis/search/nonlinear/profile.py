@@ -35,7 +35,7 @@ COARSER = 30.0  # times the step of a slope, with which it is compared: 3 % of t
 ROUGH = 0.5  # share of itself by which a slope that means something differs between the two steps
 REACH = 1.5  # factor to both sides within which the best value is looked for
 TRIALS = 16  # of that search, at the most
-FINEST = 1e-3  # of REACH, to which the ends of an interval are found
+FINEST = 1e-4  # of REACH, to which the ends of an interval are found
 
 Interval = tuple[float, float]
 
