@@ -238,7 +238,7 @@ def test_a_summary_has_ten_lines_at_the_most():
     many = compared(True)
     many.evaluations = [run(n, "train") for n in "abcde"]
     text = summary(found(many, 3 * EFFECTS)).splitlines()
-    assert len(text) == 9
+    assert len(text) == 10
     assert text[-1] == "  and 2 more runs"
     assert summary(nothing()).splitlines()[1] == f"  {NOTHING_FOUND}"
 

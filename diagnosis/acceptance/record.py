@@ -14,7 +14,7 @@ from ..predictors import ship_name
 from ..report.content import fmu_result, sensor_results, versions
 from ..session import Comparison
 from .budget import Learned, read_learned, sources_of
-from .criterion import Criterion, ReadCriteria, now, read_criteria
+from .criterion import JUDGED, ReadCriteria, now, read_criteria
 from .judged_criterion import Judgement, Predicted, judge
 from .predictions import Predictions
 from .record_files import FILES, write_record
@@ -23,7 +23,6 @@ from .record_keys import (
     CriteriaResult,
     FileResult,
     JudgementResult,
-    RangeResult,
     RecordContent,
 )
 from .validity import covered, window_means
@@ -120,12 +119,7 @@ def validate(
             purpose=read.content.purpose,
         ),
         judgements=[_result(j) for j in judgements],
-        validity=[
-            RangeResult(
-                signal=name, unit=unit, least=q[0], q05=q[1], median=q[2], q95=q[3], greatest=q[4]
-            )
-            for name, (unit, q) in covered(comparison.evaluations).items()
-        ],
+        validity=covered(comparison.evaluations),
         sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
         notes=list(dict.fromkeys(notes)),
         not_covered=list(_not_covered(comparison, judgements)),
@@ -189,28 +183,17 @@ def _result(j: Judgement) -> JudgementResult:
         estimate=estimate,
         low=low,
         high=high,
-        budget=_budget(j, c),
+        budget=_budget(j),
     )
 
 
-def _budget(j: Judgement, c: Criterion) -> BudgetResult | None:
-    b = j.budget
-    if b is None:
+def _budget(j: Judgement) -> BudgetResult | None:
+    if j.budget is None:
         return None
-
-    def scaled(u: float | None) -> float | None:
-        return None if u is None else u / c.factor
-
-    return BudgetResult(
-        u_D=scaled(b.measurement),
-        initial_state=scaled(b.initial_state),
-        parameters=scaled(b.parameters),
-        process_noise=scaled(b.process_noise),
-        u_input=scaled(b.u_input),
-        u_num=scaled(b.numerical),
-        u_val=scaled(b.u_val),
-        unknown=b.unknown,
-    )
+    found = j.budget._asdict() | {"u_input": j.budget.u_input, "u_val": j.budget.u_val}
+    scaled = {name: None if u is None else u / j.criterion.factor for name, u in found.items()}
+    u_D, u_num = scaled.pop("measurement"), scaled.pop("numerical")
+    return BudgetResult(u_D=u_D, u_num=u_num, unknown=j.budget.unknown, **scaled)
 
 
 def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:
@@ -219,7 +202,7 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     horizons = sorted({j.criterion.horizon for j in judgements})
     yield f"Predictions over other times than {', '.join(f'{h:g}' for h in horizons)} s."
     judged = {j.criterion.quantity for j in judgements if j.outcome != "cannot be judged"}
-    rest = [q for q in ("position", "heading", "u", "v", "r") if q not in judged]
+    rest = [q for q in JUDGED if q not in judged]
     if rest:
         yield f"Errors of {', '.join(rest)}: no criterion on them is judged."
     for j in judgements:
@@ -230,7 +213,6 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     if predictor.whole:
         yield f"Predictions from a measured state: the velocity of {predictor.name} cannot be set."
     yield "Systematic errors of sensors that no other channel shows."
-    if all(e.weak_windows.run.trial is None for e in comparison.evaluations):
-        yield "Measures of manoeuvring trials: no run is one."
-    else:
-        yield "Measures of manoeuvring trials, which comparison.json has, and no criterion."
+    trial = any(e.weak_windows.run.trial for e in comparison.evaluations)
+    which = ", which comparison.json has, and no criterion" if trial else ": no run is one"
+    yield f"Measures of manoeuvring trials{which}."

@@ -49,7 +49,7 @@ class CriteriaResult(Part):
     purpose: str | None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RangeResult(Part):
     """What the data cover of a signal."""
 

@@ -8,8 +8,9 @@ from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
 from .predictions import Predictions
+from .record_keys import RangeResult
 
-QUANTILES = (0.05, 0.5, 0.95)
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)  # 1; those of the keys of the record
 MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
@@ -51,18 +52,14 @@ def window_means(p: Predictions) -> dict[str, np.ndarray]:
     return found
 
 
-def covered(evaluations: Sequence[Evaluation]) -> dict[str, tuple[str, list[float]]]:
-    """Signal -> its unit; least, 5 %, 50 %, 95 % and largest value over all samples that are used."""
+def covered(evaluations: Sequence[Evaluation]) -> list[RangeResult]:
+    """Each signal over all samples that are used."""
     found: dict[str, list[np.ndarray]] = {}
     units = {}
     for e in evaluations:
         for name, values in signals(e.smoothed).items():
-            chosen = values[e.smoothed.used & np.isfinite(values)]
-            if chosen.size:
+            if (chosen := values[e.smoothed.used & np.isfinite(values)]).size:
                 found.setdefault(name, []).append(chosen)
                 units[name] = unit_of(name, e)
-    return {n: (units[n], _spread(np.concatenate(parts))) for n, parts in found.items()}
-
-
-def _spread(values: np.ndarray) -> list[float]:
-    return np.quantile(values, [0.0, *QUANTILES, 1.0]).tolist()
+    spread = {n: np.quantile(np.concatenate(parts), QUANTILES).tolist() for n, parts in found.items()}
+    return [RangeResult(n, units[n], *values) for n, values in spread.items()]

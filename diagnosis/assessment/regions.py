@@ -12,24 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..predictors import WeakWindows
-from .clusters import ClusterMean, cluster_mean, welch_p_value
+from ..predictors.uncertainty import NOISE_TOLERANCE
+from ..search.most_likely import NORMAL_95
+from .clusters import ClusterMean, cluster_mean, numbered, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
+from .settings import SETTINGS
 
 NAMES = {"X": "Surge", "Y": "Sway", "N": "Yaw"}
 UNITS = {"X": "N", "Y": "N", "N": "N m"}
-SIGNIFICANCE = 0.01  # level of the test after Bonferroni's correction; chosen
-# Calibrated by tests/test_diagnosis_where.py on model error that is correlated over a window and depends
-# on no covariate: with one block three times as many regions were found.
-BLOCKS_PER_CLUSTER = 2
-# Ratio of the model error to its uncertainty, above which there is an error at all. Chosen: that
-# uncertainty is right within 30 % (tests/test_diagnosis_where.py).
-MIN_RATIO_TO_NOISE = 1.4
-SIGMAS_ABOVE_NOISE = 2.0  # cluster-robust standard errors, one-sided 2.3 %; chosen
-MIN_RATIO_TO_REST = 1.4  # of the RMS inside to that outside; smaller differences do not matter; chosen
-MIN_SHARE, MAX_SHARE = 0.05, 0.6  # of the windows that a region may hold; chosen
-MIN_CLUSTERS = 4  # inside and outside, so that each variance has three degrees of freedom; chosen
-CLUSTERS_PER_RUN = 10_000  # a number beyond that of any run's clusters, which keeps runs apart
-SMALLEST_SQUARE = 1e-30  # N2 or (N m)2, keeps a logarithm finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +120,7 @@ def find_regions(
         std: of each run its standard deviation by the noise of the measurement (K, 3) [N, N, N m].
     """
     squares, noise = np.concatenate(omega) ** 2, np.concatenate(std) ** 2
-    numbers = [CLUSTERS_PER_RUN * k + w.block // BLOCKS_PER_CLUSTER for k, w in enumerate(data)]
-    cluster = np.unique(np.concatenate(numbers), return_inverse=True)[1]
+    cluster = numbered([w.block // SETTINGS.blocks_per_cluster for w in data])
     several_runs = len(data) > 1
     sentences: list[str] = []
     regions: list[Region] = []
@@ -147,7 +136,7 @@ def find_regions(
         if not exceeds_noise(squares[:, k], noise[:, k], cluster):
             within = f"no error seen, {measured} is within the uncertainty of {uncertainty:.1g}"
             seldom = f"{measured} (uncertainty {uncertainty:.1g}), too seldom to say where"
-            is_within = rms <= MIN_RATIO_TO_NOISE * uncertainty
+            is_within = rms <= NOISE_TOLERANCE * uncertainty
             sentences.append(f"{NAMES[axis]}: {within if is_within else seldom}.")
             continue
         found = sorted(filter(None, (d.clearest_region() for d in designs)), key=lambda r: -r.contrast)
@@ -165,9 +154,9 @@ def exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -
         noise: (K,), variance by the noise of the measurement [N2 or (N m)2].
         cluster: (K,), number of each window's cluster.
     """
-    excess = squares - MIN_RATIO_TO_NOISE**2 * noise
+    excess = squares - NOISE_TOLERANCE**2 * noise
     above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
-    return above.mean > SIGMAS_ABOVE_NOISE * np.sqrt(above.variance)
+    return above.mean > NORMAL_95 * np.sqrt(above.variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,20 +225,21 @@ class _Design:
         """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
         total, count = ((x[bins].sum(axis=0)) for x in (self.total + self.noise, self.count))
         windows = np.maximum(count, 1)
-        return cluster_mean(count * np.log(np.maximum(total, SMALLEST_SQUARE) / windows), count)
+        return cluster_mean(count * np.log(np.maximum(total, np.finfo(float).tiny) / windows), count)
 
     def _test(self, first: int, after: int, inside: np.ndarray, tried: int) -> Region | None:
         """The region, if it is significantly worse than the rest among so many that were tried."""
         share = float(self.profile.share[inside].sum())
-        if not MIN_SHARE <= share <= MAX_SHARE:
+        if share > SETTINGS.largest_region:
             return None
         parts = (inside, ~inside)
         inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
         a, b = map(self._log_mean_square, parts)
-        if min(a.dof, b.dof) + 1 < MIN_CLUSTERS or inner < MIN_RATIO_TO_REST * outer:
+        few = min(a.dof, b.dof) + 1 < SETTINGS.least_clusters
+        if few or inner < SETTINGS.least_contrast * outer:
             return None
         p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
-        if p_value > SIGNIFICANCE:
+        if p_value > SETTINGS.chance:
             return None
         p, bins = self.profile, len(self.total)
         cyclic = p.covariate.cyclic

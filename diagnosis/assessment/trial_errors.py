@@ -13,7 +13,6 @@ from fmus.ship import Ship
 from ..predictors.evaluation import Evaluation
 from ..runs import Run, Smoothed
 
-APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
 NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")
 
 # Name -> measured, before, after; of what comes several times a list of these.
@@ -72,7 +71,7 @@ def trial_errors(e: Evaluation) -> TrialErrors | None:
     if run.trial is None:
         return None
     whole = measured_passage(e.smoothed, ship)
-    begin = executes(whole)[0] - APPROACH * e.smoothed.scale.time
+    begin = executes(whole)[0] - e.smoothed.scale.time  # a second of CyberShip Enterprise 1 before
     time, predicted = e.free_runs(begin)
     rows = (whole.time >= time[0]) & (whole.time <= time[-1])
     seen = Passage(*(column[rows] for column in whole))

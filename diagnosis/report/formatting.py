@@ -30,8 +30,7 @@ GLOSSARY = (
 )
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
-POSITIONAL = (1e-4, 1e6)  # magnitudes that are written without an exponent; chosen
-WHOLE_RATIO = 9.95  # from which on a ratio has no decimal, as it would round to 10.0
+WRITTEN_OUT = 1e6  # magnitude below which no digit is left out in favour of an exponent; chosen
 
 
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
@@ -40,8 +39,8 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
         return NO_VALUE
     scaled = factor * value
     text = f"{scaled:.{digits}g}"
-    if "e" in text and POSITIONAL[0] <= abs(scaled) < POSITIONAL[1]:
-        text = f"{scaled:.0f}" if abs(scaled) >= 1.0 else f"{scaled:.6f}".rstrip("0")
+    if "e" in text and 1.0 <= abs(scaled) < WRITTEN_OUT:
+        text = f"{scaled:.0f}"
     return text.replace("-", "−")
 
 
@@ -66,8 +65,7 @@ def times(before: float | None, after: float | None) -> str:
     """Ratio by which an error fell; a dash where there is none."""
     if before is None or after is None or not after or not np.isfinite(before / after):
         return NO_VALUE
-    ratio = before / after
-    return f"{ratio:.0f}×" if ratio >= WHOLE_RATIO else f"{ratio:.1f}×"
+    return f"{number(before / after, 2)}×"
 
 
 def plain(value: object) -> str:

@@ -16,7 +16,6 @@ from ..search.findings import Ranked
 from ..session import Comparison, Diagnosis
 from .reported_effect import ReportedEffect, reported_effects
 
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 UNITS = {m.name.removesuffix("_1"): m.unit for m in MEASURES}
 # What the data of a run were used for.
 USES = {"train": "learned from", "validate": "decided by", "test": "seen only now"}
