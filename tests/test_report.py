@@ -182,6 +182,7 @@ def test_page_says_what_the_result_says(report, evaluations):
     assert "curve_vsp_x(c)" in text
     assert "97 %" in text
     assert "more than one cause" in text
+    assert "8 s of a run, predicted from where the ship was at first; of ω: 3 s" in text
     assert "−4.2" in text
 
 

@@ -82,13 +82,6 @@ def test_any_value_of_json_is_told_on_one_line():
     assert formatting.plain(0.1234567) == "0.123457"
 
 
-def test_glossary_has_the_lengths_of_both_windows():
-    words = dict(formatting.glossary(8.0, 3.0))
-    assert "8 s of a run" in words["window"]
-    assert "of ω: 3 s" in words["window"]
-    assert not any("{" in meaning for meaning in words.values())
-
-
 def test_what_is_sure_is_a_fact_and_comes_first():
     sure = effect("lag", headline.FOUND)
     unsure = effect(
@@ -326,7 +319,7 @@ def test_errors_grow_by_their_quartiles_in_millimetres_and_degrees():
     for panel, scale in ((position, 10.0), (heading, 1.0)):
         drawn = marks(panel)
         middle = drawn["before"].x
-        assert middle.size == tracks.BINS
+        assert middle.size == tracks.PARTS
         assert middle[0] == pytest.approx(0.125)
         assert drawn["before"].y == pytest.approx(scale * middle, abs=0.13 * scale)
         assert drawn["after"].y == pytest.approx(0.5 * drawn["before"].y)

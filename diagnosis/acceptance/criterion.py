@@ -169,8 +169,7 @@ def _told(error: ValidationError) -> str:
         text = f"no such key{nearest(loc[-1], known)}"
     elif first["type"] == "literal_error" and loc[-1] == "quantity":
         text = f"{shortened(first['input'])} cannot be judged{nearest(str(first['input']), JUDGED)}"
-    place = ".".join(shortened(part).strip("'") for part in loc)
-    return f"{place}: {text}" if loc else text
+    return "".join(f"{shortened(part)[1:-1]}." for part in loc)[:-1] + f": {text}" if loc else text
 
 
 def template() -> dict[str, Any]:

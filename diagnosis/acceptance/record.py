@@ -1,30 +1,31 @@
-"""The record of a validation: criteria, what the data say of them, and all that it was made with."""
+"""The record of a validation: criteria, what the data say of them, and all that it was made with.
+
+``validation.json`` has numbers in SI, but those of a criterion in its unit; one that is not finite, or
+not known, is null. E is the mean of measured minus predicted, of position of the distance; estimate, low
+and high are the share, or the RMS, with bounds at the criterion's confidence. Of standard uncertainties
+the combined ones, u_input and u_val, hold what is known.
+"""
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim import InputError
 
-from ..execution.result_folder import sha256, together
+from ..execution.result_folder import together
 from ..predictors import ship_name
-from ..report.content import fmu_result, sensor_results, versions
+from ..report.content import Content, fmu_result, sensor_results, versions
 from ..session import Comparison
-from .budget import Learned, read_learned, sources_of
+from .budget import Budget, Learned, read_learned, sources_of
 from .criterion import JUDGED, ReadCriteria, now, read_criteria
 from .judged_criterion import Judgement, Predicted, judge
 from .predictions import Predictions
-from .record_files import FILES, write_record
-from .record_keys import (
-    BudgetResult,
-    CriteriaResult,
-    FileResult,
-    JudgementResult,
-    RecordContent,
-)
+from .record_files import FILES, entry, write_record
+from .record_keys import FORM, REFERENCES, STANDING
 from .validity import covered, window_means
 
 Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
@@ -39,7 +40,7 @@ class Validation:
         judgements: with the errors of all windows.
     """
 
-    content: RecordContent
+    content: Content
     judgements: Sequence[Judgement]
 
     def write(self, folder: str | Path, sign: str | Path | None = None) -> list[str]:
@@ -66,7 +67,7 @@ class Validation:
         return "\n".join(lines(self.content))
 
 
-def lines(content: RecordContent) -> Iterator[str]:
+def lines(content: Content) -> Iterator[str]:
     """The outcome, a line for each criterion."""
     for j in content.judgements:
         yield f"{j.criterion}: {j.outcome}. {j.requirement}: {j.reason}."
@@ -103,28 +104,33 @@ def validate(
     judgements = [judge(c, given, predicted[c.horizon]) for c in read.content.criteria]
     every = {**(files or {}), "learned": () if known is None else known.files}
     fmu = fmu_result(comparison)
-    content = RecordContent(
-        made=now(),
-        command=command or " ".join(sys.argv),
-        versions=versions(),
-        model=fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
-        ship=ship_name(comparison.evaluations[0].model.ship),
-        fmu=fmu,
-        files=[*_data(comparison), *_files(every)],
-        criteria=CriteriaResult(
-            path=str(read.path),
-            sha256=read.sha256,
-            modified=read.modified,
-            read=read.read,
-            purpose=read.content.purpose,
-        ),
-        judgements=[_result(j) for j in judgements],
-        validity=covered(comparison.evaluations),
-        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
-        notes=list(dict.fromkeys(notes)),
-        not_covered=list(_not_covered(comparison, judgements)),
-    )
-    return Validation(content, judgements)
+    content = {
+        "form": FORM,
+        "standing": STANDING,
+        "references": [*REFERENCES],
+        "made": now(),
+        "command": command or " ".join(sys.argv),
+        "versions": versions(),
+        "model": fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
+        "ship": ship_name(comparison.evaluations[0].model.ship),
+        "fmu": fmu,
+        "files": [*_data(comparison), *_files(every)],
+        "criteria": {
+            "path": str(read.path),
+            "sha256": read.sha256,
+            "modified": read.modified,
+            "read": read.read,
+            "purpose": read.content.purpose,
+        },
+        "judgements": [_result(j) for j in judgements],
+        "validity": covered(comparison.evaluations),
+        "sensors": [s for e in comparison.evaluations for s in sensor_results(e)],
+        "notes": [*dict.fromkeys(notes)],
+        "not_covered": [*_not_covered(comparison, judgements)],
+        "reports": [],
+        "public_key": None,
+    }
+    return Validation(Content.of(content), judgements)
 
 
 def _predicted(
@@ -142,58 +148,59 @@ def _predicted(
         yield Predicted(e.name, p, found, window_means(p))
 
 
-def _data(comparison: Comparison) -> Iterator[FileResult]:
+def _data(comparison: Comparison) -> Iterator[dict[str, str]]:
     for e in comparison.evaluations:
         path = e.weak_windows.run.file
         if path is not None:
-            yield _file("data", path)
+            yield entry("data", path)
             beside = path.with_name(f"{path.name}.json")
             if path.is_file() and beside.is_file():
-                yield _file("layout of data", beside)
+                yield entry("layout of data", beside)
 
 
-def _files(files: Files) -> Iterator[FileResult]:
+def _files(files: Files) -> Iterator[dict[str, str]]:
     for role, paths in files.items():
         several = [] if paths is None else [paths] if isinstance(paths, (str, Path)) else paths
         for path in several:
-            yield _file(role, Path(path))
+            yield entry(role, Path(path))
 
 
-def _file(role: str, path: Path) -> FileResult:
-    return FileResult(role=role, path=str(path), sha256=sha256(path))
-
-
-def _result(j: Judgement) -> JudgementResult:
+def _result(j: Judgement) -> dict[str, Any]:
     c, f = j.criterion, j.criterion.factor
     some, whole = j.errors.size > 0, 1.0 if c.statistic != "rms" else f
     estimate, low, high = (None, None, None) if j.interval is None else (x / whole for x in j.interval)
-    return JudgementResult(
-        criterion=c.title,
-        requirement=c.text,
-        outcome=j.outcome,
-        reason=j.reason,
-        runs=[*j.runs],
-        unit=c.unit,
-        tolerance=c.tolerance,
-        windows=j.errors.size,
-        independent=j.independent,
-        E=float(np.mean(j.errors)) / f if some else None,
-        rms=float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
-        largest=float(np.max(np.abs(j.errors))) / f if some else None,
-        estimate=estimate,
-        low=low,
-        high=high,
-        budget=_budget(j),
-    )
+    return {
+        "criterion": c.title,
+        "requirement": c.text,
+        "outcome": j.outcome,
+        "reason": j.reason,
+        "runs": [*j.runs],
+        "unit": c.unit,
+        "tolerance": c.tolerance,
+        "windows": j.errors.size,
+        "independent": j.independent,
+        "E": float(np.mean(j.errors)) / f if some else None,
+        "rms": float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
+        "largest": float(np.max(np.abs(j.errors))) / f if some else None,
+        "estimate": estimate,
+        "low": low,
+        "high": high,
+        "budget": None if j.budget is None else _budget(j.budget, f),
+    }
 
 
-def _budget(j: Judgement) -> BudgetResult | None:
-    if j.budget is None:
-        return None
-    found = j.budget._asdict() | {"u_input": j.budget.u_input, "u_val": j.budget.u_val}
-    scaled = {name: None if u is None else u / j.criterion.factor for name, u in found.items()}
-    u_D, u_num = scaled.pop("measurement"), scaled.pop("numerical")
-    return BudgetResult(u_D=u_D, u_num=u_num, unknown=j.budget.unknown, **scaled)
+def _budget(b: Budget, factor: float) -> dict[str, Any]:
+    found = {
+        "u_D": b.measurement,
+        "initial_state": b.initial_state,
+        "parameters": b.parameters,
+        "process_noise": b.process_noise,
+        "u_input": b.u_input,
+        "u_num": b.numerical,
+        "u_val": b.u_val,
+    }
+    scaled = {name: None if u is None else u / factor for name, u in found.items()}
+    return scaled | {"unknown": b.unknown}
 
 
 def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:

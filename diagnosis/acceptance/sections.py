@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 
+from ..report.content import Content
 from ..report.document import Section, Table
 from ..report.formatting import NO_VALUE, number
-from .record_keys import RecordContent
 
 BUDGET = ("u_D", "initial_state", "parameters", "process_noise", "u_input", "u_num", "u_val")
 CALLED = {"u_D": "measurement u_D", "initial_state": "initial state", "process_noise": "process noise"}
 
 
-def sections(r: RecordContent) -> Iterator[Section]:
+def sections(r: Content) -> Iterator[Section]:
     """The report, in order."""
     told = [(f"{j.criterion}: {j.requirement}", j.outcome, j.reason) for j in r.judgements]
     yield Section("Verdict", tables=[Table(("criterion", "verdict", "why"), told, words=True)])
@@ -32,7 +32,7 @@ def sections(r: RecordContent) -> Iterator[Section]:
     yield Section("Terms and standing", [r.standing, *r.references])
 
 
-def _errors(r: RecordContent) -> Section:
+def _errors(r: Content) -> Section:
     rows = [
         (
             j.criterion,
@@ -51,7 +51,7 @@ def _errors(r: RecordContent) -> Section:
     return Section("Comparison error", [told], [Table(heads, rows)])
 
 
-def _uncertainty(r: RecordContent) -> Section:
+def _uncertainty(r: Content) -> Section:
     rows = []
     for j in r.judgements:
         if j.budget is not None:
@@ -66,7 +66,7 @@ def _uncertainty(r: RecordContent) -> Section:
     return Section("Uncertainty", [told], [Table(heads, rows)])
 
 
-def _origin(r: RecordContent) -> Section:
+def _origin(r: Content) -> Section:
     c = r.criteria
     rows = [
         ("made", r.made),

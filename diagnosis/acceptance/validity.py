@@ -8,9 +8,8 @@ from ..predictors import at_samples
 from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
 from .predictions import Predictions
-from .record_keys import RangeResult
 
-QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)  # 1; those of the keys of the record
+QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
 MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
@@ -52,7 +51,7 @@ def window_means(p: Predictions) -> dict[str, np.ndarray]:
     return found
 
 
-def covered(evaluations: Sequence[Evaluation]) -> list[RangeResult]:
+def covered(evaluations: Sequence[Evaluation]) -> list[dict[str, str | float]]:
     """Each signal over all samples that are used."""
     found: dict[str, list[np.ndarray]] = {}
     units = {}
@@ -61,5 +60,9 @@ def covered(evaluations: Sequence[Evaluation]) -> list[RangeResult]:
             if (chosen := values[e.smoothed.used & np.isfinite(values)]).size:
                 found.setdefault(name, []).append(chosen)
                 units[name] = unit_of(name, e)
-    spread = {n: np.quantile(np.concatenate(parts), QUANTILES).tolist() for n, parts in found.items()}
-    return [RangeResult(n, units[n], *values) for n, values in spread.items()]
+    at = [*QUANTILES.values()]
+    spread = {n: np.quantile(np.concatenate(parts), at).tolist() for n, parts in found.items()}
+    return [
+        {"signal": n, "unit": units[n], **dict(zip(QUANTILES, values, strict=True))}
+        for n, values in spread.items()
+    ]

@@ -3,15 +3,31 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from cosim import InputError
 
 from ..execution.result_folder import sha256
-from .record_keys import FORM, FileResult, RecordContent
+from .record_keys import FORM
 from .signature import is_signed
 
-SUFFIX = ".sig"
+
+class File(BaseModel):
+    """A file that a record names."""
+
+    role: str = "criteria"
+    path: str
+    sha256: str
+
+
+class Record(BaseModel):
+    """What is checked of a record."""
+
+    form: str
+    criteria: File
+    files: list[File]
+    reports: list[File]
+    public_key: str | None
 
 
 class Check(NamedTuple):
@@ -35,18 +51,14 @@ def verify_record(record: str | Path, key: str | Path | None = None) -> list[Che
     """
     path = Path(record)
     raw, content = _read(path)
-    files = [
-        FileResult(role="criteria", path=content.criteria.path, sha256=content.criteria.sha256),
-        *content.files,
-        *content.reports,
-    ]
+    files = [content.criteria, *content.files, *content.reports]
     return [_signature(path, raw, content, key), *(_check(f, path.parent) for f in files)]
 
 
-def _read(path: Path) -> tuple[bytes, RecordContent]:
+def _read(path: Path) -> tuple[bytes, Record]:
     try:
         raw = path.read_bytes()
-        content = TypeAdapter(RecordContent).validate_json(raw)
+        content = Record.model_validate_json(raw)
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:
@@ -58,8 +70,8 @@ def _read(path: Path) -> tuple[bytes, RecordContent]:
     return raw, content
 
 
-def _signature(path: Path, raw: bytes, content: RecordContent, key: str | Path | None) -> Check:
-    beside, named = path.with_suffix(SUFFIX), content.public_key
+def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) -> Check:
+    beside, named = path.with_suffix(".sig"), content.public_key
     if not beside.exists():
         if key is None and named is None:
             return Check(None, "signature: none; a change of the record would not show")
@@ -79,7 +91,7 @@ def _signature(path: Path, raw: bytes, content: RecordContent, key: str | Path |
     return Check(holds, f"signature: {'' if holds else 'not of this record '}by the key {by}")
 
 
-def _check(f: FileResult, folder: Path) -> Check:
+def _check(f: File, folder: Path) -> Check:
     told = f"{f.role}: {f.path}"
     places = [folder / f.path, Path(f.path), folder / Path(f.path).name]
     found = [h for h in map(sha256, places) if h]

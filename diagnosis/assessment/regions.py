@@ -77,12 +77,8 @@ class Region:
         low, high = (
             None if x is None else f"{by.display_factor * x:.3g}" for x in (self.low, self.high)
         )
-        if high is None:
-            text = by.above.format(low)
-        elif low is None:
-            text = by.below.format(high)
-        else:
-            text = by.between.format(low, high)
+        text = by.above.format(low) if high is None else by.between.format(low, high)
+        text = by.below.format(high) if low is None else text
         return f"in run {self.run} {text}" if self.run else text
 
     @property
@@ -121,39 +117,30 @@ def find_regions(
     """
     squares, noise = np.concatenate(omega) ** 2, np.concatenate(std) ** 2
     cluster = numbered([w.block // SETTINGS.blocks_per_cluster for w in data])
-    several_runs = len(data) > 1
     sentences: list[str] = []
     regions: list[Region] = []
     profiles: list[Profile] = []
-    for k, covariates in enumerate(covariates_by_axis(data)):
-        axis = AXES[k]
-        designs = [
-            _Design.of(axis, c, squares[:, k], noise[:, k], cluster, several_runs) for c in covariates
-        ]
+    for axis, covariates, s, n in zip(AXES, covariates_by_axis(data), squares.T, noise.T, strict=True):
+        designs = [_Design.of(axis, c, s, n, cluster, len(data) > 1) for c in covariates]
         profiles += [d.profile for d in designs]
-        rms, uncertainty = (np.sqrt(x[:, k].mean()) for x in (squares, noise))
-        measured = f"{rms:.2g} {UNITS[axis]}"
-        if not exceeds_noise(squares[:, k], noise[:, k], cluster):
-            within = f"no error seen, {measured} is within the uncertainty of {uncertainty:.1g}"
-            seldom = f"{measured} (uncertainty {uncertainty:.1g}), too seldom to say where"
-            is_within = rms <= NOISE_TOLERANCE * uncertainty
-            sentences.append(f"{NAMES[axis]}: {within if is_within else seldom}.")
-            continue
-        found = sorted(filter(None, (d.clearest_region() for d in designs)), key=lambda r: -r.contrast)
+        rms, uncertainty = np.sqrt(s.mean()), np.sqrt(n.mean())
+        measured = f"{rms:.2g} {UNITS[axis]} (uncertainty {uncertainty:.1g})"
+        found: list[Region] = []
+        if _exceeds_noise(s, n, cluster):
+            clearest = filter(None, (d.clearest_region() for d in designs))
+            found = sorted(clearest, key=lambda r: -r.contrast)
+            where = f"{measured}, nowhere clearly worse than elsewhere"
+        elif rms <= NOISE_TOLERANCE * uncertainty:
+            where = f"no error seen, {measured} is within the noise"
+        else:
+            where = f"{measured}, too seldom to say where"
         regions += found
-        everywhere = f"{measured} (uncertainty {uncertainty:.1g}), nowhere clearly worse than elsewhere."
-        sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {everywhere}")
+        sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {where}.")
     return ErrorRegions(sentences, regions, profiles)
 
 
-def exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -> bool:
-    """Whether a model error is more than noise.
-
-    Args:
-        squares: (K,), of the model error [N2 or (N m)2].
-        noise: (K,), variance by the noise of the measurement [N2 or (N m)2].
-        cluster: (K,), number of each window's cluster.
-    """
+def _exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -> bool:
+    """Whether a model error (K,) is more than the noise of the measurement."""
     excess = squares - NOISE_TOLERANCE**2 * noise
     above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
     return above.mean > NORMAL_95 * np.sqrt(above.variance)
@@ -211,15 +198,9 @@ class _Design:
 
     def clearest_region(self) -> Region | None:
         """The significant region of the largest contrast; None: there is none."""
-        bins = len(self.total)
         tried = list(self.intervals())
-        best: Region | None = None
-        for first, after in tried:
-            inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
-            region = self._test(first, after, inside, len(tried))
-            if region is not None and (best is None or region.contrast > best.contrast):
-                best = region
-        return best
+        found = filter(None, (self._test(*ends, len(tried)) for ends in tried))
+        return max(found, key=lambda region: region.contrast, default=None)
 
     def _log_mean_square(self, bins: np.ndarray) -> ClusterMean:
         """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
@@ -227,21 +208,23 @@ class _Design:
         windows = np.maximum(count, 1)
         return cluster_mean(count * np.log(np.maximum(total, np.finfo(float).tiny) / windows), count)
 
-    def _test(self, first: int, after: int, inside: np.ndarray, tried: int) -> Region | None:
+    def _test(self, first: int, after: int, tried: int) -> Region | None:
         """The region, if it is significantly worse than the rest among so many that were tried."""
+        p, bins = self.profile, len(self.total)
+        inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
         share = float(self.profile.share[inside].sum())
         if share > SETTINGS.largest_region:
             return None
         parts = (inside, ~inside)
-        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
         a, b = map(self._log_mean_square, parts)
-        few = min(a.dof, b.dof) + 1 < SETTINGS.least_clusters
-        if few or inner < SETTINGS.least_contrast * outer:
+        if min(a.dof, b.dof) + 1 < SETTINGS.least_clusters:
+            return None
+        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
+        if inner < SETTINGS.least_contrast * outer:
             return None
         p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
         if p_value > SETTINGS.chance:
             return None
-        p, bins = self.profile, len(self.total)
         cyclic = p.covariate.cyclic
         low = float(p.edges[first]) if first > 0 or cyclic else None
         high = float(p.edges[(after - 1) % bins + 1]) if after < bins or cyclic else None

@@ -84,16 +84,14 @@ def axis_remainders(
     groups = spans(data)
     found = {}
     for k, axis in enumerate(AXES):
-        size = float(np.mean((left[:, k] / noise[:, k]) ** 2)) / NOISE_TOLERANCE**2
-        dof = len(left) / OVERLAP
-        by_size = float(chdtrc(dof, dof * size))
+        size, dof = _rms(left[:, k] / noise[:, k]) / NOISE_TOLERANCE, len(left) / OVERLAP
+        by_size = float(chdtrc(dof, dof * size**2))
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups)
-        rms, start = _rms(left[:, k]), _rms(first[:, k])
+        rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
         least = max(SETTINGS.share_of_first * start, SHARE_OF_COMMAND * _rms(command[:, k]))
         matters = (by_size < level() and rms > least) or (by_slowness < level() and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         p_value = min(by_size, by_slowness)
-        uncertainty = _rms(noise[:, k])
         found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
     return found
 

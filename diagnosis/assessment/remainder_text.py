@@ -86,14 +86,11 @@ def remainder_sentence(
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
     of_first = f", {share:.2g} % of the first error" if share < 99.5 else ""
-    unit = UNITS[axis]
-    return f"{NAMES[axis]}: {r.rms:.2g} {unit} (uncertainty {r.uncertainty:.1g}{of_first})"
+    return f"{NAMES[axis]}: {r.rms:.2g} {UNITS[axis]} (uncertainty {r.uncertainty:.1g}{of_first})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
-    if r.best == "place":
-        return REPEATS["place"]
-    if r.in_part:
+    if r.in_part and r.best != "place":
         return IN_PART
     if r.best is not None:
         return REPEATS[r.best]

@@ -115,16 +115,15 @@ def check_stability(
     everywhere = sampled_motions(region)
     before = dissipation(nominal, everywhere, metric)
     after = dissipation(model, everywhere, metric)
-    notes = (
-        []
-        if mass_definite
-        else ["the mass matrix is not positive definite: some force would push backwards"]
-    )
-    compared = [_compare(k, model, nominal, metric, region) for k in range(3)]
-    worse = [text for text in compared if text]
-    lowest = int(np.argmin(after))
+    indefinite = "the mass matrix is not positive definite: some force would push backwards"
+    notes = [] if mass_definite else [indefinite]
+    worse = [*filter(None, (_compare(k, model, nominal, metric, region) for k in range(3)))]
     if not worse and _less(after.min(), before.min()):
-        worse = [_motion(everywhere[lowest], float(after.min()), float(before.min()))]
+        u, v, r = everywhere[np.argmin(after)]
+        worse = [
+            f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
+            f"{after.min():.3g} 1/s (nominal at least {before.min():.3g})"
+        ]
     if not model.ship.fully_actuated:
         advance("coming to rest without thrust")
         fastest = np.split(everywhere, SETTINGS.directions)[-1]
@@ -239,14 +238,6 @@ def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: O
     )
 
 
-def _motion(nu: np.ndarray, after: float, before: float) -> str:
-    u, v, r = nu
-    return (
-        f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
-        f"{after:.3g} 1/s (nominal at least {before:.3g})"
-    )
-
-
 def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, notes: list[str]) -> bool:
     """Whether a ship without thrust stays near the speeds of its region, from whatever motion there.
 
@@ -284,14 +275,14 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
     bounded, both, bound = True, True, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
+    outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
+    undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
     for reference, distance in zip(REFERENCES, distances, strict=True):
         if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
         notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
-        outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
-        undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
         if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
             notes.append(
                 "it holds without wind, waves and current: they are too strong for the thrusters"

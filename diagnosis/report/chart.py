@@ -57,7 +57,7 @@ class Text(NamedTuple):
 
 
 class Box(NamedTuple):
-    """Where a panel lies on the chart, from the upper left corner [pt]."""
+    """Where a panel lies on the chart [pt], ``top`` from above."""
 
     left: float
     top: float
@@ -323,11 +323,11 @@ def _element(m: Mark, clip: str) -> str:
 
 
 def _path(m: Mark, end: str = "") -> str:
-    """Points to a tenth of a point; neighbours that are the same there once."""
+    """Points to a tenth of a point; of neighbours within half of one the first."""
     places = np.column_stack([m.x, m.y]).clip(-WIDTH, 2 * WIDTH).round(1)
-    known = np.isfinite(places).all(axis=1)
+    known, cells = np.isfinite(places).all(axis=1), np.floor(2 * places)
     begins = known & ~np.r_[False, known[:-1]]
-    new = begins | (known & np.r_[True, (places[1:] != places[:-1]).any(axis=1)])
+    new = begins | (known & np.r_[True, (cells[1:] != cells[:-1]).any(axis=1)])
     parts = zip(places[new].tolist(), begins[new].tolist(), strict=True)
     text = "".join(f"{end}M{x:g},{y:g}" if begin else f" {x:g},{y:g}" for (x, y), begin in parts)
     return text.removeprefix(end) + end if text else ""

@@ -92,13 +92,19 @@ def write_report(
         trials=[*trial_rows(data)],
         coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
         provenance=[(label, value) for label, value in made_with if value is not None],
-        glossary=[*formatting.glossary(*data.lengths)],
     )
     return path
 
 
 def write_page(path: Path, template: str, **values: object) -> None:
     """Write a page by a template of this folder; an older file is replaced when it is complete."""
+    text = rendered(template, **values)
+    with cosim.atomic_write(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+
+
+def rendered(template: str, **values: object) -> str:
+    """A page, or a part of one, by a template of this folder."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -110,10 +116,8 @@ def write_page(path: Path, template: str, **values: object) -> None:
     )
     f = formatting
     made.filters |= {x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, told, boundedness)}
-    made.globals["times"] = f.times
-    text = made.get_template(template).render(values)
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    made.globals |= {"times": f.times, "degrees": degrees(1.0)}
+    return made.get_template(template).render(values)
 
 
 def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:

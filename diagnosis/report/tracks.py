@@ -13,24 +13,21 @@ from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
 from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Axis, Chart, Panel
 from .figures import interrupted
 
-MAX_POINTS = 1500  # of a track; chosen, keeps a page near a megabyte
 QUARTILES = (0.25, 0.5, 0.75)  # 1
-# Forces along a track: how many, and the longest as a share of the track's extent; chosen.
-STICKS, LONGEST = 80, 0.15
-BINS = 32  # parts of a window over which errors are summarised; chosen
+PARTS = (
+    32  # of a window over which errors are summarised; forces along a track are twice as many; chosen
+)
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
     """The measured track of a run, and the predictions of the models from the start of each window."""
     eta = e.smoothed.eta
     panel = _map(eta[:, :2])
-    _broad(panel, *_east_north(_thinned(eta)))
+    _broad(panel, *_east_north(eta))
     if e.windows is not None:
         window, measured = e.windows.sample_window, e.windows.measured
-        step = max(1, len(window) // MAX_POINTS)
         for prediction, colour, label in _models(e, learned):
-            predicted = _finite(measured - prediction.residuals)[::step, :2]
-            parts = interrupted(predicted, window[::step])
+            parts = interrupted(_finite(measured - prediction.residuals), window)
             panel.draw(*_east_north(parts), colour, label)
         starts = measured[np.r_[0, np.flatnonzero(np.diff(window)) + 1]]
         panel.draw(*_east_north(starts), INK, dots=True)
@@ -43,10 +40,10 @@ def free(e: Evaluation) -> Chart:
     measured = e.smoothed.eta[:, :2]
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
-    _broad(panel, *_east_north(_thinned(measured)))
+    _broad(panel, *_east_north(measured))
     names = ("before", "after") if e.learned else ("predicted",)
     for path, colour, label in zip(paths, (BEFORE, AFTER), names, strict=False):
-        panel.draw(*_east_north(_thinned(_finite(path))), colour, label)
+        panel.draw(*_east_north(_finite(path)), colour, label)
     panel.draw(*_east_north(measured[:1]), INK, dots=True)
     return _chart(panel)
 
@@ -60,17 +57,17 @@ def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]]
         stretches: begin and end [s] of parts that are marked; then only what is left is drawn.
     """
     eta, time = e.smoothed.eta, e.smoothed.time
-    shown = np.linspace(0, e.weak_windows.middle.size - 1, STICKS).astype(int)
+    shown = np.linspace(0, e.weak_windows.middle.size - 1, 2 * PARTS).astype(int)
     *_, headings, places = means_of_run(e.weak_windows)
     at, psi = places[shown], headings[shown]
     c, s = np.cos(psi), np.sin(psi)
     models = _models(e, learned)[-1 if stretches else 0 :]
     forces = [p.omega[shown, :2].T for p, _, _ in models]
     most = max(float(np.hypot(*f).max()) for f in forces) or 1.0
-    reach = LONGEST * np.ptp(eta[np.isfinite(eta[:, 0]), :2], axis=0).max() / most
+    reach = 2 * MARGIN * np.ptp(eta[np.isfinite(eta[:, 0]), :2], axis=0).max() / most
     tips = [at + reach * np.column_stack([c * X - s * Y, s * X + c * Y]) for X, Y in forces]
     panel = _map(np.concatenate([eta[:, :2], *tips]))
-    _broad(panel, *_east_north(_thinned(eta)), "track")
+    _broad(panel, *_east_north(eta), "track")
     for k, (begin, end) in enumerate(stretches):
         part = eta[(time >= begin) & (time <= end)]
         panel.draw(*_east_north(part), THIRD, "" if k else "pushed", width=2 * LINE)
@@ -133,9 +130,9 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
     known = [e for e in evaluations if e.windows is not None]
     windows = [e.windows for e in known if e.windows is not None]
     since = np.concatenate([w.since for w in windows])
-    edges = np.linspace(0.0, windows[0].length, BINS + 1)
+    edges = np.linspace(0.0, windows[0].length, PARTS + 1)
     middle = (edges[:-1] + edges[1:]) / 2
-    part = np.clip(np.digitize(since, edges) - 1, 0, BINS - 1)
+    part = np.clip(np.digitize(since, edges) - 1, 0, PARTS - 1)
     time = Axis("time since the window began [s]", (0.0, edges[-1]))
     position = Panel(Axis(limits=time.limits, shown=False), Axis("position [mm]", scale=np.log10))
     panels = (position, Panel(time, Axis("heading [°]", scale=np.log10)))
@@ -144,7 +141,7 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
         _, colour, label = models[0]
         errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
-            bands = np.full((3, BINS), np.nan)
+            bands = np.full((3, PARTS), np.nan)
             for k in np.unique(part):
                 bands[:, k] = np.quantile(error[part == k], QUARTILES, method="nearest")
             panel.fill(middle, bands[0], bands[2], colour)
@@ -176,10 +173,6 @@ def _broad(panel: Panel, x: np.ndarray, y: np.ndarray, label: str = "measured") 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(pose), pose, np.nan)
-
-
-def _thinned(pose: np.ndarray) -> np.ndarray:
-    return pose[:: max(1, len(pose) // MAX_POINTS)]
 
 
 def _east_north(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
