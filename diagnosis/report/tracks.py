@@ -14,9 +14,8 @@ from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Axis, Ch
 from .figures import interrupted
 
 QUARTILES = (0.25, 0.5, 0.75)  # 1
-PARTS = (
-    32  # of a window over which errors are summarised; forces along a track are twice as many; chosen
-)
+# Of a window over which errors are summarised; of forces along a track twice as many; chosen.
+PARTS = 32
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
