@@ -123,7 +123,7 @@ class ReadCriteria(NamedTuple):
     """
 
     content: Criteria
-    path: Path
+    path: str
     sha256: str
     modified: str
     read: str
@@ -148,7 +148,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as criteria: {error}") from None
     modified = datetime.fromtimestamp(changed, timezone.utc)
-    return ReadCriteria(content, path, sha256(text).hexdigest(), _stamp(modified), now())
+    return ReadCriteria(content, str(path), sha256(text).hexdigest(), _stamp(modified), now())
 
 
 def now() -> str:

@@ -18,7 +18,7 @@ from cosim import InputError
 
 from ..execution.result_folder import together
 from ..predictors import ship_name
-from ..report.content import Content, fmu_result, sensor_results, versions
+from ..report.content import Content, fmu_result, part, sensor_results, versions
 from ..session import Comparison
 from .budget import Budget, Learned, read_learned, sources_of
 from .criterion import JUDGED, ReadCriteria, now, read_criteria
@@ -28,6 +28,12 @@ from .record_files import FILES, entry, write_record
 from .record_keys import FORM, REFERENCES, STANDING
 from .validity import covered, window_means
 
+# Attributes that the record holds; KEY=ATTRIBUTE where a key has another name.
+JUDGEMENT = (
+    "criterion=criterion.title requirement=criterion.text outcome reason runs unit=criterion.unit "
+    "tolerance=criterion.tolerance windows=errors.size independent"
+)
+BUDGET = "u_D=measurement initial_state parameters process_noise u_input u_num=numerical u_val"
 Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
 
 
@@ -115,13 +121,7 @@ def validate(
         "ship": ship_name(comparison.evaluations[0].model.ship),
         "fmu": fmu,
         "files": [*_data(comparison), *_files(every)],
-        "criteria": {
-            "path": str(read.path),
-            "sha256": read.sha256,
-            "modified": read.modified,
-            "read": read.read,
-            "purpose": read.content.purpose,
-        },
+        "criteria": part(read, "path sha256 modified read purpose=content.purpose"),
         "judgements": [_result(j) for j in judgements],
         "validity": covered(comparison.evaluations),
         "sensors": [s for e in comparison.evaluations for s in sensor_results(e)],
@@ -150,8 +150,7 @@ def _predicted(
 
 def _data(comparison: Comparison) -> Iterator[dict[str, str]]:
     for e in comparison.evaluations:
-        path = e.weak_windows.run.file
-        if path is not None:
+        if (path := e.weak_windows.run.file) is not None:
             yield entry("data", path)
             beside = path.with_name(f"{path.name}.json")
             if path.is_file() and beside.is_file():
@@ -169,16 +168,7 @@ def _result(j: Judgement) -> dict[str, Any]:
     c, f = j.criterion, j.criterion.factor
     some, whole = j.errors.size > 0, 1.0 if c.statistic != "rms" else f
     estimate, low, high = (None, None, None) if j.interval is None else (x / whole for x in j.interval)
-    return {
-        "criterion": c.title,
-        "requirement": c.text,
-        "outcome": j.outcome,
-        "reason": j.reason,
-        "runs": [*j.runs],
-        "unit": c.unit,
-        "tolerance": c.tolerance,
-        "windows": j.errors.size,
-        "independent": j.independent,
+    return part(j, JUDGEMENT) | {
         "E": float(np.mean(j.errors)) / f if some else None,
         "rms": float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
         "largest": float(np.max(np.abs(j.errors))) / f if some else None,
@@ -190,16 +180,7 @@ def _result(j: Judgement) -> dict[str, Any]:
 
 
 def _budget(b: Budget, factor: float) -> dict[str, Any]:
-    found = {
-        "u_D": b.measurement,
-        "initial_state": b.initial_state,
-        "parameters": b.parameters,
-        "process_noise": b.process_noise,
-        "u_input": b.u_input,
-        "u_num": b.numerical,
-        "u_val": b.u_val,
-    }
-    scaled = {name: None if u is None else u / factor for name, u in found.items()}
+    scaled = {name: None if u is None else u / factor for name, u in part(b, BUDGET).items()}
     return scaled | {"unknown": b.unknown}
 
 

@@ -63,13 +63,12 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
 
 def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
-    twice, still = same_columns(w.run), still_column(w.run)
+    twice, wrong_one = same_columns(w.run), still_column(w.run)
+    seen = f"{wrong_one} is the same number in all rows, while the rest of the pose changes"
     if twice:
-        seen = f"{twice[0]} and {twice[1]} are the same numbers"
-        return seen, {twice[1]: Change(twice[1])}, "the name of its column"
-    if still:
-        seen = f"{still} is the same number in all rows, while the rest of the pose changes"
-        return seen, {still: Change(still)}, "the name of its column"
+        wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} are the same numbers"
+    if wrong_one:
+        return seen, {wrong_one: Change(wrong_one)}, "the name of its column"
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return silent, {}, None
@@ -86,11 +85,9 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     if beyond is None and not wrong:
         return None
     seen = beyond or f"its accelerations follow {', '.join(wrong)}"
-    return (
-        (f"{seen}; it seems that {reading.mistake}", reading.changes, None)
-        if reading
-        else (seen, {}, None)
-    )
+    if reading is None:
+        return seen, {}, None
+    return f"{seen}; it seems that {reading.mistake}", reading.changes, None
 
 
 def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:

@@ -71,8 +71,8 @@ def profile(
         )
         # What never changes has one edge, and one bin.
         edges = covariate.display_factor * np.resize(first.edges, first.rms.size + 1)
-        last_one, own = axis == AXES[-1], covariate is THRUST  # the thrust is that of the axis
-        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=own or last_one)
+        shown = axis == AXES[-1] or covariate is THRUST  # the thrust is that of the axis
+        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=shown)
         panel = Panel(x, Axis(force), zero=True)
         steps = np.repeat(edges, 2)[1:-1]
         panel.fill(steps, 0.0, np.repeat(first.uncertainty, 2), BAND, "noise")
@@ -91,18 +91,15 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     """
     shown = ranked[:MAX_RANKED]
     behind = np.array([_behind(r, shown[0]) for r in shown])
-    linear = TIE * float(behind[:, 1].max())
+    linear = TIE * float(np.median(behind[:, 1]))
     # Linear below what may be a tie, logarithmic far above.
     scale = (lambda x: np.arcsinh(x / linear)) if linear else None
-    label = (
-        "score behind the first, with its standard error [1]\n"
-        "right: explained beyond other values of the coefficients"
-    )
+    label = "score behind the first, with its standard error [1]"
+    label += "\nright: explained beyond other values of the coefficients"
     names = Axis(limits=(len(shown), -1), names=[r.id for r in shown])
     panel = Panel(Axis(label, scale=scale), names)
     for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):
-        tied = x <= TIE * std
-        colour = AFTER if tied else BAND
+        colour = AFTER if (tied := x <= TIE * std) else BAND
         panel.draw([x - std, x + std], [k, k], colour)
         panel.draw(x, k, colour, dots=True, hollow=tied and k > 0)
         panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)

@@ -66,14 +66,14 @@ def tell_apart(one: Effect, other: Effect) -> str:
     Either effect may know, or else the family of either; else both are excited.
     """
     a, b = one.wording, other.wording
-    known = (
-        a.apart.get(other.id),
-        b.apart.get(one.id),
-        a.family.apart.get(b.family.name),
-        b.family.apart.get(a.family.name),
-    )
     excite = "run " + "; and ".join(dict.fromkeys((a.family.excite, b.family.excite)))
-    return next((text for text in known if text), excite)
+    return (
+        a.apart.get(other.id)
+        or b.apart.get(one.id)
+        or a.family.apart.get(b.family.name)
+        or b.family.apart.get(a.family.name)
+        or excite
+    )
 
 
 def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:

@@ -82,7 +82,7 @@ def headline(r: ReportData) -> str:
 
 def boundedness(s: Stability) -> str:
     """Whether the learned model stays bounded in a simulation."""
-    where, paths = (
-        ("In closed loop", " on the reference paths") if s.closed_loop else ("Without thrust", "")
+    model = f"the learned model {'stays' if s.bounded else 'does NOT stay'} bounded"
+    return (
+        f"In closed loop {model} on the reference paths" if s.closed_loop else f"Without thrust {model}"
     )
-    return f"{where} the learned model {'stays' if s.bounded else 'does NOT stay'} bounded{paths}"

@@ -40,8 +40,7 @@ def free(e: Evaluation) -> Chart:
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
     _broad(panel, *_east_north(measured))
-    names = ("before", "after") if e.learned else ("predicted",)
-    for path, colour, label in zip(paths, (BEFORE, AFTER), names, strict=False):
+    for path, (_, colour, label) in zip(paths, _models(e, bool(e.learned)), strict=True):
         panel.draw(*_east_north(_finite(path)), colour, label)
     panel.draw(*_east_north(measured[:1]), INK, dots=True)
     return _chart(panel)
@@ -87,8 +86,7 @@ def worst_of(e: Evaluation) -> int | None:
 
 def heading_bands(e: Evaluation) -> Chart | None:
     """Heading over the worst window, with the bands of the learned model; None where there are none."""
-    worst = worst_of(e)
-    if worst is None or e.windows is None or e.bands is None:
+    if (worst := worst_of(e)) is None or e.windows is None or e.bands is None:
         return None
     inside = e.windows.sample_window == worst
     since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
@@ -104,8 +102,7 @@ def heading_bands(e: Evaluation) -> Chart | None:
 
 def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     """The worst window, with the bands of the learned model; None where there is no window."""
-    worst = worst_of(e)
-    if worst is None or e.windows is None:
+    if (worst := worst_of(e)) is None or e.windows is None:
         return None
     inside = e.windows.sample_window == worst
     measured = e.windows.measured[inside]
@@ -150,17 +147,15 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
 
 def _models(e: Evaluation, learned: bool) -> list[tuple[PredictionError, str, str]]:
     """Prediction error, colour and label of each model of a run."""
-    if not learned:
-        return [(e.before, BEFORE, "predicted")]
-    return [(e.before, BEFORE, "before"), (e.after, AFTER, "after")]
+    before = (e.before, BEFORE, "before" if learned else "predicted")
+    return [before, (e.after, AFTER, "after")] if learned else [before]
 
 
 def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(high - low for low, high in panel.ends())
     outline = of.vessel.outline
-    drawn = [] if outline is None else hulls(poses, outline.corners)
-    for corners in drawn:
+    for corners in [] if outline is None else hulls(poses, outline.corners):
         if 2 * np.ptp(corners, axis=0).max() < room:
             panel.draw(*np.vstack([corners, corners[:1]]).T, INK, width=LINE / 2)
 
