@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
+from .assessment.gathering import gather
 from .execution.progress import Advance, silent
-from .gathering import gather
 from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
 from .report.content import Content, file_content
 from .report.notebook import Plots, as_html

@@ -47,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
+    from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .gathering import gather  # only now: it takes a while to import
     from .predictors import WRITTEN, DescribedShip, ship_with
     from .search import shares
 

@@ -39,7 +39,6 @@ from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
 
 MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
-REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ class Diagnosis(Verdict):
         comparison: errors before and after, on training, validation and test runs, in this order.
         start: the initial model.
         stability: of the learned model.
-        speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
+        speeds: u, v, r that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
     """
@@ -221,14 +220,12 @@ def diagnose(
     comparison = _predicted(verdict, predictor, runs, data, advance)
     advance("stability")
     stability = check_stability(verdict.learned.model, start, advance, region)
-
-    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
     return Diagnosis(
         **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
         comparison=comparison,
         start=start,
         stability=stability,
-        speeds=(u, v, r),
+        speeds=region,
         prior=prior,
         seed=seed,
     )

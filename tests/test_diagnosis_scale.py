@@ -11,9 +11,9 @@ import diagnosis
 from diagnosis import Model
 from diagnosis.assessment.closed_loop import REFERENCES
 from diagnosis.assessment.covariates import MIN_TIME_BIN
+from diagnosis.assessment.gathering import gather
 from diagnosis.assessment.stability import OperatingRegion, largest_distance
 from diagnosis.compare import main as compare
-from diagnosis.gathering import gather
 from diagnosis.predictors.uncertainty import omega_std
 from fmus.actuators.law import Law
 from fmus.declare import variables

@@ -36,17 +36,16 @@ from .described_ship import DescribedShip, windows_of
 from .prediction import Starts, at_rest
 from .predictor import Description, Predictor
 from .ship_model import GivenForce, Model
+from .thrust import FORGOTTEN
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
 from .windows import Windows, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
 TAU = ("tau_X", "tau_Y", "tau_N")
-# s, times the scale of the ship; after that a surge speed has forgotten most of its start. Chosen.
-RUN_IN = 60.0
-SMALL = 1e-3  # of the ship's speeds; step of the slopes by velocity
-ALIKE = 1e-6  # relative; inertias that differ by less are the same
-LIGHTEST, HEAVIEST = 1e-3, 1e3  # of the ship's inertia, within which that of a black box is used; chosen
+# Of the ship's speeds the step of slopes; of the ship's answer to a force one that is none, and its
+# inverse too much. Chosen, as a black box solves its equations to some digits only.
+SMALL = 1e-3
 
 # Name of a pose, velocity, force or command -> values (n,) [SI].
 Signals = Mapping[str, np.ndarray]
@@ -119,7 +118,7 @@ class BlackBox(ABC):
     def run_in(self, smoothed: Smoothed) -> float:
         if not self.whole or (self.own_run_in is None and at_rest(smoothed)):
             return 0.0
-        return RUN_IN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
+        return FORGOTTEN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
 
     @property
     def model(self) -> Model:
@@ -274,11 +273,11 @@ class BlackBox(ABC):
         for k in axes:
             push = ship.ship.scale.forces[k]
             pushed = (self.accelerations({**still, TAU[k]: np.array([push])})[0] - at_rest) / push
-            if not LIGHTEST < pushed[k] * ship.mass[k, k] < HEAVIEST:
+            if not SMALL < pushed[k] * ship.mass[k, k] < 1.0 / SMALL:
                 return {}  # something lags between force and motion, or there is none
             by_force[axes, k] = pushed[axes]
         M = np.linalg.inv(by_force)
-        if np.abs(M - ship.mass).max() <= ALIKE * np.abs(ship.mass).max():
+        if np.allclose(M, ship.mass):
             return {}
         i = ship.hull.hull.inertia
         heavier = {"X_udot": i.m - M[0, 0], "Y_vdot": i.m - M[1, 1], "N_rdot": i.I_z - M[2, 2]}

@@ -13,8 +13,7 @@ from .ship_model import Model
 from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows
 
-LEVELS = (0.5, 0.9)
-POINTS = 41  # of an ellipse that is drawn; chosen
+LEVELS = (0.5, 0.9)  # probabilities of the bands that are shown; 90 % of the contract, and half
 
 
 def quantile(level: float, dof: int) -> float:
@@ -62,8 +61,8 @@ class Bands:
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
-        """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
-        around = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        """(T, points, 2), closed lines about the predicted positions of a window [m]."""
+        around = np.linspace(0.0, 2.0 * np.pi)
         circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
         factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
         return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)

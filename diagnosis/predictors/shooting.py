@@ -23,9 +23,7 @@ from .windows import usable_windows
 
 INSTANTS = 16  # of a window at which pose and prediction are compared
 PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
-ROOM = 40_000  # windows of models in one integration: in arrays of that size numpy's overhead is small
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
-VELOCITY = 1e-4  # m/s, rad/s, times the scale of the ship; step of the derivatives of the acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,16 +123,11 @@ class Shooting:
         """
         key = Response.key(model)
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
-        same = [n for n, m in changed.items() if Response.key(m) == key]
-        size = max(1, ROOM // max(self.run.size, 1))
-        first = _together(model, {n: steps[n] for n in same[:size]})
-        states = self._states(first, model)
-        poses = _poses(states[1:], first)
-        base, found = poses[0], dict(zip(same, poses[1:], strict=False))
-        for k in range(size, len(same), size):
-            some = {n: steps[n] for n in same[k : k + size]}
-            further = _together(model, some)
-            found |= dict(zip(some, _poses(self._states(further, model)[1:], further)[1:], strict=True))
+        same = {n: steps[n] for n, m in changed.items() if Response.key(m) == key}
+        together = _together(model, same)
+        states = self._states(together, model)
+        base, *others = _poses(states[1:], together)
+        found = dict(zip(same, others, strict=True))
         found |= {n: _poses(self._states(m)[1:], m)[0] for n, m in changed.items() if n not in found}
         slopes = [_off(found[n], base) / h for n, h in steps.items()]
         stacked = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
@@ -219,6 +212,7 @@ def _slope(s: vessel.State, model: Model) -> np.ndarray:
     found[:, 2, 5] = 1.0
     base = acceleration(at)
     for k, (name, speed) in enumerate(zip(("u", "v", "r"), model.ship.scale.speeds, strict=True)):
-        ahead = at._replace(**{name: getattr(at, name) + VELOCITY * speed})
-        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / (VELOCITY * speed)
+        step = np.sqrt(np.finfo(float).eps) * speed
+        ahead = at._replace(**{name: getattr(at, name) + step})
+        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / step
     return found

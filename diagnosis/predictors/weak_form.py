@@ -34,12 +34,9 @@ HORIZON = 8.0  # s, of predictions. Chosen: motions of the unstable nominal hull
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
-AT_EDGE = 1e-9  # of the half width of a window
-KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
-ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
-# Bytes for commands that thrusters with a memory respond to: of 700 s with two sets of thrusters those
-# of 30 such models.
-MEMORIES = 8e7
+# Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
+# memory respond to, of 700 s with two sets of thrusters those of 15 such models.
+ROOM = 4e7
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -109,7 +106,7 @@ class WeakWindows:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
-    def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
+    def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
         Of two models that differ in the hull alone the thrust is the same, and so on.
@@ -118,8 +115,7 @@ class WeakWindows:
         found = kept.pop(key, None)
         if found is None:
             found = make()
-            most = room // found.nbytes if isinstance(found, np.ndarray) else KEPT
-            while len(kept) >= max(most, KEPT):
+            while len(kept) * found.nbytes > ROOM:
                 del kept[next(iter(kept))]
         kept[key] = found  # the last in order is the latest
         return found
@@ -164,9 +160,8 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         & (busy[last] > busy[first])
     )
     middles, first, last = middles[kept], first[kept], last[kept]
-    # Where no sample is at its edge, a window begins between two.
-    first = np.where(t[first] > middles - half + AT_EDGE * half, np.maximum(first - 1, 0), first)
-    last = np.where(t[last - 1] < middles + half - AT_EDGE * half, np.minimum(last + 1, t.size), last)
+    # A window may begin and end between two samples.
+    first, last = np.maximum(first - 1, 0), np.minimum(last + 1, t.size)
     rows = np.repeat(np.arange(middles.size), last - first)
     columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
@@ -233,7 +228,8 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
-    eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
+    eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
+    change = w.recall("change", measured, lambda: w.slope @ nu)
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
     def met() -> np.ndarray:
@@ -328,7 +324,7 @@ def _response(w: WeakWindows, model: Model) -> np.ndarray:
     def between() -> np.ndarray:
         return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 
-    return w.recall("response", Response.key(model), between, MEMORIES)
+    return w.recall("response", Response.key(model), between)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
@@ -358,9 +354,8 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
     return np.column_stack(accelerated(model.hull.hull.inverse, X, Y, N))
 
 
-def _motion(w: WeakWindows, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
+def _motion(w: WeakWindows, model: Model) -> np.ndarray:
+    """True pose and velocity (2, n, 3) behind the measured ones."""
     motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
     # Columns in one piece each: all that is computed of them goes along time.
-    eta, nu = (np.where(w.known, np.concatenate(part), 0.0).T for part in motion)
-    return eta, nu, w.slope @ nu
+    return np.array([np.where(w.known, np.concatenate(part), 0.0) for part in motion]).swapaxes(1, 2)

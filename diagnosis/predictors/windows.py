@@ -16,14 +16,14 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import LONGEST_STEP, Starts, by_clock, predict
+from .prediction import Starts, by_clock, predict
 from .ship_model import Model
+from .thrust import LONGEST_STEP
 from .weak_form import HORIZON
 
 # Times the scale of the ship.
 FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
 LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
-MIN_COVERAGE = 0.5  # of a window's samples; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,7 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     first = measured[at]  # the first sample of each window that has any
     prompt = since[first] - length * number[first] < period
     chosen, samples = np.unique(number[used], return_counts=True)
-    full = chosen[samples >= MIN_COVERAGE * round(length / period)]
+    full = chosen[2 * samples >= round(length / period)]
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))

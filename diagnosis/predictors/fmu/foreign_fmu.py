@@ -23,9 +23,11 @@ from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_sampl
 from ..described_ship import nominal
 from ..predictor import FOUND, MAP, UnmatchedError
 from ..ship_model import Model
+from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
+from ..windows import FREE_STEP
 from .instances import Begun, simulate
-from .short_steps import FIRST, LONGEST, SECOND, STEP, ShortSteps
+from .short_steps import ShortSteps
 from .variable_map import VariableMap, completed, propose, quantities, read_map, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
 
@@ -154,7 +156,7 @@ class FmuPredictor(BlackBox):
     def _along_runs(self) -> Model:
         inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
         time = self.runs[0].scale.time
-        h = min(self.fmu.step or STEP * time, LONGEST * time)
+        h = min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
         with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
             return super()._along_runs
 
@@ -185,12 +187,12 @@ class FmuPredictor(BlackBox):
 
     def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
         """nu_dot (3,) from a start on, by differences of a few short steps."""
-        motion, h = self.units.outputs(self._steps.run(start, inputs)), self._steps.h
+        motion = self.units.outputs(self._steps.run(start, inputs))
+        slopes = self._steps.derivatives
         if set(VELOCITY) <= motion.keys():
-            return np.array([FIRST @ motion[s] for s in VELOCITY]) / h
+            return np.array([slopes(motion[s])[0] for s in VELOCITY])
         x, y, psi = (motion[s] for s in POSE)
-        rate = [FIRST @ p / h for p in (x, y, np.unwrap(psi))]
-        change = [SECOND @ p / h**2 for p in (x, y, np.unwrap(psi))]
+        rate, change = np.transpose([slopes(p) for p in (x, y, np.unwrap(psi))])
         u, v = rotate_to_body(psi[0], rate[0], rate[1])
         u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
         return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])

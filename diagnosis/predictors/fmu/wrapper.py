@@ -20,7 +20,6 @@ from ..weak_form import WeakWindows, omega
 from ..windows import step_of
 from .variable_map import BESIDE, VariableMap
 
-SLIGHT = 1e-9  # of the ship's forces: less is none
 FOREIGN, ADDED = "model", "found"  # instances of the container
 
 NONE = "No FMU with what was found is written"
@@ -67,7 +66,7 @@ def write_wrapper(
         What was written, or what is needed for it, in a sentence; the map of the new FMU, or None.
     """
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
-    needed = np.abs(change).max(axis=0) > SLIGHT * np.array(start.ship.scale.forces)
+    needed = ~np.isclose(np.abs(change).max(axis=0) / start.ship.scale.forces, 0.0)
     takes = {*fmu.map.told("inputs"), *fmu.map.told("beside")}
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
