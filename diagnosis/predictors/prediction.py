@@ -115,13 +115,10 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         each = zip(starts.runs, names, strict=True)
         parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
         return np.concatenate(parts, axis=-1)
-    body, thrust = model.hull, arriving(starts, model)
-    shape = np.broadcast_shapes(*sizes(body.params, model.drive.params), thrust[1].shape[-2:])
-    found = np.empty((starts.steps + 1, 3, *shape))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        for k, s in enumerate(propagate(starts, model, thrust)):
-            found[k] = np.stack(np.broadcast_arrays(*vessel.measured(s, body)))
-    return found
+        states = propagate(starts, model, arriving(starts, model))
+        poses = [np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull))) for s in states]
+    return np.stack(np.broadcast_arrays(*poses))
 
 
 def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +142,9 @@ def propagate(
     layout = drive.effects.layout
     power = starts.power(model.clock)
     thrusters, beside = drive, starts.given(model)
-    s = first_state(starts, body)
+    # The smoothed motion, seen through the model's measurement effects.
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), body)
+    s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     yield s
     for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
         with np.errstate(all="ignore"):
@@ -192,14 +191,9 @@ def stacked(models: Sequence[Model]) -> Model:
 
 def singles(model: Model) -> list[Model]:
     """The models of one whose thrusters' parameters are arrays (p, 1); itself where none is."""
-    many = [np.size(v) for v in model.thrusters.values() if isinstance(v, np.ndarray)]
-    if not many:
-        return [model]
-
-    def one(values: Mapping[str, Any], k: int) -> dict[str, float]:
-        return {n: float(v[k, 0]) if isinstance(v, np.ndarray) else v for n, v in values.items()}
-
-    return [replace(model, thrusters=one(model.thrusters, k)) for k in range(max(many))]
+    many = {n: v[:, 0].tolist() for n, v in model.thrusters.items() if isinstance(v, np.ndarray)}
+    each = [dict(zip(many, values, strict=True)) for values in zip(*many.values(), strict=True)]
+    return [replace(model, thrusters={**model.thrusters, **one}) for one in each] or [model]
 
 
 def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
@@ -209,21 +203,6 @@ def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.S
         lambda: vessel.integrate(s, tau, b, h, vessel.disturbed),
         lambda: vessel.integrate(s, tau, b.hull, h),
     )
-
-
-def sizes(*groups: Any) -> list[tuple[int, ...]]:
-    """Shapes (p, 1) of the parameters that are arrays."""
-    found: list[tuple[int, ...]] = []
-    for item in groups:
-        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)]
-    return found
-
-
-def first_state(starts: Starts, b: vessel.Prepared) -> vessel.State:
-    """Where the smoother says that each window begins, seen through the model's measurement effects."""
-    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), b)
-    time = starts.first(lambda s: s.time) + 0.0 * pose[0]
-    return vessel.State._make([*pose, *nu, time])
 
 
 def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
@@ -241,6 +220,6 @@ def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
         x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
         pose = [a + b for a, b in zip(pose, off, strict=True)]
-        if not np.any(np.abs(off) > np.sqrt(np.finfo(float).eps)):
+        if not any((np.abs(o) > np.sqrt(np.finfo(float).eps)).any() for o in off):
             break
     return pose

@@ -6,7 +6,6 @@ parameters' finite differences as further rows, with the functions of vessel and
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -68,6 +67,7 @@ class Shooting:
         length: of the windows [s].
 
     Attributes:
+        runs: as given.
         run, start: (w,), number of each window's run, and when it starts [s].
         since: (T,), time from a window's start to its instants [s].
         measured: (w, T, 3), pose [m, m, rad], the mean of the samples around each instant.
@@ -76,8 +76,8 @@ class Shooting:
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
-        parts = [usable_windows(smoothed, length) for smoothed in runs]
-        rows = [p.first_rows for p in parts]
+        self.runs = tuple(runs)
+        rows = [usable_windows(smoothed, length).first_rows for smoothed in runs]
         self.every = length / INSTANTS
         groups = tuple(zip(runs, rows, strict=True))
         self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS)
@@ -104,10 +104,10 @@ class Shooting:
 
     def _stepped(self, starts: Starts, model: Model, like: Model) -> list[vessel.State]:
         runs = tuple(smoothed.track.run.name for smoothed, _ in starts.runs)
-        key = Response.key(like)
-        if runs not in self._thrust or self._thrust[runs][0] != key:
-            self._thrust[runs] = key, arriving(starts, like)
-        steps = propagate(starts, model, self._thrust[runs][1])
+        key, kept = Response.key(like), self._thrust.get(runs)
+        if kept is None or kept[0] != key:
+            kept = self._thrust[runs] = key, arriving(starts, like)
+        steps = propagate(starts, model, kept[1])
         return [s for k, s in enumerate(steps) if k % PARTS == 0]
 
     def residuals(self, model: Model) -> np.ndarray:
@@ -139,10 +139,6 @@ class Shooting:
         i11, i22, i23, i32, i33 = model.hull.hull.inverse
         by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
-
-    @cached_property
-    def runs(self) -> tuple[Smoothed, ...]:
-        return tuple(smoothed for smoothed, _ in self.starts.runs)
 
 
 def _seen(s: Smoothed, times: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:

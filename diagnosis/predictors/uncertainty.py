@@ -72,24 +72,19 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
     pose, velocity, acceleration = map(in_axes, range(3))
-    nu = np.where(w.known[:, None], s.nu, 0.0)
-    slope, turned = _slope(w, model, nu), np.zeros((w.middle.size, 3, 3))
-    turned[:, :2, 2] = (w.smooth @ nu)[:, [1, 0]] * [1.0, -1.0]
+    slope, turned = _slope(w, model), np.zeros((w.middle.size, 3, 3))
+    turned[:, :2, 2] = (w.smooth @ w.motion[1])[:, [1, 0]] * [1.0, -1.0]
     variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
     for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
         variance += np.einsum("kij,kj->ki", by**2, of)
     return np.sqrt(variance)
 
 
-def _slope(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
-    """Force and moment (K, 3, 3) by u, v, r at the velocity (n, 3), over steps as large as its error."""
+def _slope(w: WeakWindows, model: Model) -> np.ndarray:
+    """Force and moment (K, 3, 3) by u, v, r over steps as large as its error."""
     error = np.median(w.smoothed.nu_std[w.known], axis=0)
     steps = np.maximum(error, np.sqrt(np.finfo(float).eps) * np.array(w.scale.speeds))
+    _, nu = w.motion
     first = modelled_force(w, model, nu)
-    return np.stack(
-        [
-            (modelled_force(w, model, nu + step) - first) / h
-            for h, step in zip(steps, np.diag(steps), strict=True)
-        ],
-        axis=2,
-    )
+    changes = [modelled_force(w, model, nu + step) - first for step in np.diag(steps)]
+    return np.stack(changes, axis=2) / steps

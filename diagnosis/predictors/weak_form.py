@@ -104,7 +104,13 @@ class WeakWindows:
     @cached_property
     def known(self) -> np.ndarray:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
-        return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
+        return np.isfinite(self.smoothed.nu).all(axis=1)
+
+    @cached_property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smoothed pose and velocity, each (n, 3); zero where they are not known."""
+        eta, nu = (np.where(self.known[:, None], x, 0.0) for x in (self.smoothed.eta, self.smoothed.nu))
+        return eta, nu
 
     def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
@@ -141,13 +147,15 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     run, scale = smoothed.track.run, smoothed.scale
     t, half = run.time, 0.5 * WIDTH * scale.time
     middles = t[0] + half + EVERY * scale.time * places(t, scale)
-    known = np.isfinite(smoothed.nu).all(axis=1)
-    fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
-    gone = np.cumsum(np.concatenate([[0], ~known]))
-    busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
     first = np.searchsorted(t, middles - half, side="left")
     last = np.searchsorted(t, middles + half, side="right")
     count = last - first
+
+    def number(rows: np.ndarray) -> np.ndarray:
+        """(K,), in each window those of some rows (n,)."""
+        sums = np.cumsum(np.concatenate([[0], rows]))
+        return sums[last] - sums[first]
+
     # Stretches know nothing of each other: no window lies in two.
     parts = np.cumsum(np.concatenate([[0], breaks(np.arange(t.size), smoothed.track)]))
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
@@ -155,9 +163,9 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         whole
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
-        & (gone[last] == gone[first])
-        & (2 * (fresh[last] - fresh[first]) >= count)
-        & (busy[last] > busy[first])
+        & (number(~np.isfinite(smoothed.nu).all(axis=1)) == 0)
+        & (2 * number(smoothed.used | smoothed.track.between) >= count)
+        & (number(np.abs(run.tau_cmd).max(axis=1) > 1e-6) > 0)
     )
     middles, first, last = middles[kept], first[kept], last[kept]
     # A window may begin and end between two samples.
@@ -167,21 +175,12 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
     area, share, step = _span(t, middles[rows], half, columns)
     area_before, share_before, step_before = _span(t, middles[rows], half, columns - 1)
-    shape = (middles.size, t.size)
-    block = max(BLOCK * scale.time, float(t[-1] - t[0]) / BLOCKS)
-
-    def matrix(values: np.ndarray) -> csr_matrix:
-        return csr_matrix((values, columns, starts), shape=shape)
-
-    return WeakWindows(
-        smoothed,
-        middles,
-        np.floor((middles - t[0]) / block).astype(int),
-        matrix(area - share + share_before),
-        matrix(area_before / step_before - area / step),
-        matrix(area),
-        horizon or HORIZON * scale.time,
-    )
+    weights = area - share + share_before, area_before / step_before - area / step, area
+    shape = middles.size, t.size
+    smooth, slope, held = (csr_matrix((values, columns, starts), shape=shape) for values in weights)
+    block = np.floor((middles - t[0]) / max(BLOCK * scale.time, (t[-1] - t[0]) / BLOCKS)).astype(int)
+    horizon = horizon or HORIZON * scale.time
+    return WeakWindows(smoothed, middles, block, smooth, slope, held, horizon)
 
 
 def _span(
@@ -232,11 +231,10 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     change = w.recall("change", measured, lambda: w.slope @ nu)
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
-    def met() -> np.ndarray:
-        return halfway(w, inflow_along(w, model, eta, nu))
-
     def drives() -> np.ndarray:
-        return w.held @ thrust_along(w, model, w.recall("met", (measured, water), met))
+        key = measured, water
+        met = w.recall("met", key, lambda: halfway(w, inflow_along(w, model, eta, nu)))
+        return w.held @ thrust_along(w, model, met)
 
     driven = _acting(w, model, w.recall("driven", drive, drives), eta, nu)
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
@@ -244,8 +242,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
 def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
     """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
-    model = model.during(w.run.name)
-    eta = np.where(w.known[:, None], w.smoothed.eta, 0.0)
+    model, (eta, _) = model.during(w.run.name), w.motion
     hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
     driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
     return hull + _acting(w, model, driven, eta, nu)
@@ -273,8 +270,7 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
     idle = ~force.any(axis=0)
     if idle.any():
-        nu = [np.where(w.known[:, None], w.smoothed.nu, 0.0) for w in data]
-        change = np.concatenate([w.slope @ x for w, x in zip(data, nu, strict=True)])
+        change = np.concatenate([w.slope @ w.motion[1] for w in data])
         force[:, idle] = (change @ model.reference_mass.T)[:, idle]
     return force
 
@@ -294,9 +290,7 @@ def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> 
     """
     model = model.during(w.run.name)
     if nu is None:
-        s, known = w.smoothed, w.known[:, None]
-        eta, nu = (np.where(known, x, 0.0) for x in (s.eta, s.nu))
-        nu = halfway(w, inflow_along(w, model, eta, nu))
+        nu = halfway(w, inflow_along(w, model, *w.motion))
     return thrust(w.run, model, _response(w, model), nu)
 
 

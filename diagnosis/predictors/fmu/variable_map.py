@@ -33,6 +33,7 @@ from pydantic import (
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
+from fmus.addition import Line
 from fmus.base_units import base_exponents
 
 from ...runs import QUANTITY, UNITS, Column, meaning
@@ -132,6 +133,22 @@ def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
     motion = {signal: QUANTITY[signal] for signal in MOTION}
     start = {**motion, **commands}
     return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
+
+
+def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dict[str, Line]]:  # noqa: A002
+    """Group -> signal in SI by its variable.
+
+    Args:
+        map: with the units of all variables.
+        commands: of the runs: signal -> quantity.
+    """
+
+    def line(c: Column, quantity: str) -> Line:
+        unit = UNITS[quantity].get(c.unit or "", 1.0)
+        return Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
+
+    known = quantities(commands)
+    return {g: {s: line(c, known[g][s]) for s, c in map.told(g).items()} for g in GROUPS}
 
 
 def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
