@@ -29,7 +29,7 @@ def residual(w: WeakWindows, model: Model, name: str) -> np.ndarray:
     s, known = w.smoothed, w.known[:, None]
     eta, nu = (np.where(known, x, np.nan) for x in (s.eta, s.nu))
     met = tuple(inflow_along(w, model, eta, nu).T)
-    commands, plant = tuple(arriving(w, model)[0]), model.drive.params.plant
+    commands, plant = tuple(arriving(w, model)), model.drive.params.plant
     return w.run.measured[name] - output(description, name, commands, met, plant)
 
 

@@ -310,7 +310,7 @@ def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
 
 
 def arriving(w: WeakWindows, model: Model) -> np.ndarray:
-    """Commands (sets, k, n) that reach the model's thrusters, mean from each sample to the next."""
+    """Commands (k, n) that reach the model's thrusters, mean from each sample to the next."""
     return _response(w, model)[0]
 
 
