@@ -10,9 +10,9 @@ from support.measured import sail
 import diagnosis
 from diagnosis import Model
 from diagnosis.assessment.closed_loop import REFERENCES
+from diagnosis.assessment.gathering import gather
 from diagnosis.assessment.stability import OperatingRegion, largest_distance
 from diagnosis.compare import main as compare
-from diagnosis.gathering import gather
 from diagnosis.predictors.uncertainty import omega_std
 from diagnosis.predictors.weak_form import BLOCK
 from fmus.actuators.law import Law

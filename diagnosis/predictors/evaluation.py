@@ -13,8 +13,7 @@ from .ship_model import Model
 from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows
 
-LEVELS = (0.5, 0.9)
-POINTS = 41  # of an ellipse that is drawn; chosen
+LEVELS = (0.5, 0.9)  # probabilities of the bands that are shown; 90 % of the contract, and half
 
 
 def quantile(level: float, dof: int) -> float:
@@ -62,8 +61,8 @@ class Bands:
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
-        """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
-        around = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        """(T, points, 2), closed lines about the predicted positions of a window [m]."""
+        around = np.linspace(0.0, 2.0 * np.pi)
         circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
         factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
         return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
@@ -159,10 +158,7 @@ class Evaluation:
 
 
 def evaluate_run(
-    w: WeakWindows,
-    before: Model | Predictor,
-    after: Model | None = None,
-    held_out: bool = False,
+    w: WeakWindows, before: Model | Predictor, after: Model | None = None, held_out: bool = False
 ) -> Evaluation:
     """Evaluate one model, or two, on a run.
 
@@ -178,22 +174,14 @@ def evaluate_run(
     predictor = DescribedShip(before) if isinstance(before, Model) else before
     windows = predictor.windows([w.smoothed], w.horizon)
     learned = [] if after is None else [after]
-    lacking = [omega(w, model) for model in (predictor.model, *learned)]
-    if windows is None:
-        errors = [PredictionError(force, np.zeros((0, 3)), None) for force in lacking]
-    else:
-        errors = [
-            PredictionError(force, residuals, windows.summary(residuals))
-            for force, residuals in zip(lacking, predictor.residuals(windows, learned), strict=True)
-        ]
-    return Evaluation(
-        predictor.model,
-        w,
-        windows,
-        held_out,
-        errors[0],
-        errors[-1],
-        learned=after,
-        predictor=predictor,
-        use="test" if held_out else "train",
-    )
+    models = [predictor.model, *learned]
+    missed = [np.zeros((0, 3))] * len(models)
+    if windows is not None:
+        missed = predictor.residuals(windows, learned)
+    errors = [
+        PredictionError(omega(w, model), off, windows and windows.summary(off))
+        for model, off in zip(models, missed, strict=True)
+    ]
+    use: DataUse = "test" if held_out else "train"
+    first, last = errors[0], errors[-1]
+    return Evaluation(models[0], w, windows, held_out, first, last, None, after, predictor, use)

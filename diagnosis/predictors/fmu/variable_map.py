@@ -20,14 +20,24 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    ValidationError,
+    field_validator,
+)
 
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
+from fmus.addition import Line
 from fmus.base_units import base_exponents
 
 from ...runs import QUANTITY, UNITS, Column, meaning
+from ...runs.columns.columns import SHOWN
 from ..black_box import MOTION, POSE, VELOCITY
 
 PROPOSED = ("inputs", "outputs", "start")
@@ -35,7 +45,6 @@ GROUPS = (*PROPOSED, "beside")
 # Inputs that act beside all else: forces, or accelerations.
 BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
           "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
-SHOWN = 40  # characters of what a broken file holds that a message shows (chosen)
 # What marks a variable as a start value, before or behind the name of the signal.
 BEFORE, BEHIND = re.compile(r"(initial|init|start)_?"), re.compile(r"_?(0|initial|init|start)")
 SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
@@ -59,8 +68,8 @@ class VariableMap(BaseModel):
     beside: dict[str, Column | None] = Field(
         default_factory=dict, description="forces or accelerations that act beside all else"
     )
-    run_in: float | None = Field(
-        default=None, ge=0.0, allow_inf_nan=False, description="time before a whole run counts [s]"
+    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
+        default=None, description="time before a whole run counts [s]"
     )
 
     @field_validator(*GROUPS, mode="before")
@@ -124,6 +133,22 @@ def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
     motion = {signal: QUANTITY[signal] for signal in MOTION}
     start = {**motion, **commands}
     return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
+
+
+def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dict[str, Line]]:  # noqa: A002
+    """Group -> signal in SI by its variable.
+
+    Args:
+        map: with the units of all variables.
+        commands: of the runs: signal -> quantity.
+    """
+
+    def line(c: Column, quantity: str) -> Line:
+        unit = UNITS[quantity].get(c.unit or "", 1.0)
+        return Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
+
+    known = quantities(commands)
+    return {g: {s: line(c, known[g][s]) for s, c in map.told(g).items()} for g in GROUPS}
 
 
 def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
