@@ -36,16 +36,13 @@ from ..columns.columns import (
     signals,
     to_si,
 )
-from ..columns.unit_check import UNITS
+from ..columns.unit_check import LARGEST, UNITS
 from .matlab_files import read_matlab
 from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
-# N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
-# below where sums of squares overflow.
-MOST_FORCE, MOST_POWER = 1e9, 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +204,9 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
-    if power is not None and power.max(initial=0.0) > MOST_POWER:
+    if power is not None and power.max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
-    if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
+    if tau is not None and np.abs(tau).max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
     missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*ALL, *own)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)

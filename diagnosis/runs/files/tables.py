@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 
 from cosim import InputError
 
-from ..columns.columns import SHOWN, Layout
+from ..columns.columns import Layout
 from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -95,7 +96,7 @@ def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
         return None
     wrong = _first(cells, stamps.isna())
     if wrong is not None:
-        raise InputError(f"{where}: {cells.name} = {wrong!r} is not a date stamp of ISO 8601")
+        raise InputError(f"{where}: {cells.name} = {shown(wrong)} is not a date stamp of ISO 8601")
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 
@@ -108,11 +109,11 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     wrong = _first(cells, np.isnan(found))
     if wrong is not None:
         hint = decimal_comma(path, layout, wrong)
-        raise InputError(f"'{path}': {cells.name} = {wrong!r} is not a number{hint}")
+        raise InputError(f"'{path}': {cells.name} = {shown(wrong)} is not a number{hint}")
     return found
 
 
 def _first(cells: pd.Series, unreadable: Any) -> str | None:
-    """The beginning of the first cell that is not empty and could not be read."""
+    """The first cell that is not empty and could not be read."""
     wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
-    return str(cells.iloc[wrong[0]])[:SHOWN] if wrong.size else None
+    return str(cells.iloc[wrong[0]]) if wrong.size else None

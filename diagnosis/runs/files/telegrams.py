@@ -9,7 +9,6 @@ import numpy as np
 # A row is on a line to rounding, which must be less than this share of how far the others are off: with
 # normal noise in two channels one row in two thousand is on a line by chance then. Chosen.
 ON_LINE = 0.03
-FUZZ = 1e-9  # relative, of numbers that were not rounded
 FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
 LONGEST = 8  # rows in a line that is no ship's steady motion without noise (chosen)
 
@@ -57,7 +56,7 @@ def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
 def _rounding(values: np.ndarray) -> float:
     """How far from a line rounding takes a row [m]: the step between values, and a little for digits."""
     steps = np.diff(np.unique(values))
-    fuzz = FUZZ * float(np.ptp(values))
+    fuzz = float(np.sqrt(np.finfo(float).eps) * np.ptp(values))
     return 1.05 * max(
         float(steps[steps > fuzz].min(initial=np.inf)) if (steps > fuzz).any() else 0.0, fuzz
     )

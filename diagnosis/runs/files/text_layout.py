@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from ..columns.columns import UNITS, Layout
+from ..columns.columns import PREAMBLE, UNITS, Layout
 
 SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
-LINES = 250  # that are looked at: far more than any preamble has (chosen)
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
@@ -25,7 +24,7 @@ def text_layout(path: Path, encoding: str) -> Layout | None:
         A layout without columns; None if there is no table of numbers below a line of names.
     """
     with path.open(encoding=encoding, errors="replace", newline="") as file:
-        lines = list(islice(file, LINES))
+        lines = list(islice(file, PREAMBLE))
     found = [_with(separator, decimal, lines) for separator in SEPARATORS for decimal in ".,"]
     best = max(found, key=lambda each: each[0])
     return best[1]
