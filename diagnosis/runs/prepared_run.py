@@ -14,7 +14,7 @@ import numpy as np
 from cosim import InputError
 from fmus.ship import Ship, ship
 
-from .cleaning import Track, clean, refuse_short
+from .cleaning import MOST_WRONG, Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
 from .sensors.examination import examine
@@ -22,7 +22,6 @@ from .sensors.sensor_finding import Examined
 from .smoothing.smoother import Smoothed, smooth
 from .thinning import thinned
 
-MOST_SPIKES = 0.1  # of the samples; chosen: of a run of the real ship 7 % are spikes, and it can be used
 # A part of a log contains less information on its clock than the whole.
 WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
 
@@ -72,7 +71,7 @@ class PreparedRun:
 
     def _refuse_spikes(self, found: Smoothed) -> None:
         fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
-        if spikes > MOST_SPIKES * fresh:
+        if spikes > MOST_WRONG * fresh:
             raise InputError(
                 f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
                 "than five standard deviations from where all others say the ship is: something is "

@@ -6,13 +6,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .cleaning import Track
+from .cleaning import BRIEF, Track
 
 # Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
-# s, times the ship's scale; longest time between two rows of what is thinned; chosen: a thirtieth of the
-# weak form's kernel.
-LONGEST = 0.1
 
 
 def thinned(track: Track) -> Track:
@@ -27,7 +24,7 @@ def thinned(track: Track) -> Track:
     """
     run = track.run
     row = float(np.median(np.diff(run.time)))
-    factor = min(-(-run.time.size // MOST_ROWS), int(LONGEST * track.scale.time / row + 1e-9))
+    factor = min(-(-run.time.size // MOST_ROWS), int(BRIEF * track.scale.time / row + 1e-9))
     if factor < 2:
         return track
     width = factor * row

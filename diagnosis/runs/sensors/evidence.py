@@ -7,14 +7,18 @@ import numpy as np
 
 from fmus.frames import rotate_to_earth
 
-from ..cleaning import in_order, lost, noise, repeated
+from ..cleaning import NORMAL_MAD, in_order, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
 
-FEWEST = 60  # samples or windows; chosen: an estimate of a few constants and of two noises
+# Samples or windows, of which some constants and noises are estimated, and parts of a run whose spread
+# gives a standard deviation (chosen).
+FEWEST = 20
 SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
-BLOCKS = 20  # parts of a run whose spread gives a standard deviation; chosen
+FAR = 8.0  # times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
 AGREED = 0.7  # correlation from which on two channels tell of the same motion (chosen)
+ALIKE = 0.3  # relative difference up to which two quantities may be the same but for a fault (chosen)
+LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
 # Of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
 STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
@@ -118,9 +122,14 @@ def straight(rate: np.ndarray) -> np.ndarray:
     return np.abs(rate) < STRAIGHT * np.quantile(np.abs(rate), 0.95)
 
 
+def large(values: np.ndarray) -> np.ndarray:
+    """(n,): values (n,) that are at least half as large as the largest, 90 % of all."""
+    return np.abs(values) > np.nanquantile(np.abs(values), 0.9) / 2.0
+
+
 def spread_of(values: np.ndarray) -> float:
     """Standard deviation of normal values about their median, by the median of their distances to it."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
 
 
 def blocked_fit(
@@ -137,14 +146,14 @@ def blocked_fit(
         Two arrays (k,).
     """
     several = right.size // time.size
-    block = np.tile((BLOCKS * np.arange(time.size)) // time.size, several)
+    block = np.tile((FEWEST * np.arange(time.size)) // time.size, several)
 
     def solved(keep: np.ndarray) -> np.ndarray:
         return np.linalg.lstsq(columns[keep], right[keep], rcond=None)[0]
 
     value = solved(np.ones(right.size, bool))
-    parts = np.array([solved(block != k) for k in range(BLOCKS)])
-    std = np.sqrt((BLOCKS - 1) / BLOCKS * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    parts = np.array([solved(block != k) for k in range(FEWEST)])
+    std = np.sqrt((FEWEST - 1) / FEWEST * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
     return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
 
 

@@ -6,10 +6,10 @@ from typing import Protocol
 
 import numpy as np
 
+from ..cleaning import Z95
 from ..files.reading import Run
 from .constants import Kind
 
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 MOST_STRETCHES = 3  # of a clock, each with its line; chosen
 
 

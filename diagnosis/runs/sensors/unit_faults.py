@@ -11,11 +11,10 @@ from fmus.scale import Scale
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, spread_of
+from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
-MOST = 0.35  # a factor nearer to one than this is a scale, and is estimated with all else (chosen)
 NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
 FEWEST = 8  # windows; chosen
 SIGN = "the other sign"  # and nothing else
@@ -125,7 +124,7 @@ def _judged(
 ) -> Examined:
     """What the ratio of a channel to the pose says, and the run with the channel in its right unit."""
     size = np.hypot.reduce(said, axis=1) if said.shape[1] > 1 else np.abs(said[:, 0])
-    much = size > 0.5 * np.quantile(size, 0.9)
+    much = large(size)
     if much.sum() < FEWEST:
         return found
     pose, said, size = pose[much], said[much], size[much]
@@ -137,7 +136,7 @@ def _judged(
         note = f"{told} and the pose do not tell of the same motion: {told} is left out"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
-    if abs(middle - 1.0) < MOST:
+    if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
         return found
     value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))

@@ -7,15 +7,10 @@ import numpy as np
 from fmus.scale import Scale
 
 from ..files.reading import Run
-from .evidence import groups_of
+from .evidence import FAR, LEAST_TURN, groups_of
 from .sensor_finding import Examined, SensorFinding
 
 ANGLES = ("psi", "psi_2", "course")
-LARGE = 8.0  # times the usual step of an angle: no ship turns so much faster than it does else (chosen)
-LEAST = (
-    0.1  # rad; a smaller step is none of an angle that leads through a turn within a few rows (chosen)
-)
-MOST = int(2.0 * np.pi / LEAST)  # rows between two telegrams, of which a line leads through the turn
 
 
 def wraps(run: Run, scale: Scale) -> Examined:
@@ -45,14 +40,14 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     there = np.flatnonzero(np.isfinite(values))
     angle, step = values[there].copy(), np.diff(values[there])
     usual = float(np.median(np.abs(step))) if step.size else 0.0
-    large = np.abs(step) > max(LARGE * usual, LEAST)
+    large = np.abs(step) > max(FAR * usual, LEAST_TURN)
     same = large[1:] & large[:-1] & (np.sign(step[1:]) == np.sign(step[:-1]))
     changed = []
     for begin, end in groups_of(same):
         a, b = begin, end + 1  # rows before and after all those large steps
         total = angle[b] - angle[a]
         turn = float(np.angle(np.exp(1j * total)))
-        if b - a > MOST or abs(total - turn) < np.pi or abs(turn) > 0.5 * abs(total):
+        if (b - a) * LEAST_TURN > 2.0 * np.pi or abs(total) < max(np.pi, 2.0 * abs(turn)):
             continue
         inside = np.arange(a + 1, b)
         angle[inside] = angle[a] + turn * (inside - a) / (b - a)

@@ -3,7 +3,7 @@
 The likeliest delay is that of the largest likelihood. Alone it proves nothing: the response of
 :mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
 makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
-damping would make of commands that act at once: motions by the commands behind lags of LAGS seconds. A
+damping would make of commands that act at once: motions by the commands behind some lags. A
 slow command cannot tell those from a delay, a jump can.
 
 The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
@@ -17,20 +17,13 @@ import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.special import stdtrit
 
-from .command_motion import Commands
+from ..cleaning import BRIEF, WIDTH
+from .command_motion import FORGETTING, Commands
 from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
-from .spline import basis, knots, middles
+from .spline import DIGITS, basis, knots, middles
 
-# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-LONGEST = 1.0  # s, of these; the ship has 0.4 s (docs/studies/measured_ship)
-FINE = 0.01  # s, to which a delay is found, or a sampling period if that is longer
-NOTICED = 0.1  # s; a shorter delay is as good as none, and not reported (chosen)
-RANK = 1e-9  # of the largest singular value; below, commands do not differ and share their effect evenly
-# s, lags of motions that are no delay's. Chosen: a ship's own time constants, by factors of four; no
-# shorter one, as a thruster's lag of half a second is a delay for what follows.
-LAGS = (1.0, 4.0, 16.0)
-# s; chosen: residuals of a spline are correlated over less than its time constant, a second.
-LATENESS_BLOCK = 5.0
+# s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
+LONGEST = 1.0
 CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
 
 
@@ -78,18 +71,21 @@ class Regression:
 
     @property
     def block(self) -> np.ndarray:
-        """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
+        """Number of the block of time of each row of r(x).
+
+        Residuals of a spline are correlated over less than its time constant, a second.
+        """
         rows = np.concatenate([self.time, middles(self.problem.spline.grid, 2)])
-        return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
+        return np.unique(rows // (WIDTH * self.time_scale), return_inverse=True)[1]
 
     def thinned(self) -> "Regression":
-        """The same on means of the pose over NOTICED seconds, where a spline with such knots does.
+        """The same on means of the pose over BRIEF seconds, where a spline with such knots does.
 
         It does if its time constant, its spacing times the sixth root of its smoothness, is no shorter.
         """
         p, spline = self.problem, self.problem.spline
         systems, grid = self.fit.systems, spline.grid
-        many = int(NOTICED * self.time_scale / grid.spacing)
+        many = int(BRIEF * self.time_scale / grid.spacing)
         if many < 2:
             return self
         smoothness = np.array([s.precision[JERK] / s.precision[POSE] for s in systems]) / many**5.0
@@ -112,13 +108,13 @@ class Regression:
 
 def size_of(a: np.ndarray) -> np.ndarray:
     """Norms (k,) of columns, none of them zero."""
-    return np.sqrt(np.maximum((a * a).sum(axis=0), 1e-300))
+    return np.sqrt(np.maximum((a * a).sum(axis=0), np.finfo(float).tiny))
 
 
 def least_squares(a: np.ndarray, z: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """x of least |z - a x|, for columns of which a part below RANK of their size counts as zero."""
+    """x of least |z - a x|; columns that do not differ share their effect evenly."""
     scaled = a / size
-    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=RANK)[0] / size
+    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
 
 
 class Lateness:
@@ -131,10 +127,9 @@ class Lateness:
     def __init__(self, regression: Regression) -> None:
         self._regression, self._block = regression, regression.block
         tau = regression.commands.delayed(0.0)
-        lagged = [
-            regression.motions(regression.commands.lagging(tau, lag * regression.time_scale))
-            for lag in LAGS
-        ]
+        # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
+        lags = np.geomspace(LONGEST, FORGETTING, 3) * regression.time_scale
+        lagged = [regression.motions(regression.commands.lagging(tau, lag)) for lag in lags.tolist()]
         self._aside = [orthonormal(np.hstack(part)) for part in zip(*lagged, strict=True)]
         self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
 
@@ -150,10 +145,10 @@ class Lateness:
 
 
 def orthonormal(a: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of the columns, without directions below RANK."""
+    """An orthonormal basis of the columns, without directions that rounding has left."""
     scaled = a / size_of(a)
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > RANK * values[-1]
+    kept = values > DIGITS * values[-1]
     return scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
 
 
@@ -165,7 +160,7 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     logarithm of their number) is zero.
     """
     period, lateness = regression.commands.track.period, Lateness(regression.thinned())
-    longest, fine, noticed = (x * regression.time_scale for x in (LONGEST, FINE, NOTICED))
+    longest, noticed = (x * regression.time_scale for x in (LONGEST, BRIEF))
     coarse = 2.0 * noticed  # between the delays that are tried first
 
     @cache
@@ -177,9 +172,9 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
 
     tried = {round(k * coarse / period) for k in range(round(longest / coarse) + 1)}
     best = min(sorted(tried), key=left)
-    step, finest = coarse / period, max(1, round(fine / period))
-    while step > finest:
-        step = max(finest, np.ceil(step / 2.0))
+    step = coarse / period
+    while step > 1:
+        step = np.ceil(step / 2.0)
         near = {max(best - int(step), 0), best + int(step)}
         tried |= near
         best = min((best, *sorted(near)), key=left)

@@ -23,9 +23,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, get_lapack_funcs
 from scipy.sparse import csr_array
 
-from .spline import Basis, Knots, basis, inverse_band, roughness
+from .spline import DIGITS, Basis, Knots, basis, inverse_band, roughness
 
-NUDGE = 1e-30  # relative step of the complex-step derivative: its square is far below rounding
 # Cholesky factors of a banded matrix, and the solution by them.
 PBTRF: Any = get_lapack_funcs("pbtrf", dtype=float)
 PBTRS: Any = get_lapack_funcs("pbtrs", dtype=float)
@@ -98,7 +97,7 @@ class System:
 
         It is the imaginary part of log |A + i p_g N_g|: exact to rounding, by one factorisation.
         """
-        lower = self.normal + 1j * NUDGE * self.precision[group] * self.equations.normals[group]
+        lower = self.normal + 1j * DIGITS * self.precision[group] * self.equations.normals[group]
         width, size = lower.shape
         degree = width - 1
         band = np.zeros((3 * degree + 1, size), complex, order="F")  # as LAPACK's gbtrf wants it
@@ -106,7 +105,7 @@ class System:
             band[2 * degree + k, : size - k] = lower[k, : size - k]
             band[2 * degree - k, k:] = lower[k, : size - k]
         pivots = GBTRF(band, degree, degree, overwrite_ab=True)[0][2 * degree]
-        return float((pivots.imag / pivots.real).sum()) / NUDGE
+        return float((pivots.imag / pivots.real).sum()) / DIGITS
 
 
 class Rates(NamedTuple):
