@@ -290,7 +290,7 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
         return ()
     angle = np.arctan2(v[legs], np.abs(u[legs]))
     middle = float(np.median(angle))
-    if abs(middle) < max(LEAST, 2.0 * spread_of(angle)):
+    if abs(middle) < max(LEAST, spread_of(angle)):
         return ()
     return (
         f"on straight legs the ship goes {np.degrees(middle):.2g}° to one side: the heading's axis is "
