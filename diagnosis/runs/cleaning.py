@@ -147,8 +147,15 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
     gap = long_gap(period, scale)
     pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], gap)
-    _moves(pose[fresh], where)
-    notes += _gaps(run.time[fresh] - run.time[0], gap)
+    reach = np.diff(np.quantile(pose[fresh], (0.1, 0.9), axis=0), axis=0)[0]
+    if not (reach > 6.0 * noise(pose[fresh])).any():
+        raise InputError(f"{where} does not move: its pose is noise around a place")
+    steps = np.diff(run.time[fresh])
+    if many := int((steps > gap).sum()):
+        longest = (
+            f"{steps.max():.4g} s, {run.time[fresh][steps.argmax()] - run.time[0]:.4g} s from the start"
+        )
+        notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
     return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
 
 
@@ -222,13 +229,6 @@ def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:
     return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
 
 
-def _moves(pose: np.ndarray, where: str) -> None:
-    """Refuse a run in which there is nothing but noise."""
-    reach = np.diff(np.quantile(pose, (0.1, 0.9), axis=0), axis=0)[0]
-    if not (reach > 6.0 * noise(pose)).any():
-        raise InputError(f"{where} does not move: its pose is noise around a place")
-
-
 def noise(values: np.ndarray) -> np.ndarray:
     """Standard deviation of the noise of each channel, from third differences.
 
@@ -238,13 +238,3 @@ def noise(values: np.ndarray) -> np.ndarray:
     """
     third = np.abs(np.diff(values, 3, axis=0))
     return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(np.diff(np.eye(4), 3, axis=0))
-
-
-def _gaps(time: np.ndarray, least: float) -> list[str]:
-    """A line for the gaps above some time [s] between times since the start, if there are any."""
-    dt = np.diff(time)
-    long = dt > least
-    if not long.any():
-        return []
-    longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"
-    return [f"a gap of {longest}" if long.sum() == 1 else f"{long.sum()} gaps, the longest {longest}"]

@@ -12,13 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
+from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
 from .cleaning import MOST_WRONG, Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
-from .sensors.examination import examine
+from .sensors.further_channels import accelerations, receivers, through_water
+from .sensors.motion import motion
 from .sensors.sensor_finding import Examined
+from .sensors.unit_faults import sway, units
+from .sensors.wraps import wraps
 from .smoothing.smoother import Smoothed, smooth
 from .thinning import thinned
 
@@ -106,6 +110,23 @@ def prepare(
         )
     repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))
     return PreparedRun(raw, sensors, thinned(clean(repaired, anyway, of.scale)), anyway)
+
+
+def examine(run: Run, scale: Scale) -> Examined:
+    """Cross-check channels that are redundant.
+
+    Args:
+        run: as it was read.
+        scale: of the ship.
+
+    Returns:
+        The run as far as its own channels repair it, and what they say of each other.
+    """
+    found = Examined(run)
+    # In the order in which one needs what others repair.
+    for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
+        found = found.plus(check(found.run, scale))
+    return found
 
 
 def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> list[Run]:

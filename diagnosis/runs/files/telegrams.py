@@ -30,13 +30,8 @@ def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
     rounding = max(_rounding(channel) for channel in position.T)
     on = none.copy()
     on[1:-1] = off <= rounding
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], on, [0]]).astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    if (
-        rounding > ON_LINE * np.quantile(off, 0.9)
-        or on.mean() < FEWEST
-        or np.mean(lengths > LONGEST) > 0.1
-    ):
+    too_long = np.mean([end - begin > LONGEST for begin, end in groups_of(on)] or [False]) > 0.1
+    if rounding > ON_LINE * np.quantile(off, 0.9) or on.mean() < FEWEST or too_long:
         return none
     first = np.flatnonzero(~on & np.concatenate([[True], on[:-1]]))  # of each block of rows on no line
     rows = np.flatnonzero(~on)
@@ -57,6 +52,10 @@ def _rounding(values: np.ndarray) -> float:
     """How far from a line rounding takes a row [m]: the step between values, and a little for digits."""
     steps = np.diff(np.unique(values))
     fuzz = float(np.sqrt(np.finfo(float).eps) * np.ptp(values))
-    return 1.05 * max(
-        float(steps[steps > fuzz].min(initial=np.inf)) if (steps > fuzz).any() else 0.0, fuzz
-    )
+    return 1.05 * float(min(steps[steps > fuzz], default=fuzz))
+
+
+def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
+    """First index, and the one after the last, of each group of successive true values (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))

@@ -80,11 +80,8 @@ def evidence(run: Run) -> Evidence | None:
     psi = np.interp(run.time, run.time[fresh], np.unwrap(run.pose[fresh, 2]))
     by = next((pair for pair in VELOCITIES if all(_given(run, name) for name in pair)), None)
     rate = _whole(run, "r") if _given(run, "r") else None
-    if by is None and rate is None:
-        return None
-    return Evidence(
-        run, rows, psi, None if by is None else velocity_over_ground(run, by, psi), rate, by, between
-    )
+    velocity = None if by is None else velocity_over_ground(run, by, psi)
+    return None if by is None and rate is None else Evidence(run, rows, psi, velocity, rate, by, between)
 
 
 def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -100,21 +97,19 @@ def _given(run: Run, name: str) -> bool:
 
 
 def _whole(run: Run, name: str) -> np.ndarray:
-    values = run.measured[name]
-    there = np.isfinite(values)
-    return np.interp(run.time, run.time[there], values[there])
+    there = np.isfinite(run.measured[name])
+    values = run.measured[name][there]
+    return np.interp(run.time, run.time[there], np.unwrap(values) if name == "course" else values)
 
 
 def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
     """Velocity (n, 2) to north and east [m/s]."""
+    first, second = (_whole(run, name) for name in by)
     if by == ("x_dot", "y_dot"):
-        return np.column_stack([_whole(run, name) for name in by])
+        return np.column_stack([first, second])
     if by == ("speed", "course"):
-        speed, there = _whole(run, "speed"), np.isfinite(run.measured["course"])
-        course = np.unwrap(run.measured["course"][there])
-        course = np.interp(run.time, run.time[there], course)
-        return np.column_stack([speed * np.cos(course), speed * np.sin(course)])
-    return np.column_stack(rotate_to_earth(psi, _whole(run, "u"), _whole(run, "v")))
+        return np.column_stack([first * np.cos(second), first * np.sin(second)])
+    return np.column_stack(rotate_to_earth(psi, first, second))
 
 
 def straight(rate: np.ndarray) -> np.ndarray:
@@ -155,9 +150,3 @@ def blocked_fit(
     parts = np.array([solved(block != k) for k in range(FEWEST)])
     std = np.sqrt((FEWEST - 1) / FEWEST * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
     return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
-
-
-def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First index, and the one after the last, of each group of successive true values (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))

@@ -3,9 +3,10 @@
 import numpy as np
 
 from ..cleaning import HELD, LONG, Z95
+from ..files.telegrams import groups_of
 from ..thinning import MOST_ROWS
 from .constants import LEAST
-from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, groups_of, spread_of
+from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
 from .sensor_finding import SensorFinding
 
 FAST = 3.0  # times the log's step, or its inverse: what is less is a clock that runs fast (chosen)

@@ -7,7 +7,8 @@ import numpy as np
 from fmus.scale import Scale
 
 from ..files.reading import Run
-from .evidence import FAR, LEAST_TURN, groups_of
+from ..files.telegrams import groups_of
+from .evidence import FAR, LEAST_TURN
 from .sensor_finding import Examined, SensorFinding
 
 ANGLES = ("psi", "psi_2", "course")
@@ -30,9 +31,7 @@ def wraps(run: Run, scale: Scale) -> Examined:
         text = f"{name} was interpolated where it wraps, in {rows.size} rows"
         many, time = float(rows.size), run.time[rows]
         findings.append(SensorFinding.estimated((name, "wrap", "1"), many, 0.0, time, text))
-    if not findings:
-        return Examined(run)
-    return Examined(replace(run, pose=pose, measured=measured), tuple(findings))
+    return Examined(replace(run, pose=pose, measured=measured) if findings else run, tuple(findings))
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError
+from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH
@@ -46,9 +46,7 @@ class Regression:
     def gains(self, delay: float) -> np.ndarray:
         """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
         motions = self.motions(self.commands.delayed(delay))
-        flat, turn = (
-            least_squares(a, z[:, 0], size_of(a)) for a, z in zip(motions, self.pose, strict=True)
-        )
+        flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
         return np.vstack([flat.reshape(2, 3), turn])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -106,13 +104,9 @@ class Regression:
         return Regression(thin, solve(thin, smoothness, counts[there]), self.commands, time)
 
 
-def size_of(a: np.ndarray) -> np.ndarray:
-    """Norms (k,) of columns, none of them zero."""
-    return np.sqrt(np.maximum((a * a).sum(axis=0), np.finfo(float).tiny))
-
-
-def least_squares(a: np.ndarray, z: np.ndarray, size: np.ndarray) -> np.ndarray:
+def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
     """x of least |z - a x|; columns that do not differ share their effect evenly."""
+    size = np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
     scaled = a / size
     return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
 
@@ -130,7 +124,7 @@ class Lateness:
         # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
         lags = np.geomspace(LONGEST, FORGETTING, 3) * regression.time_scale
         lagged = [regression.motions(regression.commands.lagging(tau, lag)) for lag in lags.tolist()]
-        self._aside = [orthonormal(np.hstack(part)) for part in zip(*lagged, strict=True)]
+        self._aside = [orth(np.hstack(part)) for part in zip(*lagged, strict=True)]
         self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
 
     def left(self, delay: float) -> np.ndarray:
@@ -139,17 +133,9 @@ class Lateness:
         total = np.zeros(self._block.max() + 1)
         for q, z, a in zip(self._aside, self._pose, self._regression.motions(tau), strict=True):
             own = a - q @ (q.T @ a)
-            off = z[:, 0] - own @ least_squares(own, z[:, 0], size_of(a))
+            off = z[:, 0] - own @ least_squares(own, z[:, 0])
             total += np.bincount(np.tile(self._block, off.size // self._block.size), off**2)
         return total
-
-
-def orthonormal(a: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of the columns, without directions that rounding has left."""
-    scaled = a / size_of(a)
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > DIGITS * values[-1]
-    return scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
 
 
 def likeliest_delay(regression: Regression) -> tuple[float, bool]:
@@ -188,7 +174,4 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
 def surely_positive(values: np.ndarray, chance: float) -> bool:
     """Whether the mean of independent values (k,) is above zero, by Student's one-sided test."""
     k = values.size
-    if k < 2:
-        return False
-    deviation = float(values.std(ddof=1)) / k**0.5
-    return float(values.mean()) > deviation * -float(stdtrit(k - 1, chance))
+    return k > 1 and bool(values.mean() > values.std(ddof=1) / k**0.5 * -stdtrit(k - 1, chance))

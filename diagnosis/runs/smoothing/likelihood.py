@@ -74,11 +74,8 @@ class Criterion:
         return system, system.residual(self._y, system.solve(self._y))
 
     def cost(self, decades: float) -> float:
-        """-2 log L, infinite where the spline is not determined."""
-        try:
-            system, off = self._solved(decades)
-        except LinAlgError:
-            return np.inf
+        """-2 log L."""
+        system, off = self._solved(decades)
         return system.deviance(off)
 
     def excess(self, decades: float) -> float:
