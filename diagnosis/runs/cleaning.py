@@ -152,9 +152,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         raise InputError(f"{where} does not move: its pose is noise around a place")
     steps = np.diff(run.time[fresh])
     if many := int((steps > gap).sum()):
-        longest = (
-            f"{steps.max():.4g} s, {run.time[fresh][steps.argmax()] - run.time[0]:.4g} s from the start"
-        )
+        begin = run.time[fresh][steps.argmax()] - run.time[0]
+        longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
         notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
     return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
 
@@ -230,11 +229,9 @@ def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:
 
 
 def noise(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of the noise of each channel, from third differences.
+    """Standard deviation of the noise of each channel of values (n, channels), from third differences.
 
-    Args:
-        values: (n, channels) in a row; that some steps are longer than others does little harm, as
-            the median is taken.
+    That some steps are longer than others does little harm, as the median is taken.
     """
     third = np.abs(np.diff(values, 3, axis=0))
     return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(np.diff(np.eye(4), 3, axis=0))

@@ -54,8 +54,14 @@ class PreparedRun:
             InputError: the samples do not determine a motion, or too many of them are spikes.
         """
         found = smooth(self.track, agreeing=self.sensors.agreeing)
-        if not self.anyway:
-            self._refuse_spikes(found)
+        fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
+        if spikes > MOST_WRONG * fresh and not self.anyway:
+            raise InputError(
+                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
+                "than five standard deviations from where all others say the ship is: something is "
+                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
+                f"of a log, {WHOLE_FIRST}; {GO_ON}"
+            )
         return replace(found, sensors=self.sensors)
 
     @property
@@ -72,16 +78,6 @@ class PreparedRun:
         part = self.track.rows(rows)
         refuse_short(part.run, self.track.scale)
         return replace(self, track=part)
-
-    def _refuse_spikes(self, found: Smoothed) -> None:
-        fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
-        if spikes > MOST_WRONG * fresh:
-            raise InputError(
-                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
-                "than five standard deviations from where all others say the ship is: something is "
-                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
-                f"of a log, {WHOLE_FIRST}; {GO_ON}"
-            )
 
 
 def prepare(

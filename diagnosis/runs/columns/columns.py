@@ -205,11 +205,7 @@ class Layout(BaseModel):
 
 
 def log_of(commands: Iterable[str]) -> Layout:
-    """Our own log: the pose after all faults, the force after clipping, and the commands.
-
-    Args:
-        commands: of the ship, ``ACTUATOR.COMMAND`` or the names of variables.
-    """
+    """Our own log: the pose after all faults, the force after clipping, and the ship's commands."""
     names = {"x": "observer.x_m", "y": "observer.y_m", "psi": "observer.psi_m"}
     names |= {f"tau_{axis}": f"thrusters.tau_cmd_{axis}" for axis in "XYN"}
     names |= {name: f"thrusters.{name.replace('.', '_')}" for name in commands}

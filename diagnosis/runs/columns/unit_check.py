@@ -48,14 +48,7 @@ class Doubt(NamedTuple):
 def refuse_time(
     row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = REFERENCE
 ) -> None:
-    """Refuse a time in another unit than stated.
-
-    Args:
-        row: median time between two rows [s].
-        seconds: length of the run [s].
-        where: what messages call the run.
-        called: signal -> its column in the file, where that has another name.
-        scale: of the ship.
+    """Refuse a time in another unit than stated, by the median between two rows and the length [s].
 
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
@@ -75,14 +68,7 @@ def refuse_time(
 def refuse_units(
     time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
 ) -> None:
-    """Refuse units of a pose that no ship's motion can be in.
-
-    Args:
-        time: (n,) [s].
-        pose: (n, 3), as it was read.
-        where: what messages call the run.
-        anyway: whether every speed is accepted.
-        called: signal -> its column in the file, where that has another name.
+    """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Raises:
         InputError: it goes or turns too fast, or is nowhere on earth.

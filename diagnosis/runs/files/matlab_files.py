@@ -33,7 +33,7 @@ def read_matlab(path: Path) -> dict[str, np.ndarray]:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = dict(zip(ROWS, data, strict=False))
+    rows: dict[str, np.ndarray] = dict(zip(ROWS, data, strict=False))
     return {s: rows[s] for s in ("time", *POSE, *FIVE)} | dict(zip(POWER, _power(rows), strict=True))
 
 

@@ -18,6 +18,7 @@ from cosim.errors import nearest
 from cosim.results import read_options
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
+from fmus.ships.naming import DEFAULT
 
 from ..columns.columns import (
     ALL,
@@ -251,3 +252,25 @@ def layout_beside(run: Run) -> dict[str, Any]:
     kept = (before or Layout()).model_dump(exclude_defaults=True, include={"trial"})
     columns = {name: Column(name=name, noise=std) for name, std in run.noise.items()}
     return kept | Layout(columns=columns).model_dump(exclude_defaults=True)
+
+
+def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
+    """The ship that logs of :mod:`cosim` are of, and the first one that says so.
+
+    Args:
+        paths: of runs; files that are no logs say nothing.
+
+    Returns:
+        The name or file of the ship; None: CyberShip Enterprise 1, or no log tells.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    logs = {path: read_options(path if path.is_dir() else path.parent) for path in paths}
+    told = {path: log.ship or log.outline.name for path, log in logs.items() if log.outline}
+    ships = dict.fromkeys(told.values())
+    if len(ships) > 1:
+        each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
+        raise InputError(f"the runs are of several ships: {each}")
+    first = next(iter(told.items()), None)
+    return None if first is None or first[1] == DEFAULT else (first[1], first[0])

@@ -16,11 +16,8 @@ LONGEST = 8  # rows in a line that is no ship's steady motion without noise (cho
 def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
     """(n,): rows that a straight line between two measurements has filled; none in most logs.
 
-    Of the two rows about a telegram the one nearer to it stays.
-
-    Args:
-        time: (n,) [s], in order.
-        position: (n, 2) [m], finite.
+    Of the two rows about a telegram the one nearer to it stays. Times (n,) [s] are in order, positions
+    (n, 2) [m] finite.
     """
     none = np.zeros(time.size, bool)
     if time.size < 2 * LONGEST:

@@ -16,12 +16,7 @@ KNOWN = {unit for units in UNITS.values() for unit in units}
 def text_layout(path: Path, encoding: str) -> Layout | None:
     """Separator, decimal mark, line of the names and of the units, as the first lines suggest.
 
-    Args:
-        path: of a CSV file.
-        encoding: of its text.
-
-    Returns:
-        A layout without columns; None if there is no table of numbers below a line of names.
+    Without columns; None if there is no table of numbers below a line of names.
     """
     with path.open(encoding=encoding, errors="replace", newline="") as file:
         lines = list(islice(file, PREAMBLE))

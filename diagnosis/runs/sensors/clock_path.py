@@ -132,10 +132,14 @@ class PathProblem:
         matrix = csr_array((factor, (equation, unknown)), shape=(group.size, STATES * m))
         root = 1.0 / np.sqrt(np.concatenate(lengths))
         self.present = sorted(set(group.tolist()) - {RATE, FIXED})
-        normals = np.array([_normal(matrix[group == g], root[group == g]) for g in range(FIXED + 1)])
+        normals = []
+        for g in range(FIXED + 1):  # lower band of M^T W M, in which two neighbouring nodes lie
+            of = matrix[group == g]
+            normal = of.T @ (of * (root[group == g] ** 2)[:, None])
+            normals.append([np.pad(normal.diagonal(-k), (0, k)) for k in range(2 * STATES)])
         # The walk of the clock and its anchor are one prior, which counts as a whole.
         counts = np.array([np.sum(group == g) if g < CLOCK else 0 for g in range(FIXED + 1)])
-        self.equations = Equations(matrix, matrix.T, root, group, normals, counts)
+        self.equations = Equations(matrix, matrix.T, root, group, np.array(normals), counts)
 
     def border(self, constants: Sequence[Column], clock: np.ndarray) -> np.ndarray:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
@@ -151,12 +155,7 @@ class PathProblem:
         return made
 
     def solve(self, constants: Sequence[Column], fixed_clock: bool = False) -> "Path":
-        """The likeliest path.
-
-        Args:
-            constants: faults that are looked for.
-            fixed_clock: whether the clock is taken to run evenly at rate 1.
-        """
+        """The likeliest path with some constant faults; a fixed clock runs evenly at rate 1."""
         place, angle = self.noise
         samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
         std = np.array([*samples, *(BEGIN * walk), NEGLIGIBLE if fixed_clock else ANCHOR, 1.0])
@@ -233,13 +232,6 @@ class Path:
         variance = (right * self.system.inverse(right)).sum(axis=0)
         variance += (by_constants * (self.covariance @ by_constants)).sum(axis=0)
         return np.sqrt(variance)
-
-
-def _normal(matrix: csr_array, root: np.ndarray) -> np.ndarray:
-    """(band, unknowns): lower band of M^T W M, in which two neighbouring nodes lie."""
-    normal = matrix.T @ (matrix * (root**2)[:, None])
-    bands = [np.pad(normal.diagonal(-k), (0, k)) for k in range(2 * STATES)]
-    return np.array(bands)
 
 
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:

@@ -75,14 +75,8 @@ def _elsewhere(
     """Likeliest, shortest and longest time [s] that is missing, by how the ship goes elsewhere.
 
     A ship that winds goes less far than its speed says. A time is possible if windows of that length,
-    which begin and end about as fast and turn as much, would be told as the jump is. None: there are
-    too few of these.
-
-    Args:
-        e: the channels.
-        speed: (k,), at the rows with a pose [m/s].
-        jump: the rows before and after it.
-        value: time that is missing for the speed [s].
+    which begin and end about as fast (k,) [m/s] and turn as much, would be told as the jump between two
+    rows is, whose way needs a value [s] at its speed. None: there are too few of these.
     """
     rows, time, (a, b) = e.rows, e.time[e.rows], jump
     ends = np.median(speed[max(0, a - AROUND) : a + 1]), np.median(speed[b : b + AROUND + 1])

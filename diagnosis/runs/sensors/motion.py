@@ -98,7 +98,7 @@ def _correction(
     if not wanders:
         clock = np.full_like(clock, rates[0] if rates else 1.0)
     true = problem.edges[0] + integral_of(problem.edges, np.where(problem.cut, 1.0, clock))
-    return Correction(values, problem.edges, true, jumps)
+    return Correction(values, (problem.edges, true), jumps)
 
 
 def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFinding]) -> Motion:

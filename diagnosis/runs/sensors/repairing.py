@@ -22,14 +22,12 @@ class Correction:
 
     Attributes:
         values: (channel, kind) -> size of each constant fault.
-        log: (m,), times of the log [s]; None: the clock is right.
-        true: (m,), true times of the same instants [s].
+        clock: times (m,) of the log, and true times of the same instants [s]; empty: it is right.
         gaps: jumps of the clock.
     """
 
     values: Mapping[tuple[str, str], float]
-    log: np.ndarray | None = None
-    true: np.ndarray | None = None
+    clock: tuple[np.ndarray, ...] = ()
     gaps: Sequence[SensorFinding] = ()
 
     def of(self, channel: str, kind: str, usual: float = 0.0) -> float:
@@ -65,18 +63,14 @@ def corrected(e: Evidence, fix: Correction) -> Run:
         swing = rotate_to_earth(psi, -aside * turning, ahead * turning)
         measured |= _as_given(e, velocity + np.column_stack(swing), psi)
     repaired = replace(run, pose=pose, measured=measured)
-    return repaired if fix.log is None or fix.true is None else _retimed(repaired, e, fix)
+    return _retimed(repaired, e, fix) if fix.clock else repaired
 
 
 def heading_is_off(e: Evidence, offset: float) -> bool:
-    """Whether rather the heading is off than the axes of the velocity.
+    """Whether rather the heading is off than the axes of the velocity, which differ by an offset [rad].
 
     A ship goes ahead where nothing pushes: what of track against heading, and of the velocity in its own
     axes, has clearly less leeway on straight legs is right.
-
-    Args:
-        e: evidence.
-        offset: by which heading and axes of the velocity differ [rad].
     """
     assert e.velocity is not None
     legs = straight(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
@@ -114,9 +108,9 @@ def _as_given(e: Evidence, velocity: np.ndarray, psi: np.ndarray) -> dict[str, n
 
 def _retimed(run: Run, e: Evidence, fix: Correction) -> Run:
     """The run on its true time: rows within a jump of the clock are left out."""
-    assert fix.log is not None and fix.true is not None  # noqa: PT018
-    clock = np.interp(run.time, fix.log, fix.true)
-    clock += np.minimum(run.time - fix.log[0], 0.0) + np.maximum(run.time - fix.log[-1], 0.0)
+    log, true = fix.clock
+    clock = np.interp(run.time, log, true)
+    clock += np.minimum(run.time - log[0], 0.0) + np.maximum(run.time - log[-1], 0.0)
     keep = np.ones(run.time.size, bool)
     for gap in fix.gaps:
         clock += np.where(run.time >= gap.end, gap.value, 0.0)

@@ -43,12 +43,6 @@ class CommandResponse(NamedTuple):
     delay: float = np.nan
     sure: bool = False
 
-    @classmethod
-    def none(cls, n: int) -> "CommandResponse":
-        """No response, for n samples."""
-        still = np.zeros((n, 3))
-        return cls(still, still, still)
-
 
 @dataclass(frozen=True, eq=False)
 class Commands:
@@ -150,12 +144,6 @@ class Commands:
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
-        eta, eta_dot, eta_ddot = (
-            _channels(self.sampled(each, self.track.run.time)) for each in (x, x_dot, x_ddot)
-        )
-        return CommandResponse(eta, eta_dot, eta_ddot, delay)
-
-
-def _channels(x: np.ndarray) -> np.ndarray:
-    """North, east and heading (n, 3) of the first two as one complex number, and the third (n, 2)."""
-    return np.column_stack([np.real(x[:, 0]), np.imag(x[:, 0]), np.real(x[:, 1])])
+        sampled = (self.sampled(each, self.track.run.time).T for each in (x, x_dot, x_ddot))
+        eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
+        return CommandResponse(eta[0], eta[1], eta[2], delay)

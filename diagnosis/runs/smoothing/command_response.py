@@ -39,7 +39,7 @@ def with_commands(
     """
     weights, run = alone.weights, commands.track.run
     time = run.time[p.rows] - run.time[0]
-    near = likeliest(p, weights, alone.even)
+    near = alone.even
     regression = Regression(p, fit, commands, time)
     delay, sure = likeliest_delay(regression)
     gains = regression.gains(delay)
@@ -56,6 +56,6 @@ def with_commands(
         found, least = (rest, near, response._replace(sure=sure)), cost
         gains = Regression(p, solve(rest, near, weights), commands, time).gains(delay)
     if found is None:
-        return alone.problem, alone.smoothness, CommandResponse.none(commands.psi.size)
+        return alone.problem, alone.smoothness, CommandResponse(*np.zeros((3, commands.psi.size, 3)))
     rest, near, response = found
     return *adapt(rest, near, weights), response

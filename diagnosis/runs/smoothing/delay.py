@@ -19,8 +19,8 @@ from scipy.special import stdtrit
 
 from ..cleaning import BRIEF, WIDTH
 from .command_motion import FORGETTING, Commands
-from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
-from .spline import DIGITS, basis, knots, middles
+from .penalised import Fit, Problem
+from .spline import DIGITS, middles
 
 # s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
 LONGEST = 1.0
@@ -73,35 +73,8 @@ class Regression:
 
         Residuals of a spline are correlated over less than its time constant, a second.
         """
-        rows = np.concatenate([self.time, middles(self.problem.spline.grid, 2)])
+        rows = np.concatenate([self.time, middles(self.problem.spline.grid)])
         return np.unique(rows // (WIDTH * self.time_scale), return_inverse=True)[1]
-
-    def thinned(self) -> "Regression":
-        """The same on means of the pose over BRIEF seconds, where a spline with such knots does.
-
-        It does if its time constant, its spacing times the sixth root of its smoothness, is no shorter.
-        """
-        p, spline = self.problem, self.problem.spline
-        systems, grid = self.fit.systems, spline.grid
-        many = int(BRIEF * self.time_scale / grid.spacing)
-        if many < 2:
-            return self
-        smoothness = np.array([s.precision[JERK] / s.precision[POSE] for s in systems]) / many**5.0
-        if (smoothness < 1.0).any():
-            return self
-        coarse = knots(grid.start, grid.end, many * grid.spacing)
-        part = np.unique(basis(coarse, self.time).first, return_inverse=True)[1]
-        weights = systems[0].equations.root[: part.size] ** 2
-        counts = np.bincount(part, weights)
-        there = counts > 0.0
-        time, *z = (np.bincount(part, weights * x)[there] / counts[there] for x in (self.time, *p.z.T))
-        at, to = (middles(each) for each in (grid, coarse))
-        stiffness = np.array([np.interp(to, at, each) for each in spline.stiffness])
-        thin = p._replace(
-            z=np.column_stack(z),
-            spline=Spline(coarse, basis(coarse, time), stiffness, Rates.none(coarse)),
-        )
-        return Regression(thin, solve(thin, smoothness, counts[there]), self.commands, time)
 
 
 def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -112,11 +85,7 @@ def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 class Lateness:
-    """The likelihood of delays, beside motions that follow the commands without one.
-
-    Args:
-        regression: of the run.
-    """
+    """The likelihood of delays, beside motions that follow the commands without one."""
 
     def __init__(self, regression: Regression) -> None:
         self._regression, self._block = regression, regression.block
@@ -145,7 +114,7 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
     logarithm of their number) is zero.
     """
-    period, lateness = regression.commands.track.period, Lateness(regression.thinned())
+    period, lateness = regression.commands.track.period, Lateness(regression)
     longest, noticed = (x * regression.time_scale for x in (LONGEST, BRIEF))
     coarse = 2.0 * noticed  # between the delays that are tried first
 

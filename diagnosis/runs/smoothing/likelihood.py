@@ -15,6 +15,7 @@ three or four evaluations.
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -32,12 +33,9 @@ DECADES = 8.0
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-    """The smoothness (3,) with the largest restricted likelihood.
+    """The smoothness (3,) with the largest restricted likelihood, for weights (n,) of the samples.
 
-    Args:
-        p: problem.
-        weights: (n,), of the samples.
-        near: (3,), smoothness to begin the search with; 1 by default.
+    The search begins near a smoothness (3,), 1 by default.
     """
     starts = np.zeros(3) if near is None else np.log10(near)
     found = [c.minimum(x) for c, x in zip(criteria(p, weights), starts.tolist(), strict=True)]
@@ -56,13 +54,7 @@ def criteria(p: Problem, weights: np.ndarray) -> list["Criterion"]:
 
 
 class Criterion:
-    """-2 log L of one channel over its smoothness, in decades.
-
-    Args:
-        p: problem.
-        channel: 0 to 2.
-        equations: of the channel.
-    """
+    """-2 log L of one channel over its smoothness, in decades."""
 
     def __init__(self, p: Problem, channel: int, equations: Equations) -> None:
         self._problem, self._channel, self._equations = p, channel, equations
@@ -103,7 +95,9 @@ class Criterion:
             try:
                 beyond = float(np.clip(before + step, -DECADES, DECADES))
                 if excess(beyond) * step >= 0.0:
-                    return float(toms748(excess, *sorted((before, beyond))))
+                    low, high = sorted((before, beyond))
+                    root: Any = toms748(excess, low, high)
+                    return float(root)
             except LinAlgError:  # so little smoothing that the spline is not determined
                 break
             if abs(beyond) == DECADES:
@@ -115,12 +109,8 @@ class Criterion:
 def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
     """A problem with its penalty adapted to the jerk, and the likeliest smoothness (3,) then.
 
-    The weight of each interval is the inverse of the local mean square of the jerk that a fit has.
-
-    Args:
-        p: problem with an even penalty.
-        smoothness: (3,), its likeliest.
-        weights: (n,), of the samples.
+    The weight of each interval is the inverse of the local mean square of the jerk that a fit has, which
+    begins with an even penalty and its likeliest smoothness. Samples have weights (n,).
     """
     for _ in range(ROUNDS):
         square = third(p.spline.grid, solve(p, smoothness, weights).coefficients) ** 2

@@ -15,11 +15,7 @@ REWEIGHTINGS = 10  # most rounds of reweighting, and of the outlier test; two or
 
 
 class TooFewError(Exception):
-    """In some stretch hardly any sample agrees with the others.
-
-    Args:
-        rows: of the run, all samples of that stretch.
-    """
+    """In some stretch hardly any sample agrees with the others; its rows in the run."""
 
     def __init__(self, rows: np.ndarray) -> None:
         self.rows = rows
@@ -44,9 +40,8 @@ class Inliers(NamedTuple):
 def robust(p: Problem, local: np.ndarray) -> Inliers:
     """Which samples are no outliers, and the smoothness of the spline through them.
 
-    Args:
-        p: problem with an even penalty.
-        local: (3,), smoothness that follows a few samples, to find what sticks out.
+    The problem has an even penalty. With a local smoothness (3,) its spline follows a few samples, and
+    outliers stick out.
 
     Raises:
         TooFewError: in some stretch.

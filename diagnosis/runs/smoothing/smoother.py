@@ -237,7 +237,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         eta_ddot_std,
         _body_std(motion, eta_std, eta_dot_std),
         sigma,
-        sigma**2 / (smoothness * grid.spacing**5),
+        sigma**2 / (smoothness * grid.spacing**DEGREE),
         response.delay,
         response.sure,
         pose_only,
@@ -247,17 +247,9 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
 def measured_rates(
     track: Track, rows: np.ndarray, psi: np.ndarray, agreeing: Agreeing, grid: Knots
 ) -> tuple[np.ndarray, Rates] | None:
-    """Measured derivatives at samples of the pose.
+    """Rows with a pose that have all derivatives that agree with it, and these; None: there are none.
 
-    Args:
-        track: the run.
-        rows: of the samples of the pose.
-        psi: (n,), heading [rad].
-        agreeing: channels that count, with their noise; no noise is less than that of third differences.
-        grid: knots of the spline.
-
-    Returns:
-        The rows that have them all, and the derivatives; None: there are none.
+    The noise of a channel is no less than that of its third differences.
     """
     run = track.run
     by = next((pair for pair in VELOCITIES if pair[0] in agreeing), None)

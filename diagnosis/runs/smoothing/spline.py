@@ -134,12 +134,8 @@ def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
     Cholesky factor of its Gram matrix times these differences. |R c|^2 is a sum of squares that loses no
     digits, where c^T K c is a small difference of large numbers.
 
-    Args:
-        grid: knots.
-        weights: (intervals,), of each interval, those of all stretches in a row.
-
-    Returns:
-        R, with two more rows than intervals in each stretch, and the lower band (6, size) of K.
+    Weights (intervals,) are those of all stretches in a row. R has two more rows than intervals in each
+    stretch, K is given by its lower band (6, size).
     """
     parabolas = pieces(DEGREE - ORDER)  # of the third derivative, and the integrals of their products
     products = parabolas.T @ hilbert(ORDER) @ parabolas
@@ -167,9 +163,9 @@ def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
-def middles(grid: Knots, more: int = 0) -> np.ndarray:
-    """(intervals,): times [s] in the middle of all intervals, and of some more after each stretch."""
-    counts = grid.intervals + more
+def middles(grid: Knots) -> np.ndarray:
+    """(rows,): times [s] of the rows of R, middles of all intervals and of two after each stretch."""
+    counts = grid.intervals + 2
     return np.repeat(grid.start, counts) + (successive(0 * counts, counts) + 0.5) * grid.spacing
 
 
@@ -184,13 +180,7 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
     """The part of the inverse of S = L L^T that lies in its band (Takahashi et al. 1973).
 
     The recursion runs backwards and forgets its start (:data:`MEMORY`), so that it runs in many parts at
-    once.
-
-    Args:
-        factors: (channels, 6, size), lower bands of L.
-
-    Returns:
-        (6, size, channels): lower bands of the inverses.
+    once. Factors are lower bands of L, (channels, 6, size), the inverses (6, size, channels).
     """
     channels, _, size = factors.shape
     parts = -(-size // MEMORY) + 1
