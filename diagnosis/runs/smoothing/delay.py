@@ -84,29 +84,6 @@ def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
 
 
-class Lateness:
-    """The likelihood of delays, beside motions that follow the commands without one."""
-
-    def __init__(self, regression: Regression) -> None:
-        self._regression, self._block = regression, regression.block
-        tau = regression.commands.delayed(0.0)
-        # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
-        lags = np.geomspace(LONGEST, FORGETTING, 3) * regression.time_scale
-        lagged = [regression.motions(regression.commands.lagging(tau, lag)) for lag in lags.tolist()]
-        self._aside = [orth(np.hstack(part)) for part in zip(*lagged, strict=True)]
-        self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
-
-    def left(self, delay: float) -> np.ndarray:
-        """(blocks,), what a delay [s] leaves of -2 log L in each block."""
-        tau = self._regression.commands.delayed(delay)
-        total = np.zeros(self._block.max() + 1)
-        for q, z, a in zip(self._aside, self._pose, self._regression.motions(tau), strict=True):
-            own = a - q @ (q.T @ a)
-            off = z[:, 0] - own @ least_squares(own, z[:, 0])
-            total += np.bincount(np.tile(self._block, off.size // self._block.size), off**2)
-        return total
-
-
 def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     """From a command to its effect [s], and whether the blocks of the run agree that there is a delay.
 
@@ -114,20 +91,32 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
     logarithm of their number) is zero.
     """
-    period, lateness = regression.commands.track.period, Lateness(regression)
-    longest, noticed = (x * regression.time_scale for x in (LONGEST, BRIEF))
-    coarse = 2.0 * noticed  # between the delays that are tried first
+    commands, block, time_scale = regression.commands, regression.block, regression.time_scale
+    period, longest, noticed = commands.track.period, LONGEST * time_scale, BRIEF * time_scale
+    # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
+    lags = np.geomspace(LONGEST, FORGETTING, 3) * time_scale
+    prompt = commands.delayed(0.0)
+    lagged = [regression.motions(commands.lagging(prompt, lag)) for lag in lags.tolist()]
+    aside = [orth(np.hstack(part)) for part in zip(*lagged, strict=True)]
+    pose = [z - q @ (q.T @ z) for q, z in zip(aside, regression.pose, strict=True)]
 
     @cache
     def blocks(periods: int) -> Any:
-        return lateness.left(periods * period)
+        """(blocks,), what a delay leaves of -2 log L in each block."""
+        total = np.zeros(block.max() + 1)
+        motions = regression.motions(commands.delayed(periods * period))
+        for q, z, a in zip(aside, pose, motions, strict=True):
+            own = a - q @ (q.T @ a)
+            off = z[:, 0] - own @ least_squares(own, z[:, 0])
+            total += np.bincount(np.tile(block, off.size // block.size), off**2)
+        return total
 
     def left(periods: int) -> float:
         return float(blocks(periods).sum())
 
-    tried = {round(k * coarse / period) for k in range(round(longest / coarse) + 1)}
+    step = 2.0 * noticed / period  # between the delays that are tried first
+    tried = {round(k * step) for k in range(round(longest / (2.0 * noticed)) + 1)}
     best = min(sorted(tried), key=left)
-    step = coarse / period
     while step > 1:
         step = np.ceil(step / 2.0)
         near = {max(best - int(step), 0), best + int(step)}
@@ -135,8 +124,8 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
         best = min((best, *sorted(near)), key=left)
     if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
         return 0.0, False
-    prompt = min((k for k in tried if k * period < noticed), key=left)
-    sure = best != prompt and surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried))
+    short = min((k for k in tried if k * period < noticed), key=left)
+    sure = best != short and surely_positive(blocks(short) - blocks(best), CHANCE / len(tried))
     return best * period, sure
 
 
