@@ -27,6 +27,7 @@ MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spike
 # s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
 # so that a command that is wrong there hardly counts.
 HELD, LONG = 0.5, 5.0
+DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
 # Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
 NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
 
@@ -139,7 +140,8 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         last = run.time[fresh][np.maximum(after - 1, 0)]
         between |= repeats & (run.time - last < period - 0.5 * row)
         until = run.time[fresh][np.minimum(after, fresh.size - 1)] - last
-        between |= np.isnan(run.pose).all(axis=1) & (until < LONG * period)
+        # Rows are empty between two measurements if no other one was due meanwhile.
+        between |= np.isnan(run.pose).all(axis=1) & (until < 2.0 * period)
         dropped &= ~between
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
@@ -197,6 +199,11 @@ def in_order(time: np.ndarray) -> np.ndarray:
     while before[found[-1]] >= 0:
         found.append(int(before[found[-1]]))
     return np.array(found[::-1])
+
+
+def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Integral (n, k) over times (n,) [s], from the first one, of values (n, k) that are held."""
+    return np.vstack([0.0 * values[:1], np.cumsum(values[:-1] * np.diff(time)[:, None], axis=0)])
 
 
 def lost(pose: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fmus.scale import REFERENCE_LENGTH, Scale
 
-from ..cleaning import Track
+from ..cleaning import Track, impulse
 from ..linear_filter import filtered
 from .spline import Knots
 
@@ -105,9 +105,7 @@ class Commands:
     @cached_property
     def _impulses(self) -> np.ndarray:
         """(n, 3), integral of the commands until each row [N s, N s, N m s]."""
-        run = self.track.run
-        steps = run.tau_cmd[:-1] * np.diff(run.time)[:, None]
-        return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        return impulse(self.track.run.time, self.track.run.tau_cmd)
 
     def _impulse(self, time: np.ndarray) -> np.ndarray:
         """Integral (m, 3) of the commands until times (m,) [s]."""

@@ -22,7 +22,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, get_lapack_funcs
 from scipy.sparse import csr_array
 
-from .spline import DIGITS, Basis, Knots, basis, inverse_band, roughness
+from ..cleaning import DIGITS
+from .spline import Basis, Knots, basis, inverse_band, roughness
 
 # Cholesky factors of a banded matrix, and the solution by them.
 PBTRF: Any = get_lapack_funcs("pbtrf", dtype=float)
