@@ -30,6 +30,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    FiniteFloat,
     NonNegativeInt,
     PositiveFloat,
     StringConstraints,
@@ -108,20 +109,12 @@ class Column(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str = Field(description="the column's name in the file")
-    unit: str | None = Field(default=None, description="its unit; SI if not said")
-    factor: float = Field(
-        default=1.0,
-        allow_inf_nan=False,
-        description="by which its numbers are multiplied to be in that unit",
-    )
-    flip: bool = Field(default=False, description="whether its axis points the other way")
-    offset: float = Field(
-        default=0.0, allow_inf_nan=False, description="what is added, in its unit, after the flip"
-    )
-    noise: PositiveFloat | None = Field(
-        default=None, allow_inf_nan=False, description="standard deviation, in its unit"
-    )
+    name: str  # in the file
+    unit: str | None = None  # SI if not said
+    factor: FiniteFloat = 1.0  # by which its numbers are multiplied to be in that unit
+    flip: bool = False  # whether its axis points the other way
+    offset: FiniteFloat = 0.0  # what is added, in its unit, after the flip
+    noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
 
 
 class Layout(BaseModel):
@@ -129,13 +122,13 @@ class Layout(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    separator: Mark = Field(default=",", description="between two cells")
-    decimal: Mark = Field(default=".", description="the decimal point")
-    encoding: str = Field(default=UTF_8, description="of the text, as Python calls it")
-    skip: NonNegativeInt = Field(default=0, le=PREAMBLE, description="lines before that of the names")
-    units_line: bool = Field(default=False, description="whether the line below the names is of units")
-    columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
-    trial: str | None = Field(default=None, description="the manoeuvring trial that it is, as zigzag")
+    separator: Mark = ","  # between two cells
+    decimal: Mark = "."  # the decimal point
+    encoding: str = UTF_8  # of the text, as Python calls it
+    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # lines before that of the names
+    units_line: bool = False  # whether the line below the names is of units
+    columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
+    trial: str | None = None  # the manoeuvring trial that it is, as zigzag
 
     @field_validator("trial")
     @classmethod

@@ -65,16 +65,13 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
         )
         if units.get(columns[signal].get("unit", "")) == 1.0:  # SI need not be said
             del columns[signal]["unit"]
-    return f"; {_line(path, {'columns': columns})}"
-
-
-def _line(path: Path, content: Mapping[str, Any]) -> str:
-    return f"put {json.dumps(content)} into '{path}.json'"
+    return f"; {_changed(path, Layout(), columns=columns)}"
 
 
 def _changed(path: Path, layout: Layout, **changes: Any) -> str:
     """What to put into the file beside a measurement, with what it says now."""
-    return _line(path, layout.model_dump(exclude_defaults=True) | changes)
+    content = layout.model_dump(exclude_defaults=True) | changes
+    return f"put {json.dumps(content)} into '{path}.json'"
 
 
 def refuse_encoding(path: Path, layout: Layout) -> None:

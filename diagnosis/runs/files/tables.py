@@ -51,18 +51,13 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
     """The columns of some names of a CSV file, those of them that there are."""
-    try:
-        return _csv(
-            path,
-            layout,
-            usecols=lambda name: str(name).strip() in wanted,
-            decimal=layout.decimal,
-            skipinitialspace=True,
-        ).rename(columns=str.strip)
-    except pd.errors.ParserError as error:
-        if READ_INTERRUPTED in str(error):
-            raise KeyboardInterrupt from error
-        raise
+    return _csv(
+        path,
+        layout,
+        usecols=lambda name: str(name).strip() in wanted,
+        decimal=layout.decimal,
+        skipinitialspace=True,
+    ).rename(columns=str.strip)
 
 
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
@@ -79,6 +74,10 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
             )
     except UnicodeDecodeError:
         refuse_encoding(path, layout)
+        raise
+    except pd.errors.ParserError as error:
+        if READ_INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
         raise
 
 

@@ -13,12 +13,11 @@ from .wraps import wraps
 
 
 class Closure(NamedTuple):
-    """What windows of a run miss by.
+    """What windows of a run miss by; NaN where no velocity or no yaw rate is measured.
 
     Attributes:
-        position: median distance between where the ship is and where velocity and heading take it [m];
-            NaN where no velocity is measured.
-        heading: RMS of the heading less the integrated yaw rate, in turns [rad]; NaN where none is.
+        position: median distance between where the ship is and where velocity and heading take it [m].
+        heading: RMS of the heading less the integrated yaw rate, in turns [rad].
     """
 
     position: float

@@ -79,11 +79,6 @@ class Commands:
         return np.concatenate(self.parts)
 
     @cached_property
-    def first(self) -> np.ndarray:
-        """Index of the start of each stretch but the first among them."""
-        return np.cumsum([part.size for part in self.parts])[:-1]
-
-    @cached_property
     def rotation(self) -> np.ndarray:
         """(m,), from body to earth: a rotation in the complex plane, north its real axis."""
         known = np.isfinite(self.psi)
@@ -133,7 +128,7 @@ class Commands:
 
     def _recursion(self, x: np.ndarray, kept: float) -> np.ndarray:
         """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch."""
-        parts = np.split(x, self.first)
+        parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
     def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
