@@ -81,7 +81,7 @@ def test_a_module_is_imported_with_the_change():
 def test_prepared_runs_serve_rooms_after_the_preparation():
     assert Task(0, "diagnosis.search.shortlist:NEW", HALF).prepared
     assert Task(0, "", 1.0).prepared
-    assert not Task(0, "diagnosis.runs.cleaning:GAP", HALF).prepared
+    assert not Task(0, "diagnosis.runs.cleaning:HELD", HALF).prepared
     assert not Task(1, "diagnosis.search.shortlist:NEW", HALF).prepared
 
 

@@ -83,11 +83,7 @@ def motion(prepared: PreparedRun) -> Smoothed:
 def usable(
     smoothed: Sequence[Smoothed], model: Model, anyway: bool = False, horizon: float | None = None
 ) -> list[WeakWindows]:
-    """Windows of smoothed runs, if these can be what their files state.
-
-    Args:
-        smoothed: the runs.
-        model, anyway, horizon: see :func:`gather`.
+    """Windows of smoothed runs, if these can be what their files state; see :func:`gather`.
 
     Raises:
         InputError: a run's thrusters are never at work, too much of it is missing, it is not the trial
