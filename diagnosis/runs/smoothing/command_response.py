@@ -56,6 +56,7 @@ def with_commands(
         found, least = (rest, near, response._replace(sure=sure)), cost
         gains = Regression(p, solve(rest, near, weights), commands, time).gains(delay)
     if found is None:
-        return alone.problem, alone.smoothness, CommandResponse(*np.zeros((3, commands.psi.size, 3)))
+        still = np.zeros((commands.psi.size, 3))
+        return alone.problem, alone.smoothness, CommandResponse(still, still, still)
     rest, near, response = found
     return *adapt(rest, near, weights), response
