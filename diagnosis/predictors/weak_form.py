@@ -4,9 +4,8 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -200,19 +199,6 @@ def _span(
     step = np.where(b > a, b - a, 1.0)
     moment = half * (kernel_moment(high) - kernel_moment(low)) + (middle - a) * area
     return area, moment / step, step
-
-
-def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
-    """Runs of which no two have the same name: those that had it are numbered."""
-    found, seen = [], Counter[str]()
-    for w in data:
-        name, s = w.run.name, w.smoothed
-        seen[name] += 1
-        if seen[name] > 1:
-            run = replace(w.run, name=f"{name} ({seen[name]})")
-            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
-        found.append(w)
-    return found
 
 
 def omega(w: WeakWindows, model: Model) -> np.ndarray:

@@ -91,7 +91,7 @@ class ReportData:
             return rms(e.weak_windows, e.model, name), rms(e.weak_windows, e.learned or e.model, name)
 
         every = [
-            (e, named(e.weak_windows, e.model) if e.predicted_by.parametric else ())
+            (e, named(e.weak_windows, e.model) if e.predictor.parametric else ())
             for e in self.evaluations
         ]
         return [{name: errors(e, name) for name in names} for e, names in every]
