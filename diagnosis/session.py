@@ -12,6 +12,7 @@ from typing_extensions import deprecated
 
 from cosim import InputError
 
+from .assessment.gathering import told_apart
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import for_each
@@ -26,7 +27,6 @@ from .predictors import (
     evaluate_run,
     nominal,
     open_model,
-    told_apart,
 )
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK

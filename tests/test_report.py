@@ -59,7 +59,7 @@ def evaluations(data):
 def compared(evaluations, **before):
     """The comparison of these runs; of where the model fails, something else than there is."""
     std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
-    c = Comparison(evaluations, std, evaluations[0].predicted_by)
+    c = Comparison(evaluations, std, evaluations[0].predictor)
     vars(c)["before"] = replace(c.before, **before)
     return c
 

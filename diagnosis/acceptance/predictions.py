@@ -35,7 +35,7 @@ class Predictions:
     """
 
     def __init__(self, e: Evaluation, horizon: float) -> None:
-        self.smoothed, self.predictor = e.smoothed, e.predicted_by
+        self.smoothed, self.predictor = e.smoothed, e.predictor
         self._learned = [] if e.learned is None else [e.learned]
         self.model = (e.learned or e.model).during(e.name)
         none = InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")

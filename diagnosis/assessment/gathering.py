@@ -1,6 +1,8 @@
 """From files to runs that can be judged: each prepared, two at a time, and cut into windows."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -102,3 +104,16 @@ def usable(
     if not anyway:
         refuse_implausible(windows, model)
     return windows
+
+
+def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
+    """Runs of which no two have the same name: those that had it are numbered."""
+    found, seen = [], Counter[str]()
+    for w in data:
+        name, s = w.run.name, w.smoothed
+        seen[name] += 1
+        if seen[name] > 1:
+            run = replace(w.run, name=f"{name} ({seen[name]})")
+            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
+        found.append(w)
+    return found

@@ -116,28 +116,34 @@ class Evaluation:
     """One run with the errors of the initial and of the learned model on it.
 
     Attributes:
-        model: the initial model, or one that moves as the predictor does.
+        predictor: what predicts the run.
         weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
-        held_out: whether nothing was learned from it, and nothing decided by it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
-        predictor: what predicts the run; None: ``model`` does.
         use: what the data were used for.
     """
 
-    model: Model
+    predictor: Predictor
     weak_windows: WeakWindows
     windows: Windows | None
-    held_out: bool
     before: PredictionError
     after: PredictionError
     bands: Bands | None = None
     learned: Model | None = None
-    predictor: Predictor | None = None
     use: DataUse = "train"
+
+    @property
+    def model(self) -> Model:
+        """The initial model, or one that moves as the predictor does."""
+        return self.predictor.model
+
+    @property
+    def held_out(self) -> bool:
+        """Whether nothing was learned from the run, and nothing decided by it."""
+        return self.use == "test"
 
     @property
     def smoothed(self) -> Smoothed:
@@ -147,14 +153,9 @@ class Evaluation:
     def name(self) -> str:
         return self.weak_windows.run.name
 
-    @property
-    def predicted_by(self) -> Predictor:
-        """The predictor of the run."""
-        return self.predictor or DescribedShip(self.model)
-
     def free_runs(self, begin: float = -np.inf) -> tuple[np.ndarray, list[np.ndarray]]:
         """The run as it is predicted from one state, see :meth:`.predictor.Predictor.free_runs`."""
-        return self.predicted_by.free_runs(self.smoothed, self.learned, begin)
+        return self.predictor.free_runs(self.smoothed, self.learned, begin)
 
 
 def evaluate_run(
@@ -183,5 +184,4 @@ def evaluate_run(
         for model, off in zip(models, missed, strict=True)
     ]
     use: DataUse = "test" if held_out else "train"
-    first, last = errors[0], errors[-1]
-    return Evaluation(models[0], w, windows, held_out, first, last, None, after, predictor, use)
+    return Evaluation(predictor, w, windows, errors[0], errors[-1], None, after, use)

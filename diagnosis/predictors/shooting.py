@@ -164,7 +164,7 @@ def _beside(states: Sequence[vessel.State]) -> vessel.State:
     """The states (p, w) of some runs in one; a run that no parameter moves has p = 1."""
     models = max(np.broadcast_shapes(*map(np.shape, s))[0] for s in states)
     whole = [[np.broadcast_to(x, (models, s.u.shape[-1])) for x in s] for s in states]
-    return vessel.State._make([np.concatenate(x, axis=-1) for x in zip(*whole, strict=True)])
+    return vessel.State._make(np.concatenate(x, axis=-1) for x in zip(*whole, strict=True))
 
 
 def _poses(states: Sequence[vessel.State], model: Model) -> np.ndarray:

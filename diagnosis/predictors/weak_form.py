@@ -4,9 +4,8 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -202,19 +201,6 @@ def _span(
     return area, moment / step, step
 
 
-def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
-    """Runs of which no two have the same name: those that had it are numbered."""
-    found, seen = [], Counter[str]()
-    for w in data:
-        name, s = w.run.name, w.smoothed
-        seen[name] += 1
-        if seen[name] > 1:
-            run = replace(w.run, name=f"{name} ({seen[name]})")
-            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
-        found.append(w)
-    return found
-
-
 def omega(w: WeakWindows, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
 
@@ -261,11 +247,7 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
 
     That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
-    sideways, what its inertia asks for the motion that was measured.
-
-    Args:
-        data: windows of each run.
-        model: by whose inertia an acceleration is a force.
+    sideways, what the model's inertia asks for the motion that was measured.
     """
     force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
     idle = ~force.any(axis=0)
@@ -283,10 +265,7 @@ def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) 
 def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
     """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
 
-    Args:
-        w: windows of the run.
-        model: whose thrusters.
-        nu: (n, 3), of :func:`inflow_along`; by default that of the smoothed motion, halfway.
+    They meet the water with ``nu`` (n, 3); by default with that of the smoothed motion, halfway.
     """
     model = model.during(w.run.name)
     if nu is None:
@@ -295,13 +274,9 @@ def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> 
 
 
 def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
-    """Velocity (n, 3) between each sample of a run and the next, at which a thruster's force is taken.
+    """Velocity (n, 3) halfway from each sample to the next, at which a thruster's force is taken.
 
     A force that goes with speed, as a rudder's, would else come half a sampling period late.
-
-    Args:
-        w: windows of the run.
-        nu: (n, 3), at the samples, zero where it is not known.
     """
     middle = nu.copy()
     half = np.where(w.known[:-1] & w.known[1:], 0.5, 0.0)
@@ -329,14 +304,7 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust.
-
-    Args:
-        model: of the ship.
-        time: (n,) [s].
-        eta: (n, 3) true pose [m, m, rad].
-        nu: (n, 3) body-fixed velocity over ground.
-    """
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3)."""
     s = vessel.State._make([*eta.T, *nu.T, time])
     nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
     return np.column_stack(np.broadcast_arrays(*nu_dot))

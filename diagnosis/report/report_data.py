@@ -88,7 +88,7 @@ class ReportData:
         found = []
         for e in self.evaluations:
             w, last = e.weak_windows, e.learned or e.model
-            names = named(w, e.model) if e.predicted_by.parametric else ()
+            names = named(w, e.model) if e.predictor.parametric else ()
             found.append({name: (rms(w, e.model, name), rms(w, last, name)) for name in names})
         return found
 

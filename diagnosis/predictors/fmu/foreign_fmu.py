@@ -119,17 +119,10 @@ class Fmu:
 class FmuPredictor(BlackBox):
     """How an FMU predicts some runs.
 
-    Args:
-        fmu: the FMU.
-        runs: no two of the same name.
-        ship: model of the ship.
-
     Attributes:
         given: which of its variables is which signal, as it was told or proposed.
         map: the same with the units that the FMU declares.
-
-    Raises:
-        InputError: as :meth:`Fmu.variables`.
+        lines: see :func:`.variable_map.signal_lines`.
     """
 
     kind = "FMU"
@@ -230,8 +223,8 @@ def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
 
 def _as_one(path: Path, folder: Path) -> Path:
     """A system as one FMU, whose parameters are all that the system leaves open."""
-    system = prepare(cosim.load_scenario(path))
-    try:
+    made = folder / f"{path.stem}.fmu"
+    with closing(prepare(cosim.load_scenario(path))) as system:
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -239,11 +232,8 @@ def _as_one(path: Path, folder: Path) -> Path:
             for v in model.variables.values()
             if v.causality == "parameter" and v.type == "Real"
         }
-        made = folder / f"{path.stem}.fmu"
         export_fmu(system, made, expose=every - given)
-        return made
-    finally:
-        system.close()
+    return made
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:

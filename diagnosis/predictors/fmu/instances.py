@@ -23,15 +23,14 @@ class Begun(NamedTuple):
 def simulate(
     path: Path, isolated: bool, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
 ) -> dict[str, np.ndarray]:
-    """Each output (steps + 1, w) of w predictions.
+    """Each output (steps + 1, w) of w predictions in steps of h [s].
 
     Args:
         path: of the FMU.
         isolated: whether each instance needs a process of its own.
         begun: what is predicted.
         outputs: names of variables.
-        h: length of a step [s].
-        steps: of each.
+        h, steps: length of a step [s], and how many.
 
     Raises:
         InputError: the FMU fails.

@@ -38,10 +38,6 @@ class ShortSteps:
     def run(self, start: Values, inputs: Values) -> dict[str, np.ndarray]:
         """Each output (STEPS + 1,) from a start on.
 
-        Args:
-            start: parameter -> value.
-            inputs: input -> value.
-
         Raises:
             InputError: the FMU refuses it, or fails.
         """

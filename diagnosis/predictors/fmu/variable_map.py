@@ -16,7 +16,7 @@ ahead alone. A variable whose unit the map does not tell is in the one that its 
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -46,7 +46,8 @@ GROUPS = (*PROPOSED, "beside")
 BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
           "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
 # What marks a variable as a start value, before or behind the name of the signal.
-BEFORE, BEHIND = re.compile(r"(initial|init|start)_?"), re.compile(r"_?(0|initial|init|start)")
+BEFORE = re.compile(r"(initial|init|start)_?(?P<core>.+)")
+BEHIND = re.compile(r"(?P<core>.+?)_?(0|initial|init|start)")
 SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
            "moment": "N.m", "shaft speed": "1/s", "command": "1", "acceleration": "m/s2",
            "angular acceleration": "rad/s2"}  # fmt: skip
@@ -241,19 +242,13 @@ def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]
 
 def _same(name: str, signal: str) -> bool:
     """Whether a variable bears a signal's own name, which goes before other names of it."""
-    return bool(signal) and name.casefold().replace(".", "_").startswith(
-        signal.casefold().replace(".", "_")
-    )
+    own, known = (x.casefold().replace(".", "_") for x in (name, signal))
+    return bool(signal) and own.startswith(known)
 
 
 def _cores(name: str) -> list[str]:
     """A start value's name without what marks it as one."""
-    lower = name.casefold()
-    marks: list[tuple[re.Pattern[str], Callable[[re.Match[str]], str]]] = [
-        (re.compile(f"{BEFORE.pattern}(.+)"), lambda m: m[2]),
-        (re.compile(f"(.+?){BEHIND.pattern}"), lambda m: m[1]),
-    ]
-    cores = [core(m) for pattern, core in marks if (m := pattern.fullmatch(lower))]
+    cores = [m["core"] for mark in (BEFORE, BEHIND) if (m := mark.fullmatch(name.casefold()))]
     return [core for core in cores if len(core) > 1 or core in MOTION]
 
 

@@ -1,6 +1,7 @@
 """A foreign FMU with what was found beside it, as one FMU."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,12 +55,7 @@ def write_wrapper(
 ) -> tuple[str, VariableMap | None]:
     """Write an FMU of a foreign one and of what was found beside it.
 
-    Args:
-        path: of the file.
-        fmu: the foreign one.
-        start: that moves as it does.
-        learned: the same with what was found.
-        runs: on which that was.
+    ``start`` is a model that moves as the foreign one does, ``learned`` the same with what was found.
 
     Returns:
         What was written, or what is needed for it, in a sentence; the map of the new FMU, or None.
@@ -78,11 +74,9 @@ def write_wrapper(
         return f"{NONE}: the ship has effects of your own.", None
     try:
         with scratch_folder() as folder:
-            system = prepare(cosim.load_scenario(_scenario(fmu, start, learned, folder, runs)))
-            try:
+            scenario = cosim.load_scenario(_scenario(fmu, start, learned, folder, runs))
+            with closing(prepare(scenario)) as system:
                 export_fmu(system, path, overwrite=True, expose=_start_values(fmu))
-            finally:
-                system.close()
     except (cosim.InputError, BuildError) as error:
         return f"{NONE}: {error}.", None
     return f"{path.name} is {fmu.name} with what was found.", _map(fmu)
