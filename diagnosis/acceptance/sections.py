@@ -17,10 +17,7 @@ def sections(r: Content) -> Iterator[Section]:
     yield _errors(r)
     yield _uncertainty(r)
     heads = ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest")
-    covered = [
-        (v.signal, v.unit, *map(number, (v.least, v.q05, v.median, v.q95, v.greatest)))
-        for v in r.validity
-    ]
+    covered = [(v.signal, v.unit, *map(number, [*v.values()][2:])) for v in r.validity]
     text = "What the data cover: least, quantiles and greatest over all samples that are used."
     yield Section("Validity range", [text], [Table(heads, covered)])
     faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
@@ -52,12 +49,15 @@ def _errors(r: Content) -> Section:
 
 
 def _uncertainty(r: Content) -> Section:
-    rows = []
-    for j in r.judgements:
-        if j.budget is not None:
-            known = (getattr(j.budget, name) for name in BUDGET)
-            shown = ("not known" if u is None else number(u) for u in known)
-            rows.append((j.criterion, j.unit, *shown))
+    rows = [
+        (
+            j.criterion,
+            j.unit,
+            *("not known" if j.budget[n] is None else number(j.budget[n]) for n in BUDGET),
+        )
+        for j in r.judgements
+        if j.budget is not None
+    ]
     told = (
         "Standard uncertainties of the judged quantity at the horizon; u_input² is that of initial "
         "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."

@@ -24,9 +24,8 @@ def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
         under_way = speed > SLOW * np.nanmax(speed)
     drift = np.where(under_way, np.arctan2(-v, u), np.nan)
     motion = {"u": u, "v": v, "r": r, "speed": speed, "drift": drift}
-    return motion | {
-        n: x for n, x in at_samples(smoothed).items() if n not in {*motion, "x", "y", "psi"}
-    }
+    known = {*motion, "x", "y", "psi"}
+    return motion | {n: x for n, x in at_samples(smoothed).items() if n not in known}
 
 
 def unit_of(signal: str, evaluation: Evaluation) -> str:

@@ -9,6 +9,7 @@ Vessel and thrusters have the parameters of a model; observer, controller and pa
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from itertools import takewhile
 from math import inf
 from typing import Any, NamedTuple
 
@@ -61,20 +62,13 @@ REFERENCES = (
 
 
 class Loop(NamedTuple):
-    """A closed loop at an instant: the states of its components, and what they give to each other.
+    """A closed loop at an instant: the states of its components, and what they give to each other."""
 
-    Attributes:
-        states: of vessel, path, observer, controller and thrusters.
-        velocity: of the ship, as its thrusters are told.
-        target, estimate: what path and observer give.
-        poses: measured, on their way to the observer, the oldest first.
-    """
-
-    states: tuple[Any, ...]
+    states: tuple[Any, ...]  # of vessel, path, observer, controller and thrusters
     velocity: Any
     target: Target
     estimate: Estimate
-    poses: tuple[Measurement, ...]
+    poses: tuple[Measurement, ...]  # on their way to the observer, the oldest first
 
 
 def closed_loop(
@@ -158,12 +152,9 @@ def bound_of(model: Model) -> float:
 
 def largest_distance(reference: Reference, model: Model) -> float:
     """Largest distance [m] between the ship and its target; infinite as soon as the ship is lost."""
-    largest, bound = 0.0, bound_of(model)
+    bound = bound_of(model)
     try:
-        for distance in distances(reference, model):
-            if not distance < bound:
-                return inf
-            largest = max(largest, distance)
+        kept = [*takewhile(lambda distance: distance < bound, distances(reference, model))]
     except (OverflowError, ValueError, ZeroDivisionError):  # numbers beyond what a float holds
         return inf
-    return largest
+    return max(kept) if len(kept) == round(reference.seconds / SETTINGS.step) else inf

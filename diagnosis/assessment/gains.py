@@ -70,17 +70,16 @@ def gains(w: WeakWindows, model: Model) -> Gains:
     u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
     north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
     earth = ([north, east], [-east, north], [])
-    value, error, left = np.full(3, np.nan), np.full(3, np.nan), np.zeros_like(a)
-    told = np.zeros(3, bool)
+    value, error = np.full((2, 3), np.nan)
+    left, told = np.zeros_like(a), np.zeros(3, bool)
     for j in np.flatnonzero(moves):
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
         states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth[j]]
         x = np.column_stack(
             [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
         )
-        if len(a) < OVERLAP * x.shape[1] or not np.isfinite(x).all():
-            continue  # of fewer independent windows than unknowns nothing is told
-        if _own(T[:, j], others) < SETTINGS.own:
+        few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
+        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.own:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
         inverse = pinv(x / size)

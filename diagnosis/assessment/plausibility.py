@@ -120,12 +120,9 @@ def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None
 
 def same_columns(run: Run) -> tuple[str, str] | None:
     """Two signals of a run that are the same numbers, if there are any."""
-    signals = {"time": run.time, **dict(zip(POSE, run.pose.T, strict=True))}
-    pairs = list(combinations(signals, 2))
-    if run.commands is None:
-        signals |= dict(zip(TAU, run.tau_cmd.T, strict=True))
-        pairs += combinations(TAU, 2)
-    for a, b in pairs:
+    signals = dict(zip(("time", *POSE, *TAU), (run.time, *run.pose.T, *run.tau_cmd.T), strict=True))
+    commands = combinations(TAU if run.commands is None else (), 2)
+    for a, b in (*combinations(("time", *POSE), 2), *commands):
         if np.array_equal(signals[a], signals[b], equal_nan=True) and np.nanstd(signals[a]) > 0.0:
             return a, b
     return None
@@ -141,12 +138,7 @@ def still_column(run: Run) -> str | None:
 
 
 class Mistake(NamedTuple):
-    """A reading that explains a run far better than its file as it was read.
-
-    Attributes:
-        reading: how it was meant.
-        before, after: 1 - U as it was read and as it was meant, mean of the axes.
-    """
+    """A reading that explains a run better, and 1 - U before and after, mean of the axes."""
 
     reading: Reading
     before: float

@@ -53,12 +53,9 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> 
     apart = 2 * BLOCK * data[0].scale.time
     # A pass of so long to both sides has fewer windows.
     count = SETTINGS.neighbours + 2 * round(apart / data[0].every) + 1
-    neighbours = {
-        "place": _neighbours(place, run, time, apart, count),
-        "motion": _neighbours(_scaled(motion), run, time, apart, count),
-        "command": _neighbours(_scaled(command), run, time, apart, count),
-        "time": _neighbours(time[:, None], run, time, np.inf, count),
-    }
+    spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
+    neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
+    neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     rng = np.random.default_rng(seed)
     shifts = round(1.0 / SETTINGS.chance) - 1
     offsets = rng.integers(count, max(len(left) - count, count + 1), shifts)

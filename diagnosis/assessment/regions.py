@@ -8,12 +8,13 @@ Bonferroni's correction for the number of regions that were tried.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..predictors import WeakWindows
 from ..predictors.uncertainty import NOISE_TOLERANCE
-from ..search.most_likely import NORMAL_95
 from .clusters import ClusterMean, cluster_mean, numbered, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
 from .settings import SETTINGS
@@ -143,17 +144,13 @@ def _exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) 
     """Whether a model error (K,) is more than the noise of the measurement."""
     excess = squares - NOISE_TOLERANCE**2 * noise
     above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
-    return above.mean > NORMAL_95 * np.sqrt(above.variance)
+    return above.mean > ndtri(1.0 - SETTINGS.chance) * np.sqrt(above.variance)
 
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """Block design of an axis and a covariate: bins by clusters.
-
-    Attributes:
-        profile: what is reported of it.
-        total, noise: (bins, clusters), sums of the squares and of the noise's variance.
-        count: (bins, clusters), numbers of windows.
+    """Block design of an axis and a covariate: sums of the squares and of the noise's variance, and
+    numbers of windows, in bins and clusters (bins, clusters).
     """
 
     profile: Profile
@@ -172,15 +169,13 @@ class _Design:
         several_runs: bool,
     ) -> "_Design":
         edges = by.edges
-        bins = max(edges.size - 1, 1)
+        bins, clusters = max(edges.size - 1, 1), cluster.max() + 1
         place = np.clip(np.searchsorted(edges, by.values, side="right") - 1, 0, bins - 1)
-        flat = place * (cluster.max() + 1) + cluster[by.rows]
-        shape = (bins, cluster.max() + 1)
-
-        def cells(weights: np.ndarray | None) -> np.ndarray:
-            return np.bincount(flat, weights, bins * shape[1]).reshape(shape)
-
-        total, variance, count = cells(squares[by.rows]), cells(noise[by.rows]), cells(None)
+        flat = place * clusters + cluster[by.rows]
+        total, variance, count = (
+            np.bincount(flat, weights[by.rows], bins * clusters).reshape(bins, clusters)
+            for weights in (squares, noise, np.ones_like(noise))
+        )
         n = count.sum(axis=1)
         with np.errstate(invalid="ignore"):
             rms, uncertainty = (np.sqrt(x.sum(axis=1) / n) for x in (total, variance))
@@ -191,10 +186,10 @@ class _Design:
     def intervals(self) -> Iterator[tuple[int, int]]:
         """First bin and the one after the last of each interval, which may pass the end if cyclic."""
         by, bins = self.profile.covariate, len(self.total)
-        for first in range(bins):
-            for after in range(first + 1, first + bins if by.cyclic else bins + 1):
-                if (by.bounded or first == 0 or after == bins) and after - first < bins:
-                    yield first, after
+        for first, more in product(range(bins), range(1, bins)):
+            after = first + more
+            if (by.cyclic or after <= bins) and (by.bounded or first == 0 or after == bins):
+                yield first, after
 
     def clearest_region(self) -> Region | None:
         """The significant region of the largest contrast; None: there is none."""

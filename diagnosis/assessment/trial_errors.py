@@ -33,9 +33,8 @@ def order_under_trial(run: Run, ship: Ship) -> np.ndarray:
     if run.trial == "stop":
         return run.tau_cmd[:, 0]
     angles = [k for k, unit in enumerate((ship.commands or {}).values()) if unit == "rad"]
-    if run.commands is None or not angles:
-        return run.tau_cmd[:, 2]
-    return run.commands[:, angles].mean(axis=1)
+    ordered = run.tau_cmd[:, [2]] if run.commands is None or not angles else run.commands[:, angles]
+    return ordered.mean(axis=1)
 
 
 def measured_passage(smoothed: Smoothed, ship: Ship) -> Passage:
@@ -92,9 +91,8 @@ def _together(found: list[Mapping[str, float]]) -> TrialErrors:
     told: TrialErrors = {}
     for name in dict.fromkeys(name for each in found for name in each):
         triple = [each.get(name) for each in found]
-        numbered = NUMBERED.fullmatch(name)
-        if numbered is None:
-            told[name] = triple
-        else:
+        if numbered := NUMBERED.fullmatch(name):
             told.setdefault(numbered[1], []).append(triple)
+        else:
+            told[name] = triple
     return told

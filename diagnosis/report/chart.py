@@ -90,9 +90,8 @@ class Axis:
 
     def ends(self, values: Sequence[np.ndarray]) -> Ends:
         """Limits on the scale, between which all values lie."""
-        known = self.spaced(
-            np.concatenate([np.zeros(0), *values]) if self.limits is None else self.limits
-        )
+        every = np.concatenate([np.zeros(0), *values]) if self.limits is None else self.limits
+        known = self.spaced(every)
         known = known[np.isfinite(known)] if np.isfinite(known).any() else np.array([0.0, 1.0])
         if self.limits is not None and known[0] != known[-1]:
             return float(known[0]), float(known[-1])
@@ -184,8 +183,8 @@ class Panel:
         texts += [Text(LETTER, b.top + b.height / 2, self.y.label, upwards=True)]
         if self.x.shown:
             texts += [Text(x, bottom + ROW, text) for x, text in columns]
-            for k, text in enumerate(self.x.label.splitlines(), 2):
-                texts.append(Text((b.left + right) / 2, bottom + k * ROW, text))
+            lines = enumerate(self.x.label.splitlines(), 2)
+            texts += [Text((b.left + right) / 2, bottom + k * ROW, text) for k, text in lines]
         yield from ((text, False) for text in texts)
 
 

@@ -121,13 +121,8 @@ def file_content(r: ReportData) -> Content:
         "errors": [*_errors(r)],
         "where": _where(r.comparison.before),
     }
-    origin = {
-        "runs": [e.name for e in r.evaluations],
-        "model": r.model,
-        "files": list(r.files),
-        "versions": versions(),
-    }
-    fmu = fmu_result(r.comparison)
+    names, fmu = [e.name for e in r.evaluations], fmu_result(r.comparison)
+    origin = {"runs": names, "model": r.model, "files": list(r.files), "versions": versions()}
     if r.diagnosis is None:
         return Content.of(finite(runs | {"fmu": fmu} | origin))
     d, learned = r.diagnosis, r.diagnosis.learned

@@ -1,7 +1,7 @@
 """Numbers and units as the page and JSON show them."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -43,9 +43,7 @@ def plain(value: object) -> str:
     """Any value that JSON can hold, on one line."""
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {plain(each)}" for key, each in value.items())
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Sequence):
+    if isinstance(value, (list, tuple)):
         return ", ".join(plain(each) for each in value)
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -157,7 +157,8 @@ def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     outline = of.vessel.outline
     for corners in [] if outline is None else hulls(poses, outline.corners):
         if 2 * np.ptp(corners, axis=0).max() < room:
-            panel.draw(*np.vstack([corners, corners[:1]]).T, INK, width=LINE / 2)
+            east, north = np.vstack([corners, corners[:1]]).T
+            panel.draw(east, north, INK, width=LINE / 2)
 
 
 def _broad(panel: Panel, x: np.ndarray, y: np.ndarray, label: str = "measured") -> None:
