@@ -31,15 +31,13 @@ from .predictors import (
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
+from .search.gram import PARTS
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import Verdict, judge
 from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
-
-MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
-REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,13 +220,12 @@ def diagnose(
     advance("stability")
     stability = check_stability(verdict.learned.model, start, advance, region)
 
-    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
     return Diagnosis(
         **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
         comparison=comparison,
         start=start,
         stability=stability,
-        speeds=(u, v, r),
+        speeds=region,
         prior=prior,
         seed=seed,
     )
@@ -241,11 +238,11 @@ def _refuse_short(train: Sequence[WeakWindows]) -> None:
         InputError: they are.
     """
     blocks = sum(np.unique(w.block).size for w in train)
-    if blocks < MIN_BLOCKS:
+    if blocks < PARTS:
         block = BLOCK * train[0].scale.time
         raise InputError(
             f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
-            f"at least {MIN_BLOCKS * block:.3g} s are needed"
+            f"at least {PARTS * block:.3g} s are needed"
         )
 
 
