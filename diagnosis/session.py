@@ -31,14 +31,13 @@ from .predictors import (
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
+from .search.gram import PARTS
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import Verdict, judge
 from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
-
-MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,10 +188,10 @@ def diagnose(
     prior_shares((source.start or nominal(runs)).ship, prior)  # before any work
     harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
     blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
-    if blocks < MIN_BLOCKS:
+    if blocks < PARTS:
         raise InputError(
             f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
-            f"at least {MIN_BLOCKS * block:.3g} s are needed"
+            f"at least {PARTS * block:.3g} s are needed"
         )
     train, validate = runs[: len(train)], runs[len(train) : len(runs) - len(held_out)]
 

@@ -17,7 +17,7 @@ from diagnosis.predictors.windows import Windows
 from diagnosis.search.candidates import model_error
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.prediction_fit import disturbance as pushes
-from diagnosis.search.prediction_fit.disturbance import NO_PUSH, Push, covariance, estimate
+from diagnosis.search.prediction_fit.disturbance import Push, covariance, estimate
 from diagnosis.search.prediction_fit.disturbance_summary import box, unrecorded
 from diagnosis.search.prediction_fit.fit import fit_predictions, shootings
 from diagnosis.search.prediction_fit.joint_posterior import Posterior
@@ -38,6 +38,7 @@ STEPS = {
 DRAG = -2.0  # N s/m, hidden
 LIGHTLY_DAMPED = -0.62  # N m s/rad, hidden
 DRAGGED = Model({"delta_X_u": DRAG})
+NO_PUSH = Push(np.zeros(3), np.ones(3))
 
 
 def pushed(t, axis, size, seconds=2.0):
@@ -179,7 +180,7 @@ def test_covariance_of_a_windows_mean_is_the_double_integral():
             assert pushes.OF_FORCE[k, lag] == pytest.approx(whole, rel=0.02, abs=1e-6)
     assert (np.diff(pushes.OF_FORCE[:, 0]) > 0.0).all(), "the slower, the less its mean is over a window"
     assert pushes.OF_NOISE[0] == 1.0
-    apart = np.arange(pushes.LAGS + 1) * EVERY >= WIDTH
+    apart = np.arange(pushes.OF_NOISE.size) * EVERY >= WIDTH
     assert pushes.OF_NOISE[apart] == pytest.approx(0.0, abs=1e-4), "windows without a sample in common"
 
 
