@@ -17,8 +17,8 @@ from test_diagnosis_commands import frame
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
 from cosim.process import run_state
-from diagnosis.execution import result_folder
 from diagnosis.execution.result_folder import together
+from fmus import scratch_folder
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
 
@@ -147,7 +147,7 @@ def test_other_threads_hold_nothing():
 
 @pytest.mark.parametrize("step", ["mkdtemp", "rmtree"])
 def test_interrupt_while_folders_come_and_go(step, tmp_path, monkeypatch):
-    home = result_folder if step == "mkdtemp" else result_folder.shutil
+    home = scratch_folder.tempfile if step == "mkdtemp" else scratch_folder.shutil
     original = getattr(home, step)
 
     def interrupted(*args, **kwargs):

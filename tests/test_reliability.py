@@ -20,8 +20,9 @@ import cosim
 from benchmarks.reliability import campaigns, endings, mutations, sanitized
 from benchmarks.reliability.judgement import faults
 from cosim import files
-from cosim.command import LONGEST_WORD, printable
+from cosim.command import printable
 from cosim.results.log import LogWriter
+from fmus.message_text import LONGEST_WORD
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 
@@ -290,13 +291,18 @@ def test_scratch_folders_of_killed_runs_are_swept_and_those_of_others_not(
         text=True,
         check=True,
     )
-    for name in (f"cosim_{ended.stdout.strip()}_a", f"cosim_{os.getpid()}_b", "cosim_mine", "other"):
+    for name in (
+        f"cybership_{ended.stdout.strip()}_a",
+        f"cybership_{os.getpid()}_b",
+        "cybership_mine",
+        "other",
+    ):
         (tmp_path / name).mkdir()
         (tmp_path / name / "file").write_text("")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     cosim.simulate(cosim.load_scenario(ellipse | {"stop": 0.1}), tmp_path / "out")
     left = {path.name for path in tmp_path.iterdir()}
-    assert left == {f"cosim_{os.getpid()}_b", "cosim_mine", "other", "out"}
+    assert left == {f"cybership_{os.getpid()}_b", "cybership_mine", "other", "out"}
 
 
 @pytest.mark.slow

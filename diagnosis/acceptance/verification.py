@@ -7,6 +7,7 @@ from typing import NamedTuple
 from pydantic import TypeAdapter, ValidationError
 
 from cosim import InputError
+from fmus.message_text import first_fault
 
 from ..execution.result_folder import sha256
 from .record_keys import FORM, FileResult, RecordContent
@@ -51,11 +52,7 @@ def _read(path: Path) -> tuple[bytes, RecordContent]:
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise InputError(
-            f"'{path}' is no validation record: {f'{place}: ' if place else ''}{first['msg']}"
-        ) from None
+        raise InputError(f"'{path}' is no validation record: {first_fault(error)}") from None
     if content.form != FORM:
         raise InputError(f"'{path}' is not of the form '{FORM}' but of '{content.form[:40]}'")
     return raw, content

@@ -2,7 +2,6 @@
 
 import hashlib
 import importlib.metadata
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
+from ..scratch_folder import scratch_folder
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ship_description import Description
@@ -93,16 +93,16 @@ def export(
         found = [starts.baked(component) for component in found]
         _tell_unused(starts, [component.name for component in found], of, note)
     files = exported_source(found)
-    with tempfile.TemporaryDirectory(prefix="source_") as work:
+    with scratch_folder() as work:
         for name, text in files.items():
-            Path(work, name).write_text(text, encoding="utf-8")
-        return _placed([Path(work, name) for name in files], folder, overwrite)
+            (work / name).write_text(text, encoding="utf-8")
+        return _placed([work / name for name in files], folder, overwrite)
 
 
 def came_compiled(name: str) -> bool:
     """Whether a compiled FMU of a component came with the package, for this source and computer."""
-    with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-        return released(name, own_source(), native_targets(), Path(work)) is not None
+    with scratch_folder() as work:
+        return released(name, own_source(), native_targets(), work) is not None
 
 
 def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
@@ -179,15 +179,15 @@ def _cached(
         if not is_whole(fmu):
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
-            with tempfile.TemporaryDirectory(prefix="fmu_") as work:
+            with scratch_folder() as work:
                 as_released = starts is None and own_file is None and of is make_ship()
                 if native is None:
-                    built = pack(component, module, own_file, Path(work), of)
-                elif as_released and (fits := released(stem, own_source(), native, Path(work))):
+                    built = pack(component, module, own_file, work, of)
+                elif as_released and (fits := released(stem, own_source(), native, work)):
                     built = fits
                 else:
                     code_hash = hash_of(sources(module, own_file, of), component.starts, of)
-                    built = _compiled(component, code_hash, native, Path(work), python)
+                    built = _compiled(component, code_hash, native, work, python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
                 store(built, fmu)

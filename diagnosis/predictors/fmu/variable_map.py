@@ -26,6 +26,7 @@ from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
 from fmus.base_units import base_exponents
+from fmus.message_text import Location, first_fault
 
 from ...runs import QUANTITY, UNITS, Column, meaning
 from ..black_box import MOTION, POSE, VELOCITY
@@ -103,15 +104,15 @@ def read_map(path: Path) -> VariableMap:
     try:
         return VariableMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part)[:SHOWN] for part in first["loc"])
-        extra = first["type"] == "extra_forbidden" and len(first["loc"]) == 1
-        hint = nearest(str(first["loc"][0]), VariableMap.model_fields) if extra else ""
-        raise InputError(f"'{path}': {place}: {first['msg']}{hint}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def _nearest_key(location: Location) -> str:
+    return nearest(str(location[0]), VariableMap.model_fields) if len(location) == 1 else ""
 
 
 def write_map(path: Path, content: Mapping[str, Any]) -> None:
