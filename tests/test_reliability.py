@@ -17,7 +17,14 @@ from support.project import ROOT
 from test_run import in_a_process as command
 
 import cosim
-from benchmarks.reliability import campaigns, endings, mutations, sanitized
+from benchmarks.reliability import (
+    campaigns,
+    endings,
+    killed_commands,
+    mutations,
+    sanitized,
+    ship_mutations,
+)
 from benchmarks.reliability.judgement import faults
 from cosim import files
 from cosim.command import printable
@@ -374,6 +381,22 @@ def test_campaign_in_small(tmp_path):
     assert campaigns.interrupted_campaigns(2, 2, tmp_path, nothing) == []
     assert campaigns.deaths_elsewhere(4, 2, tmp_path, nothing) == []
     assert campaigns.spoilt_cache(2, 2, tmp_path, nothing) == []
+
+
+@linux_only
+def test_broken_ships_in_small(tmp_path, monkeypatch):
+    monkeypatch.setattr(ship_mutations, "EACH", 1000)  # none but the first is built
+    assert ship_mutations.broken_ships(20, 2, tmp_path, lambda: None) == []
+
+
+@pytest.mark.slow
+@linux_only
+def test_killed_commands_in_small(tmp_path):
+    nothing = lambda: None  # noqa: E731
+    assert killed_commands.interrupted_compares(3, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_diagnoses(4, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(4, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_campaigns(2, 2, tmp_path, nothing) == []
 
 
 @pytest.mark.slow
