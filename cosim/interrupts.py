@@ -29,8 +29,6 @@ __all__ = [
     "SIGNALS",
     "Held",
     "UninterruptedProcesses",
-    "has_interrupted",
-    "hide_lost_interrupts",
     "ignore_interrupts",
     "leave_on_interrupt",
     "on_interrupt",

@@ -85,6 +85,16 @@ def test_temporary_files_of_a_compiler_lie_in_the_folder_of_the_build(tmp_path, 
     assert not list((tmp_path / "temporary").iterdir())
 
 
+def test_a_build_that_takes_long_says_so(tmp_path, monkeypatch):
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    monkeypatch.setattr(building, "LONG", 0.0)
+    notes = []
+    building.build("guidance_ellipse", note=notes.append)
+    assert notes == ["building guidance_ellipse takes longer than 0 s"]
+    building.build("guidance_ellipse", note=notes.append)  # from the cache
+    assert len(notes) == 1
+
+
 def test_a_build_that_is_interrupted_makes_no_folder(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

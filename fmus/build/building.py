@@ -2,9 +2,11 @@
 
 import hashlib
 import importlib.metadata
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 from ..declare import Component, discover
@@ -22,6 +24,9 @@ from .platforms import Native, native_targets
 from .released import released
 from .start_values_file import Starts
 
+# Wall time after which a build says that it takes long [s]; chosen: an FMU takes a second or two, and
+# one that is compiled for all platforms up to ten.
+LONG = 15.0
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
 
 
@@ -179,7 +184,7 @@ def _cached(
         if not is_whole(fmu):
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
-            with scratch_folder() as work:
+            with scratch_folder() as work, _told_if_long(component.name, note):
                 as_released = starts is None and own_file is None and of is make_ship()
                 if native is None:
                     built = pack(component, module, own_file, work, of)
@@ -192,6 +197,18 @@ def _cached(
                     ledger.record(built, cache_folder())
                 store(built, fmu)
     return fmu
+
+
+@contextmanager
+def _told_if_long(name: str, note: Callable[[str], None]) -> Iterator[None]:
+    """Say while an FMU is built that it takes long."""
+    timer = Timer(LONG, note, [f"building {name} takes longer than {LONG:g} s"])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _compiled(
