@@ -42,7 +42,6 @@ DIAGNOSIS_LAYERS = (
     ("predictors",),
     ("search", "assessment"),
     ("verdict",),
-    ("gathering",),
     ("session",),
     ("report",),
     ("analysis",),

@@ -1,6 +1,5 @@
 """Files that appear in a folder together, when all of them are whole, and which folder that is."""
 
-import errno
 import hashlib
 import json
 import os
@@ -19,7 +18,6 @@ from fmus.scratch_folder import Scratch, sweep
 MADE_OF = ".inputs.json"
 LOGS = ("log.csv", "log.parquet")
 NEW = ".new-"  # begins the names of scratch folders
-TRIES = 10  # to make a folder that other commands, which end without a result, remove again; chosen
 
 
 @contextmanager
@@ -77,11 +75,10 @@ def _clean(out: Path) -> None:
 
 def _scratch(out: Path) -> Scratch:
     """A new folder in one that is made if it is not there, though another command may take that away."""
-    for _ in range(TRIES):
+    while True:
         out.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             return Scratch(out, NEW)
-    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
 
 
 def sha256(path: Path) -> str:

@@ -114,13 +114,8 @@ def _worst(
 ) -> Withdrawn | None:
     """The effect without which the data that decide gain the most, of those to reject; None: none is.
 
-    Args:
-        kept: the findings.
-        rests: effect -> the findings without it.
-        data: the data that decide.
-        drive: effects with which the hull drives the ship on.
-        harm: the criterion.
-        sizes: effect -> number of its parameters.
+    Of each effect ``rests`` has the findings without it, ``sizes`` the number of its parameters; with
+    those of ``drive`` the hull drives the ship on.
     """
     others = [_alternative(rest, kept, data.start) for rest in rests.values()]
     full, *losses = data.losses(kept, *others)

@@ -24,8 +24,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
     of cross-validation.
 
     Args:
-        learned: the findings and the model with them.
-        start: the initial model.
+        learned, start: the findings and the model with them, and the initial model.
         validate: validation runs.
     """
     found = [f.share for f in learned.effects]
@@ -39,10 +38,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
 
 
 def unique_shares(
-    learned: Findings,
-    start: Model,
-    train: Sequence[WeakWindows],
-    validate: Sequence[WeakWindows],
+    learned: Findings, start: Model, train: Sequence[WeakWindows], validate: Sequence[WeakWindows]
 ) -> list[float | None]:
     """Share of the first sum of squares that comes back without one finding.
 
@@ -51,8 +47,7 @@ def unique_shares(
     findings that explain the same, neither has a share of its own.
 
     Args:
-        learned: the findings and the model with them.
-        start: the initial model.
+        learned, start: the findings and the model with them, and the initial model.
         train: training runs; they count for what holds in them alone, such as times of failures.
         validate: validation runs; where there are any, they count for all else.
 
