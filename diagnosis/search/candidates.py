@@ -16,7 +16,7 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from .nonlinear.multistart import Landscape, best_values
+from .nonlinear.multistart import Landscape, best_values, limits
 from .nonlinear.segmentation import FLOOR, intervals, problem
 
 # Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
@@ -202,10 +202,9 @@ def scaled(
     Where the force never is, because it saturates, of the value at which it has half of its largest.
     The effect's other parameters are refined as well, from where they are.
     """
-    allowed = next(p.range for p in e.parameters if p.name == name)
     unit, forces_of = model.unit(name), model.ship.scale.forces
-    low = -LARGEST * unit if allowed.min is None else allowed.min
-    high = LARGEST * unit if allowed.max is None else allowed.max
+    allowed = limits(next(p for p in e.parameters if p.name == name))
+    low, high = np.clip(allowed, -LARGEST * unit, LARGEST * unit).tolist()
     wanted = float(np.square(base / forces_of).sum())
     others = {n: model.value(n) for n in e.shape_parameters}
     others |= {n: 0.0 for n in e.coefficients if n != name}

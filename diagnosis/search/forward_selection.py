@@ -35,12 +35,7 @@ class ForwardSelection:
     name = "selection"
 
     def fit(
-        self,
-        runs: Sequence[WeakWindows],
-        model: Model,
-        prior: Prior,
-        advance: Advance,
-        seed: int,
+        self, runs: Sequence[WeakWindows], model: Model, prior: Prior, advance: Advance, seed: int
     ) -> Findings:
         """The effects that a model lacks, see :class:`.methods.Method`."""
         rng = np.random.default_rng(seed)
@@ -70,11 +65,7 @@ class ForwardSelection:
 
 
 def search(
-    data: Sequence[WeakWindows],
-    prior: Prior,
-    start: Model,
-    advance: Advance,
-    rng: np.random.Generator,
+    data: Sequence[WeakWindows], prior: Prior, start: Model, advance: Advance, rng: np.random.Generator
 ) -> Selection:
     """All effects that a regression finds; arguments as of :class:`.methods.Method`."""
     belief = NominalPrior.of(start, prior, MEASURED)

@@ -38,12 +38,7 @@ class Method(Protocol):
     name: str
 
     def fit(
-        self,
-        runs: "Sequence[WeakWindows]",
-        model: "Model",
-        prior: "Prior",
-        advance: Advance,
-        seed: int,
+        self, runs: "Sequence[WeakWindows]", model: "Model", prior: "Prior", advance: Advance, seed: int
     ) -> "Findings":
         """The effects that a model lacks.
 

@@ -65,7 +65,9 @@ def features(data: Sequence[WeakWindows], model: Model) -> Features:
     names: list[str] = []
     for c in candidates(data, model, base):
         stacked = [_stacked(s, sigma) for s in c.shapes]
-        best = int(np.argmax([_alone(x[:, 0], target) for x in stacked]))
+        norms = [max(float(np.linalg.norm(x[:, 0])), np.finfo(float).tiny) for x in stacked]
+        explained = [abs(x[:, 0] @ target) / norm for x, norm in zip(stacked, norms, strict=True)]
+        best = int(np.argmax(explained))
         shape = c.shapes[best]
         chosen.append((c, shape))
         columns.append(stacked[best])
@@ -89,11 +91,6 @@ def _stacked(shape: Shape, sigma: np.ndarray) -> np.ndarray:
     return stacked.reshape(-1, stacked.shape[2])
 
 
-def _alone(column: np.ndarray, target: np.ndarray) -> float:
-    """How much of the target a column explains by itself."""
-    return abs(float(column @ target)) / max(float(np.linalg.norm(column)), np.finfo(float).tiny)
-
-
 class Peer(ABC):
     """Identification by the coefficients of one regression on all candidates.
 
@@ -112,12 +109,7 @@ class Peer(ABC):
         """Coefficients (p,) of standardised regressors (n, p) for a target (n,)."""
 
     def fit(
-        self,
-        runs: Sequence[WeakWindows],
-        model: Model,
-        prior: Prior,
-        advance: Advance,
-        seed: int,
+        self, runs: Sequence[WeakWindows], model: Model, prior: Prior, advance: Advance, seed: int
     ) -> Findings:
         """The effects that a model lacks, see :class:`.methods.Method`; prior and seed are not used."""
         advance("every effect as a candidate")

@@ -21,6 +21,7 @@ from ..predictors.weak_form import OVERLAP
 from .candidates import SMALL, Shape, model_error
 from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
+from .nonlinear.multistart import limits
 from .nonlinear.segmentation import likely, problem, segmented
 from .prior import NominalPrior
 
@@ -120,9 +121,7 @@ def timed(ship: Ship, name: str) -> Effect | None:
 
 def bounded(start: Model, name: str, addition: float) -> float:
     """An addition to a parameter of a model, with which it stays within its range."""
-    limits, present = start.declared(name).range, start.value(name)
-    low = -np.inf if limits.min is None else limits.min
-    high = np.inf if limits.max is None else limits.max
+    (low, high), present = limits(start.declared(name)), start.value(name)
     return min(max(addition, low - present), high - present)
 
 
@@ -135,8 +134,8 @@ def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[
         return []
 
     def at(name: str) -> bool:
-        limits, value = start.declared(name).range, start.value(name) + additions[name]
-        return any(end and abs(value - end) <= NEAR_LIMIT * abs(end) for end in (limits.min, limits.max))
+        ends, value = limits(start.declared(name)), start.value(name) + additions[name]
+        return any(0.0 < abs(x) < np.inf and abs(value - x) <= NEAR_LIMIT * abs(x) for x in ends)
 
     return [name for name in additions if at(name)]
 

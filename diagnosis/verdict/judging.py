@@ -136,8 +136,8 @@ def judge(
     learned = with_confidence(fit.findings, remainder, start)
     explained = shares(learned, start, data.validate)
     alone = unique_shares(learned, start, train, data.validate)
-    found = learned, withdrawn, remainder, refitted, dropped, explained, alone
-    return Verdict(*found, fit.posterior, fit.unrecorded)
+    known, force = fit.posterior, fit.unrecorded
+    return Verdict(learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force)
 
 
 def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Findings:

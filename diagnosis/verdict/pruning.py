@@ -58,7 +58,8 @@ def prune(
     kept, left = found, judged
     while left:
         rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
-        on = {i for i, rest in rests.items() if drives(kept.model, _model(rest, start))}
+        models = {i: rest.model if rest.effects else start for i, rest in rests.items()}
+        on = {i for i, model in models.items() if drives(kept.model, model)}
         worst = _at_limit(kept, left, start) or _worst(kept, rests, data, on, harm, sizes)
         if worst is None:
             break
@@ -129,10 +130,6 @@ def _worst(
             continue
         found.append((gain(full, other), Withdrawn(i, reason)))
     return max(found)[1] if found else None
-
-
-def _model(found: Findings, start: Model) -> Model:
-    return found.model if found.effects else start
 
 
 def without(found: Findings, ids: Sequence[str], start: Model) -> Findings:

@@ -13,10 +13,6 @@ def _squares(runs: Sequence[WeakWindows], model: Model, sigma: np.ndarray) -> fl
     return sum(float(np.sum((omega(w, model) / sigma) ** 2)) for w in runs)
 
 
-def _within(share: float) -> float:
-    return min(1.0, max(0.0, share))
-
-
 def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:
     """Share of the initial sum of squares that each finding explains.
 
@@ -34,7 +30,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
         unseen = (-np.diff(sums) / sums[0]).tolist()
         pairs = zip(learned.effects, unseen, strict=True)
         found = [f.share if f.of_runs else share for f, share in pairs]
-    return [_within(share) for share in found]
+    return np.clip(found, 0.0, 1.0).tolist()
 
 
 def unique_shares(
@@ -64,7 +60,7 @@ def unique_shares(
         if fitted and not others.plausible:
             without = learned.model.plus({name: -value for name, value in finding.values.items()})
         left, now, first = (_squares(runs, m, learned.sigma) for m in (without, learned.model, start))
-        return _within((left - now) / first)
+        return float(np.clip((left - now) / first, 0.0, 1.0))
 
     found: list[float | None] = []
     for finding in learned.effects:

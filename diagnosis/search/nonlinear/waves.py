@@ -20,8 +20,8 @@ from ...predictors import Model
 from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
 from ...runs import Motion, Run, Smoothed, without_commands
-from ...runs.thinning import LONGEST
 from ..map_regression import REPLICATES
+from .segmentation import CELL
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
@@ -71,8 +71,8 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     if not left or not noise:
         return None
     time = model.ship.scale.time
-    frequency, segments = segments_of(left, LONGEST * time)
-    floor = segments_of(noise, LONGEST * time)[1].mean(axis=-1)
+    frequency, segments = segments_of(left, CELL * time)
+    floor = segments_of(noise, CELL * time)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
     white = np.mean([part[2] for part in parts], axis=0)
     follows = followed(frequency, floor, white, model.reference_mass)
@@ -101,7 +101,7 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    run, time, step = smoothed.track.run, smoothed.time, LONGEST * smoothed.scale.time
+    run, time, step = smoothed.track.run, smoothed.time, CELL * smoothed.scale.time
     motion = without_commands(smoothed)
     error, noise = model_error(run, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
@@ -114,7 +114,7 @@ def _signals(
 
 def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (m,) [Hz], and spectra (m, 3, segments) of signals (n, 3), a row each ``step`` [s]."""
-    length = round(SEGMENT / LONGEST)
+    length = round(SEGMENT / CELL)
     found = [spectra(x, step, length) for x in parts]
     return np.fft.rfftfreq(length, step), np.concatenate(found, axis=-1)
 
@@ -221,7 +221,7 @@ def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarr
     found = []
     for first, end in edges.reshape(-1, 2):
         even = np.arange(float(time[first]), float(time[end - 1]), step)
-        if even.size <= SEGMENT / LONGEST:  # one is lost by the difference
+        if even.size <= SEGMENT / CELL:  # one is lost by the difference
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)

@@ -73,10 +73,7 @@ class Unrecorded:
 
 
 def unrecorded(
-    runs: Sequence[WeakWindows],
-    model: Model,
-    push: Push,
-    differing: Mapping[str, tuple[float, float]],
+    runs: Sequence[WeakWindows], model: Model, push: Push, differing: Mapping[str, tuple[float, float]]
 ) -> Unrecorded:
     """What acts unrecorded in runs that a model was fitted to; push and differing as in the result."""
     left = [omega(w, model) for w in runs]

@@ -113,11 +113,7 @@ class PredictionFit:
     """
 
     def __init__(
-        self,
-        runs: Sequence[WeakWindows],
-        windows: Sequence[Shooting],
-        at: Estimate,
-        prior: NominalPrior,
+        self, runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
     ) -> None:
         self.runs, self.prior, self.windows = runs, prior, windows
         self.assumed = Push(np.zeros_like(runs[0].smoothed.noise), np.ones_like(runs[0].smoothed.noise))
