@@ -146,7 +146,8 @@ def _special(kind: str, location: Location, value: Any) -> str:
 
 def _nearest_key(location: Location) -> str:
     """A hint at the keys that are allowed in the place of an unknown one."""
-    first = location[0] if len(location) > 1 else ""
+    *before, last = location
+    first = before[0] if before else ""
     classes: dict[int | str, type[BaseModel]] = {
         "fmus": FmuEntry,
         "events": Event,
@@ -155,8 +156,8 @@ def _nearest_key(location: Location) -> str:
         "recordings": Recording,
         "roles": Roles,
         "transformations": Transformation,
-        "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),
+        "faults": faults.KINDS.get(str(before[-1]) if before else "", faults.Fault),
     }
     fields = classes.get(first, Scenario).model_fields
     known = [field.alias or name for name, field in fields.items()]
-    return nearest(str(location[-1]), known)
+    return nearest(str(last), known)
