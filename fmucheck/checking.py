@@ -14,6 +14,7 @@ from pathlib import Path
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
 from fmus.interruption import program
+from fmus.message_text import printable
 
 from .examine import examine
 from .fmu import Fmu
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(error: Exception) -> int:
-    print("error:", " ".join(str(error).split()), file=sys.stderr)
+    print("error:", printable(str(error)), file=sys.stderr)
     return BAD_INPUT
 
 

@@ -1,7 +1,6 @@
 """What counts as agreement, written down before anybody looks: the file of ``--criteria``."""
 
 import json
-from collections.abc import Sequence
 from datetime import datetime, timezone
 from hashlib import sha256
 from pathlib import Path
@@ -20,6 +19,7 @@ from pydantic import (
 
 from cosim import InputError
 from cosim.errors import nearest
+from fmus.message_text import Location, first_fault
 
 from ..runs import UNITS
 
@@ -140,7 +140,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
         changed, text = path.stat().st_mtime, path.read_bytes()
         content = Criteria.model_validate(json.loads(text))
     except ValidationError as error:
-        raise InputError(f"'{path}': {_told(error)}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key, special=_special)}") from None
     except FileNotFoundError:
         raise InputError(f"no such criteria: '{path}'; cybership criteria prints some") from None
     except RecursionError:
@@ -160,16 +160,14 @@ def _stamp(time: datetime) -> str:
     return time.isoformat(timespec="seconds")
 
 
-def _told(error: ValidationError) -> str:
-    first = error.errors()[0]
-    loc = [*map(str, first["loc"])]
-    text = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        known: Sequence[str] = [*(Criteria if len(loc) == 1 else Criterion).model_fields]
-        text = f"no such key{nearest(loc[-1], known)}"
-    elif first["type"] == "literal_error" and loc[-1] == "quantity":
-        text = f"{shortened(first['input'])} cannot be judged{nearest(str(first['input']), JUDGED)}"
-    return "".join(f"{shortened(part)[1:-1]}." for part in loc)[:-1] + f": {text}" if loc else text
+def _nearest_key(location: Location) -> str:
+    return nearest(str(location[-1]), (Criteria if len(location) == 1 else Criterion).model_fields)
+
+
+def _special(kind: str, location: Location, value: object) -> str:
+    if kind == "literal_error" and location[-1] == "quantity":
+        return f"'{value}' cannot be judged{nearest(str(value), JUDGED)}"
+    return ""
 
 
 def template() -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from pydantic import BaseModel, ValidationError
 
 from cosim import InputError
+from fmus.message_text import first_fault
 
 from ..execution.result_folder import sha256
 from .record_keys import FORM
@@ -62,9 +63,7 @@ def _read(path: Path) -> tuple[bytes, Record]:
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        place = "".join(f"{part}: " for part in first["loc"])
-        raise InputError(f"'{path}' is no validation record: {place}{first['msg']}") from None
+        raise InputError(f"'{path}' is no validation record: {first_fault(error)}") from None
     if content.form != FORM:
         raise InputError(f"'{path}' is not of the form '{FORM}' but of '{content.form[:40]}'")
     return raw, content

@@ -14,6 +14,7 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
 from cosim.interrupts import Held
+from fmus.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
 
 from ..execution.progress import Advance, progress
@@ -224,6 +225,7 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
+    sweep()
     with Held() as interrupts:
         interrupts.allow()
         try:

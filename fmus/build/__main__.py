@@ -15,6 +15,8 @@ from pathlib import Path
 from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD
 from ..interruption import program, run_interruptible
+from ..message_text import printable
+from ..scratch_folder import sweep
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ships.naming import described_ship
@@ -96,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):
         parser.error("--target and --source need --native")
+    sweep()
     try:
         effects = STANDARD
         for file in options.effects:
@@ -122,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (BuildError, DeclarationError, OSError) as error:
-        print("error:", " ".join(str(error).split()), file=sys.stderr)
+        print("error:", printable(str(error)), file=sys.stderr)
         return 2
     return 0
 
@@ -168,7 +171,7 @@ def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
 
 
 def _note(text: str) -> None:
-    print("note:", text, file=sys.stderr)
+    print("note:", printable(text), file=sys.stderr)
 
 
 def _limits(allowed: Range) -> str:

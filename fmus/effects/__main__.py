@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..declare import DeclarationError, Variable
 from ..interruption import program
+from ..message_text import printable
 from . import STANDARD
 from .effect import Effect
 from .effect_set import EffectSet
@@ -81,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for file in parser.parse_args(arguments).files:
             effects = effects.plus_file(file)
     except DeclarationError as error:
-        print("error:", error, file=sys.stderr)
+        print("error:", printable(str(error)), file=sys.stderr)
         return 2
     print(table(effects), end="")
     return 0

@@ -20,6 +20,7 @@ from ..declare import DeclarationError, Range, Variable, nearest, parameters_of,
 from ..effects.all_thrusters import LONGEST
 from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
+from ..message_text import Location, brief, first_fault
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
 from .hull_errors import WIND_SETTINGS
@@ -130,7 +131,7 @@ def _read(path: Path, _changed: int) -> Description:
     try:
         return _description(table)
     except DeclarationError as error:
-        raise DeclarationError(f"'{path}': {error}") from None
+        raise DeclarationError(f"'{path}': {brief(str(error))}") from None
 
 
 def _toml(path: Path) -> Any:
@@ -142,17 +143,16 @@ def _toml(path: Path) -> Any:
         import tomli as tomllib  # pyright: ignore[reportMissingImports]
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, OSError) as error:
-        raise DeclarationError(f"'{path}' cannot be read as TOML: {error}") from None
+    except (ValueError, RecursionError, OSError) as error:  # ValueError also of a number of 5,000 digits
+        raise DeclarationError(f"'{path}' cannot be read as TOML: {brief(str(error))}") from None
 
 
 def _told(error: ValidationError) -> str:
-    """A fault of a file in a line, with the nearest right key; keys that are not known come first."""
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    what, at = faults[0], faults[0]["loc"]
-    place = ".".join(str(part)[:40] for part in at if part not in ("number", "table"))
-    if what["type"] != "extra_forbidden":
-        return f"{place}: {what['msg'].removeprefix('Value error, ')}".removeprefix(": ")
+    """A fault of a file in a line, with the nearest right key."""
+    return first_fault(error, _nearest_key, lambda part: part in ("number", "table"))
+
+
+def _nearest_key(at: Location) -> str:
     table: type[BaseModel] = ShipTable
     if at[-2:-1] == ("table",):
         table = Number
@@ -160,7 +160,7 @@ def _told(error: ValidationError) -> str:
         table = Term
     elif at[0] == "hull":
         table = HullTable
-    return f"unknown key '{place}'{nearest(str(at[-1]), table.model_fields)}"
+    return nearest(str(at[-1]), table.model_fields)
 
 
 def _description(table: ShipTable) -> Description:

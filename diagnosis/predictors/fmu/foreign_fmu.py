@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from weakref import finalize
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from cosim.export import export_fmu
 from cosim.fmu import Model as FmuModel
 from cosim.system import prepare
 from fmus.frames import rotate_to_body
+from fmus.scratch_folder import Scratch
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
@@ -56,8 +57,9 @@ class Fmu:
     ) -> None:
         self._given = self.path = Path(path).absolute()
         if self.path.suffix in SYSTEMS:
-            self._made = TemporaryDirectory(prefix="cosim_")
-            self.path = _as_one(self._given, Path(self._made.name))
+            self._made = Scratch()
+            finalize(self, self._made.remove)
+            self.path = _as_one(self._given, self._made.path)
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)

@@ -18,7 +18,6 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from reprlib import repr as shown
 from typing import Annotated, Any
 
 from pydantic import (
@@ -36,6 +35,7 @@ from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
 from fmus.addition import Line
 from fmus.base_units import base_exponents
+from fmus.message_text import Location, first_fault
 
 from ...runs import QUANTITY, UNITS, Column, meaning
 from ..black_box import MOTION, POSE, VELOCITY
@@ -113,15 +113,15 @@ def read_map(path: Path) -> VariableMap:
     try:
         return VariableMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        extra = first["type"] == "extra_forbidden" and len(first["loc"]) == 1
-        hint = nearest(str(first["loc"][0]), VariableMap.model_fields) if extra else ""
-        raise InputError(f"'{path}': {place}: {first['msg']}{hint}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def _nearest_key(location: Location) -> str:
+    return nearest(str(location[0]), VariableMap.model_fields) if len(location) == 1 else ""
 
 
 def write_map(path: Path, content: Mapping[str, Any]) -> None:
@@ -193,12 +193,12 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
                 raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable {shown(column.name)}{hint}")
+                raise InputError(f"{place}: the FMU has no such variable '{column.name}'{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: {shown(column.unit)} is no unit of {signal}{hint}")
+                raise InputError(f"{place}: '{column.unit}' is no unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 

@@ -24,14 +24,13 @@ from .variable_map import VariableMap
 FOREIGN, ADDED = "model", "found"  # instances of the container
 
 NONE = "No FMU with what was found is written"
-SOURCE = '''"""What was found beside {name}."""
-
+SOURCE = """# What was found beside {name!r}.
 from fmus.addition import Line, addition
 from fmus.ship import ship
 from fmus.ship_description import Description, Part, Value
 
 COMPONENT = addition(ship(description={description!r}), {arguments})
-'''
+"""
 
 
 class Wrapped(NamedTuple):

@@ -42,6 +42,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
+from fmus.message_text import Location, first_fault
 
 from .unit_check import UNITS
 
@@ -221,11 +222,7 @@ def layout_of(
     try:
         return Layout.model_validate({"columns": columns})
     except ValidationError as error:
-        raise InputError(f"{where}: {_text(error)}") from None
-
-
-def _text(error: ValidationError) -> str:
-    return error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise InputError(f"{where}: {first_fault(error)}") from None
 
 
 def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
@@ -254,15 +251,16 @@ def read_layout(path: Path) -> Layout | None:
     try:
         return Layout.model_validate(json.loads(beside.read_text(encoding="utf-8")))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(shown(part).strip("'") for part in first["loc"])
-        known = Column.model_fields if "columns" in first["loc"] else Layout.model_fields
-        hint = nearest(str(first["loc"][-1]), known) if first["type"] == "extra_forbidden" else ""
-        raise InputError(f"'{beside}': {place}: {_text(error)}{hint}") from None
+        raise InputError(f"'{beside}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
         raise InputError(f"'{beside}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{beside}' cannot be read: {error}") from None
+
+
+def _nearest_key(location: Location) -> str:
+    known = Column.model_fields if "columns" in location else Layout.model_fields
+    return nearest(str(location[-1]), known)
 
 
 def signals(
