@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from rich.console import Console
 
-from fmus.message_text import printable as printable
+from cybership.message_text import printable as printable
 
 from .interrupts import (
     INTERRUPTED,

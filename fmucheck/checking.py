@@ -11,10 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
+from cybership.message_text import printable
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
 from fmus.interruption import program
-from fmus.message_text import printable
 
 from .examine import examine
 from .fmu import Fmu

@@ -11,10 +11,10 @@ import zipfile
 import pytest
 from support.project import ROOT
 
+from cybership.scratch_folder import scratch_folder
 from fmus import interruption
 from fmus.build import building
 from fmus.native import compilers
-from fmus.scratch_folder import scratch_folder
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no signals to send")
 

@@ -24,12 +24,12 @@ from support.shared import once
 
 import diagnosis
 from cosim import InputError
+from cybership import scratch_folder
 from diagnosis import compare, learn, session
 from diagnosis.assessment.stability import OPERATING, least_dissipation
 from diagnosis.execution.result_folder import together
 from diagnosis.predictors import DescribedShip
 from diagnosis.report.formatting import finite
-from fmus import scratch_folder
 from fmus.effects import STANDARD
 from fmus.ship import ship
 

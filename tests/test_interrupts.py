@@ -18,8 +18,8 @@ from test_diagnosis_commands import frame
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
 from cosim.process import run_state
+from cybership import scratch_folder
 from diagnosis.execution.result_folder import default_folder, together
-from fmus import scratch_folder
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
 

@@ -6,7 +6,14 @@ from typing import Annotated
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from fmus.message_text import LONGEST_FAULT, LONGEST_VALUE, LONGEST_WORD, brief, first_fault, printable
+from cybership.message_text import (
+    LONGEST_FAULT,
+    LONGEST_VALUE,
+    LONGEST_WORD,
+    brief,
+    first_fault,
+    printable,
+)
 
 
 class Inner(BaseModel):

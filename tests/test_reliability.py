@@ -29,7 +29,7 @@ from benchmarks.reliability.judgement import faults
 from cosim import files
 from cosim.command import printable
 from cosim.results.log import LogWriter
-from fmus.message_text import LONGEST_WORD
+from cybership.message_text import LONGEST_WORD
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, ValidationError, field_validator, model_validator
 
-from fmus.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault
 
 from ..errors import InputError, nearest
 from ..scenario.load import load_scenario

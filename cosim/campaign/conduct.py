@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
-from fmus.scratch_folder import sweep
+from cybership.scratch_folder import sweep
 
 from ..compiled.library import kind_of, prepare_library
 from ..dispatch.job import Job, Row

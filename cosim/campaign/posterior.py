@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from fmus.message_text import first_fault
+from cybership.message_text import first_fault
 
 from ..errors import InputError
 

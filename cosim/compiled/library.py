@@ -24,7 +24,7 @@ from typing import NamedTuple
 from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
-from fmus.scratch_folder import environment_with, scratch_folder
+from cybership.scratch_folder import environment_with, scratch_folder
 
 from .cache_entry import is_whole, make_folder, refusal, store
 

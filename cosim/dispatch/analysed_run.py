@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.scratch_folder import sweep
+from cybership.scratch_folder import sweep
 
 from ..errors import InputError, SimulationError
 from ..master.simulation import simulate

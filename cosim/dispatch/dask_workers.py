@@ -24,7 +24,7 @@ from distributed import (
 )
 from distributed.deploy.spec import close_clusters
 
-from fmus.scratch_folder import Scratch
+from cybership.scratch_folder import Scratch
 
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
-from fmus.scratch_folder import scratch_folder
+from cybership.scratch_folder import scratch_folder
 
 from ..compiled.library import prepare_library
 from ..errors import SimulationError

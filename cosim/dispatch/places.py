@@ -4,7 +4,7 @@ import re
 from collections.abc import Generator, Iterable
 from typing import Protocol
 
-from fmus.scratch_folder import Scratch
+from cybership.scratch_folder import Scratch
 
 from ..errors import InputError
 from .job import Job, Row

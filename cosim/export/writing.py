@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from fmus.scratch_folder import Scratch, sweep
+from cybership.scratch_folder import Scratch, sweep
 
 from ..errors import InputError
 from ..formats.namespaces import OSP_STRUCTURE

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription, read_model_description
 
-from fmus.scratch_folder import Scratch
+from cybership.scratch_folder import Scratch
 
 from ..conversion import BASE_UNITS, Unit
 from ..errors import InputError

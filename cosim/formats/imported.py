@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fmus.scratch_folder import Scratch
+from cybership.scratch_folder import Scratch
 
 
 class Unpacked:

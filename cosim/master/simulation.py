@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from fmus.scratch_folder import sweep
+from cybership.scratch_folder import sweep
 
 from ..compiled.library import prepare_library
 from ..errors import InputError, SimulationError

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from fmus.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault
 
 from ..errors import InputError, most_alike, nearest
 from ..formats.systems import is_system, read_system

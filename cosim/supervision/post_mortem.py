@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fmus.scratch_folder import is_scratch, sweep
+from cybership.scratch_folder import is_scratch, sweep
 
 from ..command import FAILED, INTERRUPTED, complain
 from ..files import update_json, write_json

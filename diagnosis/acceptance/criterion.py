@@ -19,7 +19,7 @@ from pydantic import (
 
 from cosim import InputError
 from cosim.errors import nearest
-from fmus.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault
 
 from ..runs import UNITS
 

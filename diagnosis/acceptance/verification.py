@@ -6,7 +6,7 @@ from typing import NamedTuple
 from pydantic import BaseModel, ValidationError
 
 from cosim import InputError
-from fmus.message_text import first_fault
+from cybership.message_text import first_fault
 
 from ..execution.result_folder import sha256
 from .record_keys import FORM

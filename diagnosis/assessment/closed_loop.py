@@ -13,7 +13,7 @@ from itertools import takewhile
 from math import inf
 from typing import Any, NamedTuple
 
-from cosim.scenario.shipped import find_scenario
+from cosim.scenario import find_scenario
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs as ControllerInputs
 from fmus.declare import Component, flatten, rebuild

@@ -14,7 +14,7 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
 from cosim.interrupts import Held
-from fmus.scratch_folder import sweep
+from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
 
 from ..execution.progress import Advance, progress

@@ -12,7 +12,7 @@ from cosim import InputError
 from cosim.command import complain
 from cosim.interrupts import Held
 from cosim.process import STATE
-from fmus.scratch_folder import Scratch, sweep
+from cybership.scratch_folder import Scratch, sweep
 
 # In a folder that nobody chose: the hashes of what the result there was made of.
 MADE_OF = ".inputs.json"

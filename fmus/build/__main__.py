@@ -12,11 +12,12 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from cybership.message_text import printable
+from cybership.scratch_folder import sweep
+
 from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD
 from ..interruption import program, run_interruptible
-from ..message_text import printable
-from ..scratch_folder import sweep
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ships.naming import described_ship

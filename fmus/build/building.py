@@ -9,9 +9,10 @@ from pathlib import Path
 from threading import Timer
 from typing import Any
 
+from cybership.scratch_folder import scratch_folder
+
 from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
-from ..scratch_folder import scratch_folder
 from ..ship import Ship
 from ..ship import ship as make_ship
 from ..ship_description import Description

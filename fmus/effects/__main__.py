@@ -5,9 +5,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from cybership.message_text import printable
+
 from ..declare import DeclarationError, Variable
 from ..interruption import program
-from ..message_text import printable
 from . import STANDARD
 from .effect import Effect
 from .effect_set import EffectSet

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..scratch_folder import environment_with
+from cybership.scratch_folder import environment_with
 
 NO_ZIG = "needs zig: pip install 'cybership[native]'"
 OPTIONS = (

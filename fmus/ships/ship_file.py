@@ -14,13 +14,14 @@ from pydantic import (
     ValidationError,
 )
 
+from cybership.message_text import Location, brief, first_fault
+
 from ..actuators import actuation as actuation  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
 from ..effects.all_thrusters import LONGEST
 from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
-from ..message_text import Location, brief, first_fault
 from ..scale import REFERENCE_LENGTH, Scale
 from ..ship_description import Description, Part, Value
 from .hull_errors import WIND_SETTINGS

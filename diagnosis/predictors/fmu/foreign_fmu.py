@@ -13,8 +13,8 @@ import cosim
 from cosim.export import export_fmu
 from cosim.fmu import Model as FmuModel
 from cosim.system import prepare
+from cybership.scratch_folder import Scratch
 from fmus.frames import rotate_to_body
-from fmus.scratch_folder import Scratch
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent

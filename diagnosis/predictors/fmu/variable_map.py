@@ -33,9 +33,9 @@ from pydantic import (
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
+from cybership.message_text import Location, first_fault
 from fmus.addition import Line
 from fmus.base_units import base_exponents
-from fmus.message_text import Location, first_fault
 
 from ...runs import QUANTITY, UNITS, Column, meaning
 from ..black_box import MOTION, POSE, VELOCITY

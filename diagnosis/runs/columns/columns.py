@@ -42,7 +42,7 @@ from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
-from fmus.message_text import Location, first_fault
+from cybership.message_text import Location, first_fault
 
 from .unit_check import UNITS
 
