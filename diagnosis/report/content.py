@@ -15,7 +15,7 @@ from typing_extensions import deprecated
 from ..assessment.regions import ErrorRegions
 from ..predictors.evaluation import Evaluation
 from ..predictors.ship_model import parameter_and_run
-from ..search.most_likely import NORMAL_95
+from ..runs.cleaning import Z95
 from ..session import Comparison, Diagnosis
 from .formatting import as_json, finite
 from .headline import headline
@@ -182,7 +182,7 @@ def coefficients(diagnosis: Diagnosis) -> Iterator[CoefficientChange]:
         before, after = start.value(name), model.value(name)
         if before == after == 0.0:
             continue
-        half = NORMAL_95 * std[name] if name in std else None
+        half = Z95 * std[name] if name in std else None
         yield CoefficientChange(
             f"{start.owner(parameter_and_run(name)[0])}.{name}",
             start.declared(name).unit,

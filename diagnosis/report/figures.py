@@ -9,8 +9,8 @@ from cosim.results import thin
 from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
 from ..assessment.regions import Profile
 from ..predictors.evaluation import Evaluation
+from ..runs.cleaning import Z95
 from ..search.findings import Ranked
-from ..search.most_likely import NORMAL_95
 from ..search.shortlist import TIE
 from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Axis, Chart, Panel
 from .formatting import percent
@@ -43,7 +43,7 @@ def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> Chart:
         t, y = interrupted(np.column_stack([time, measured])[rows], segment[rows]).T
         panel = Panel(Axis("time [s]", shown=axis == 2), Axis(label), zero=True)
         if std is not None:
-            half = NORMAL_95 * interrupted(std[rows, axis], segment[rows])
+            half = Z95 * interrupted(std[rows, axis], segment[rows])
             panel.fill(t, y - half, y + half, BAND, "uncertainty, 95 %")
         panel.draw(t, y, BEFORE, "measured")
         if learned:

@@ -18,6 +18,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Annotated, Any
 
 from pydantic import (
@@ -38,7 +39,6 @@ from fmus.base_units import base_exponents
 from fmus.message_text import Location, first_fault
 
 from ...runs import QUANTITY, UNITS, Column, meaning
-from ...runs.columns.columns import SHOWN
 from ..black_box import MOTION, POSE, VELOCITY
 
 PROPOSED = ("inputs", "outputs", "start")
@@ -189,17 +189,17 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
         variables = {v.name: v for v in _candidates(model, group)}
         found[group] = dict(given.fixed) if group == "outputs" else {}
         for signal, column in given.told(group).items():
-            place = f"{where}: {group}.{signal[:SHOWN]}"
+            place = f"{where}: {group}.{signal}"
             if signal not in known:
                 raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable '{column.name[:SHOWN]}'{hint}")
+                raise InputError(f"{place}: the FMU has no such variable {shown(column.name)}{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: '{column.unit[:SHOWN]}' is no unit of {signal}{hint}")
+                raise InputError(f"{place}: {shown(column.unit)} is no unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 

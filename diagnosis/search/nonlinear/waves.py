@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 from fmus.vessel.vessel import State
@@ -40,7 +41,8 @@ class Waves:
         peak: frequency [rad/s].
         force: standard deviation of the horizontal force around the peak [N].
         share: of the model error's power, on the axis where they stand out most.
-        confidence: share of bootstrap replicates in which they stand out.
+        confidence: share of bootstrap replicates in which they stand out; at most (n + 1) / (n + 2) of n
+            segments (rule of succession): what was seen in few of them may be by chance.
     """
 
     peak: float
@@ -93,7 +95,7 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        float(np.mean(heights >= least)),
+        min(float(np.mean(heights >= least)), (count + 1) / (count + 2)),
     )
 
 
@@ -115,25 +117,8 @@ def _signals(
 def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (m,) [Hz], and spectra (m, 3, segments) of signals (n, 3), a row each ``step`` [s]."""
     length = round(SEGMENT / CELL)
-    found = [spectra(x, step, length) for x in parts]
+    found = [spectrogram(x, 1.0 / step, nperseg=length, axis=0, detrend="linear")[2] for x in parts]
     return np.fft.rfftfreq(length, step), np.concatenate(found, axis=-1)
-
-
-def spectra(x: np.ndarray, step: float, length: int) -> np.ndarray:
-    """One-sided power spectral density (m, 3, segments) of a signal (n, 3).
-
-    Segments overlap by an eighth, are without their linear trend, and tapered over a quarter (Tukey), as
-    those of ``scipy.signal.spectrogram``, which takes longer to import than waves take to look for.
-    """
-    t = np.arange(length)
-    window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(1.0, 8.0 * np.minimum(t, length - t) / length))
-    parts = sliding_window_view(x, length, axis=0)[:: length - length // 8]
-    t = t - t.mean()
-    parts = parts - parts.mean(axis=-1, keepdims=True)
-    parts = parts - (parts @ t / (t @ t))[..., None] * t
-    power = np.abs(np.fft.rfft(parts * window)) ** 2 * step / (window @ window)
-    power[..., 1 : (length + 1) // 2] *= 2.0
-    return power.T
 
 
 def followed(
@@ -149,7 +134,7 @@ def followed(
     """
     level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
     whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
-    share = running_median(noise[1:] / whole[1:], 2)
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
     low = share < 0.25  # half of a motion is a quarter of its power
     corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
     return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
@@ -170,35 +155,16 @@ def peak(
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
         band, around: (m, 3), where a peak counts, and width of the spectrum around [Hz].
     """
-    reach = int(around / frequency[1] / 2.0)
+    width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
-    level = floor * running_median(power / floor, reach)
+    level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
     above = np.zeros_like(band)
     for axis, spectrum in enumerate(np.log(np.maximum(power, np.finfo(float).tiny)).T):
-        above[prominent(spectrum, np.log(PEAK)), axis] = True
+        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
     height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
-
-
-def running_median(x: np.ndarray, reach: int) -> np.ndarray:
-    """Median (m, 3) of each value of x (m, 3) and those up to ``reach`` rows away; the ends go on."""
-    longer = np.pad(x, ((reach, reach), (0, 0)), mode="edge")
-    return np.median(sliding_window_view(longer, 2 * reach + 1, axis=0), axis=-1)
-
-
-def prominent(x: np.ndarray, least: float) -> list[int]:
-    """Rows of the maxima of x (m,) from which one must go down by ``least`` to get to a higher one."""
-    found = []
-    for k in 1 + np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])):
-        higher = np.flatnonzero(x > x[k])
-        before, after = higher[higher < k], higher[higher > k]
-        left = x[before[-1] if before.size else 0 : k].min()
-        right = x[k : after[0] if after.size else None].min()
-        if x[k] - max(left, right) >= least:
-            found.append(int(k))
-    return found
 
 
 def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
