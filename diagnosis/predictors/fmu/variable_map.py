@@ -18,6 +18,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Annotated, Any
 
 from pydantic import (
@@ -193,12 +194,12 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
                 raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable '{column.name}'{hint}")
+                raise InputError(f"{place}: the FMU has no such variable {shown(column.name)}{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: '{column.unit}' is no unit of {signal}{hint}")
+                raise InputError(f"{place}: {shown(column.unit)} is no unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 
