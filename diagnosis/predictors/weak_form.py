@@ -103,7 +103,7 @@ class WeakWindows:
     @cached_property
     def known(self) -> np.ndarray:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
-        return np.isfinite(self.smoothed.nu).all(axis=1)
+        return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
     @cached_property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
@@ -162,7 +162,7 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         whole
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
-        & (number(~np.isfinite(smoothed.nu).all(axis=1)) == 0)
+        & (number(~np.all(np.isfinite(smoothed.nu), axis=1, keepdims=False)) == 0)
         & (2 * number(smoothed.used | smoothed.track.between) >= count)
         & (number(np.abs(run.tau_cmd).max(axis=1) > 1e-6) > 0)
     )
