@@ -116,9 +116,9 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
         return np.concatenate(parts, axis=-1)
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        states = propagate(starts, model, arriving(starts, model))
-        poses = [np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull))) for s in states]
-    return np.stack(np.broadcast_arrays(*poses))
+        x, y, psi, *_ = zip(*propagate(starts, model, arriving(starts, model)), strict=True)
+        s = vessel.State(*(np.stack(np.broadcast_arrays(*each)) for each in (x, y, psi)))
+        return np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
 
 
 def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:

@@ -38,9 +38,10 @@ SHARE_OF_COMMAND = 0.02
 @cache
 def noise_gain() -> list[np.ndarray]:
     """For order k = 0, 1, 2 and each w0 the integral of w^2k |kernel|^2 H [s^-2k-1]."""
-    transform = hyp0f1(4.5, -((FREQUENCIES * WIDTH / 4.0) ** 2))  # of (1 - s^2)^3: of its power + 3/2
+    half = WIDTH / 2
+    transform = hyp0f1(4.5, -((FREQUENCIES * half / 2) ** 2))  # of (1 - s^2)^3: of its power + 3/2
     H = 1.0 / (1.0 + (FREQUENCIES / FREQUENCIES[:, None]) ** 6)
-    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in range(3)]
+    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in (0, 1, 2)]
     return [np.trapezoid(d * H, FREQUENCIES) for d in densities]
 
 
@@ -71,7 +72,7 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
         x, y, psi = (density * gain / time ** (2 * order + 1)).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
-    pose, velocity, acceleration = map(in_axes, range(3))
+    pose, velocity, acceleration = map(in_axes, (0, 1, 2))
     slope, turned = _slope(w, model), np.zeros((w.middle.size, 3, 3))
     turned[:, :2, 2] = (w.smooth @ w.motion[1])[:, [1, 0]] * [1.0, -1.0]
     variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
