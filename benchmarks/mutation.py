@@ -42,7 +42,7 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies")
+PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "thesis")
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 # What the tests import that is not ours: taken over by every process that is forked.
 LIBRARIES = (
@@ -52,11 +52,12 @@ LIBRARIES = (
 )
 # Package -> those that may import it; cosim and fmus know nothing of each other.
 USERS = {
-    "studies": ("studies", "benchmarks", "cybership"),
-    "diagnosis": ("diagnosis", "studies", "benchmarks", "cybership"),
-    "cosim": ("cosim", "diagnosis", "studies", "benchmarks", "cybership"),
+    "thesis": ("thesis", "benchmarks"),
+    "studies": ("studies", "thesis", "benchmarks"),
+    "diagnosis": ("diagnosis", "studies", "thesis", "benchmarks", "cybership"),
+    "cosim": ("cosim", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
     "fmucheck": ("fmucheck", "fmus"),
-    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "benchmarks", "cybership"),
+    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
 }
 KILLED, SURVIVED, SAME, UNTESTED, GONE = "killed", "survived", "equivalent", "no test", "gone"
 STRICT = r",?\s*strict=\w+,?"
