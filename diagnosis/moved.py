@@ -27,9 +27,9 @@ class MovedModules:
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
         """The specification of a module by its old name; None if it is another one."""
         package, _, inner = name.partition(".")
-        return (
-            ModuleSpec(name, self) if inner.partition(".")[0] in MOVED.get(package, "").split() else None
-        )
+        if inner.partition(".")[0] not in MOVED.get(package, "").split():
+            return None
+        return ModuleSpec(name, self)  # pyright: ignore[reportArgumentType] - has what is called
 
     def get_code(self, name: str) -> CodeType:
         """What ``python -m`` of the old name runs."""
