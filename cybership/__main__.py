@@ -21,7 +21,9 @@ Exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted."""
 
 def usage() -> str:
     """The text of ``cybership --help``."""
-    lines = (f"  {name:11}{purpose(name, module)}" for name, module in all_modules().items())
+    modules = all_modules()
+    wide = max(map(len, modules))
+    lines = (f"  {name:{wide}} {purpose(name, module)}" for name, module in modules.items())
     return USAGE.format(commands="\n".join(lines))
 
 

@@ -63,7 +63,7 @@ DIAGNOSIS_LAYERS = (
 # the tools.
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
-    ("scale",),
+    ("installed", "scale"),
     ("ship_description",),
     ("hull_functions",),
     ("frames", "hull", "sizing"),

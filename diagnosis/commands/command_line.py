@@ -72,10 +72,10 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     made.add_argument(
         "--effects",
         type=Path,
-        metavar="FILE.py",
+        metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own; may be repeated",
+        help="a file of model effects of your own, or one of an installed package; may be repeated",
     )
     ship_option(made)
     anyway_option(made)
