@@ -9,6 +9,9 @@ from importlib.util import find_spec
 from diagnosis.moved import keep_old_names
 
 if missing := [name for name in ("scipy", "pandas") if find_spec(name) is None]:
-    print(f"error: studies need {' and '.join(missing)}: pip install '.[studies]'", file=sys.stderr)
+    print(
+        f"error: studies need {' and '.join(missing)}: pip install '.[analysis,campaign]'",
+        file=sys.stderr,
+    )
     raise SystemExit(2)
 keep_old_names()

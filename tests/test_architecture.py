@@ -63,11 +63,12 @@ DIAGNOSIS_LAYERS = (
 # the tools.
 FMUS_LAYERS = (
     ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
-    ("installed", "scale"),
+    ("scale",),
     ("ship_description",),
     ("hull_functions",),
     ("frames", "hull", "sizing"),
     ("effects",),
+    ("installed",),
     ("actuators",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),
     ("watch",),
