@@ -5,8 +5,8 @@ quick tests run once with coverage, which tells the tests that execute a line; e
 its line in a process of its own, the quickest of every test function first, until one fails. One that no
 test kills, and that ``benchmarks/equivalent_mutants.toml`` does not call equivalent, survives.
 
-Needs ``pip install -e ".[dev]" --group mutation`` and a system that can fork. The log has each mutant as it is
-judged; what stands there is not done again. ``--again`` takes its survivors, where they still exist.
+Needs ``pip install -e ".[dev]" --group mutation`` and a system that can fork. The log has each mutant as
+it is judged; what stands there is not done again. ``--again`` takes its survivors, where they exist.
 """
 
 import argparse
