@@ -43,7 +43,6 @@ DIAGNOSIS_LAYERS = (
     ("predictors",),
     ("search", "assessment"),
     ("verdict",),
-    ("gathering",),
     ("session",),
     ("report",),
     ("acceptance",),

@@ -484,7 +484,7 @@ def written(monkeypatch, tmp_path):
         ("write_report", write_report),
     ):
         monkeypatch.setattr(f"diagnosis.report.{name}", stub)
-    monkeypatch.setattr("diagnosis.gathering.gather", lambda paths, *_: list(paths))
+    monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
     monkeypatch.setattr(session, "diagnose", lambda *_, **__: given)
     monkeypatch.setattr(session, "evaluate", lambda *_, **__: given.comparison)
     return given

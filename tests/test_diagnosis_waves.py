@@ -6,7 +6,7 @@ from support.cases import in_part
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model
-from diagnosis.search.nonlinear.waves import AROUND, PEAK, find_waves, followed, inside, peak
+from diagnosis.search.nonlinear.waves import BAND, PEAK, find_waves, followed, inside, peak
 
 MASS = Model().reference_mass
 
@@ -55,7 +55,7 @@ def test_the_flank_of_a_slow_motion_is_no_peak(line, found):
     power = slow * (1.0 + line * np.exp(-(((frequency - 0.5) / 0.04) ** 2)))
     ones = np.ones((frequency.size, 3))
     band = inside(frequency)[:, None] & np.ones((1, 3), bool)
-    _, highest = peak(frequency, power[:, None] * ones, ones, band, AROUND)
+    _, highest = peak(frequency, power[:, None] * ones, ones, band, float(np.ptp(BAND)))
     assert (highest.height > PEAK) == found
     if found:
         assert frequency[highest.row] == pytest.approx(0.5, abs=0.05)

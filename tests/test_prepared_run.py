@@ -124,7 +124,7 @@ def test_of_learning_and_comparing(prepared, monkeypatch, spoilt, tmp_path, main
 def test_of_a_trial_that_is_the_whole_run_or_a_part(prepared, monkeypatch, spoilt, tmp_path):
     """A part is that of the file's times, though the clock is repaired: it jumps at 80 s."""
     common = (spoilt, "--trial", "zigzag", "--out", tmp_path / "out")
-    place = "diagnosis.gathering.usable"
+    place = "diagnosis.assessment.gathering.usable"
     (whole,) = seen(monkeypatch, place, measure_trial.main, *common)
     assert np.array_equal(np.column_stack([whole.time, whole.track.pose])[whole.used], samples(prepared))
     (part,) = seen(monkeypatch, place, measure_trial.main, *common, "--from", 85, "--to", 110)

@@ -25,10 +25,11 @@ from diagnosis.acceptance.budget import (
 )
 from diagnosis.acceptance.criterion import Criterion
 from diagnosis.acceptance.judged_criterion import Predicted, decide, judge
-from diagnosis.acceptance.pdf import table
+from diagnosis.acceptance.pdf import laid_out
 from diagnosis.acceptance.predictions import Predictions, difference, judged
 from diagnosis.acceptance.statistics import independent, root_mean_square, share
 from diagnosis.acceptance.validity import window_means
+from diagnosis.report.document import Section, Table
 from diagnosis.search.prediction_fit.disturbance import Push
 from diagnosis.verify import main as verify_main
 
@@ -359,10 +360,11 @@ def test_a_signature_is_of_criteria(tmp_path, capsys):
 
 
 def test_tables_fit_into_their_lines():
-    rows = [("head", "what it is"), ("a" * 30, "words " * 40)]
-    lines = list(table(rows, 60))
+    table = Table(("head", "what it is"), [("a" * 30, "words " * 40)])
+    lines = laid_out("title", [Section("heading", ["[b]", "words " * 40], [table])], 60)
     assert max(map(len, lines)) <= 60
-    assert "".join(lines).count("words") == 40
+    assert "".join(lines).count("words") == 80
+    assert "[b]" in lines
 
 
 LEFT = json.dumps({"unrecorded": {"size": [0.1, 0.2, 0.3], "time": [1.0, 2.0, 3.0]}})

@@ -1,6 +1,5 @@
 """Files that appear in a folder together, when all of them are whole, and which folder that is."""
 
-import errno
 import hashlib
 import json
 import os
@@ -18,7 +17,6 @@ from cosim.process import STATE
 # In a folder that nobody chose: the hashes of what the result there was made of.
 MADE_OF = ".inputs.json"
 LOGS = ("log.csv", "log.parquet")
-TRIES = 10  # to make a folder that other commands, which end without a result, remove again; chosen
 
 
 @contextmanager
@@ -68,11 +66,10 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
 
 def _scratch(out: Path) -> Path:
     """A new folder in one that is made if it is not there, though another command may take that away."""
-    for _ in range(TRIES):
+    while True:
         out.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
             return Path(mkdtemp(prefix=".new-", dir=out))
-    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
 
 
 def sha256(path: Path) -> str:

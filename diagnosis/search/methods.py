@@ -1,6 +1,6 @@
 """Methods of identification behind one interface, and the table of those that there are."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from cosim import InputError
 from cosim.errors import nearest
 
+from ..execution.progress import Advance
 from ..execution.user_files import from_file
 
 if TYPE_CHECKING:
@@ -37,12 +38,7 @@ class Method(Protocol):
     name: str
 
     def fit(
-        self,
-        runs: "Sequence[WeakWindows]",
-        model: "Model",
-        prior: "Prior",
-        advance: Callable[[str], None],
-        seed: int,
+        self, runs: "Sequence[WeakWindows]", model: "Model", prior: "Prior", advance: Advance, seed: int
     ) -> "Findings":
         """The effects that a model lacks.
 

@@ -1,5 +1,6 @@
 """The MATLAB files that NTNU publishes of CyberShip Enterprise 1; docs/measurements.md."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,11 @@ from cosim import InputError
 from ..columns.columns import FIVE, POSE, POWER
 
 MATLAB = "cse1_data"
-MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
-# Two power settings: by hand that of the bow first, in dynamic positioning that of the VSP first.
-MATLAB_POWER = slice(12, 14)
+# Its first rows. Of the two power settings the first is that of the bow by hand, and that of the VSP in
+# dynamic positioning.
+ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi", *FIVE, "first power", "second power")
 # The settings in dynamic positioning, at which the thrusters give their nominal force.
 FULL_VSP, FULL_BOW = 0.4, 0.5
-SAME_COMMAND = 1e-6  # of the full command; a difference below is rounding in the file
 
 
 def read_matlab(path: Path) -> dict[str, np.ndarray]:
@@ -27,25 +27,25 @@ def read_matlab(path: Path) -> dict[str, np.ndarray]:
         from scipy.io import loadmat  # most runs are no MATLAB files
 
         data = np.asarray(loadmat(path)[MATLAB], float)
-        if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop or not data.size:
+        if data.ndim != 2 or data.shape[0] < len(ROWS) or not data.size:
             raise ValueError(f"a matrix of shape {data.shape}")
     except KeyError:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE], *_power(data)]
-    return dict(zip(("time", *POSE, *FIVE, *POWER), rows, strict=True))
+    rows: dict[str, np.ndarray] = dict(zip(ROWS, data, strict=False))
+    return {s: rows[s] for s in ("time", *POSE, *FIVE)} | dict(zip(POWER, _power(rows), strict=True))
 
 
-def _power(data: np.ndarray) -> np.ndarray:
+def _power(rows: Mapping[str, np.ndarray]) -> np.ndarray:
     """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
 
     The settings hold for stretches. In those that a controller steers, both VSP have the same sway
     command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
     limit.
     """
-    bow, vsp = data[MATLAB_POWER]
-    alike = np.abs(data[MATLAB_FIVE][1] - data[MATLAB_FIVE][3]) < SAME_COMMAND
+    bow, vsp = rows["first power"], rows["second power"]
+    alike = np.isclose(rows["u2"], rows["u4"])
     stretch = np.cumsum(
         np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
     )

@@ -21,18 +21,15 @@ from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
 from ...runs import Motion, Run, Smoothed, without_commands
 from ..map_regression import REPLICATES
+from .segmentation import CELL
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
 PEAK = 4.0  # times the spectrum around it, and its own flanks
-FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes from the commands
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
-AROUND = 0.9  # Hz, width of the spectrum around
 SEGMENT = 25.0  # s; six periods of the slowest wave
-NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
 DRAWINGS = 3  # of noise, whose mean spectrum counts; chosen: of one, a line is low by chance
-RATE = 10.0  # Hz; half of it is far above the band
 
 
 @dataclass(frozen=True)
@@ -74,30 +71,29 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     if not left or not noise:
         return None
     time = model.ship.scale.time
-    frequency, segments = segments_of(left, time)
-    floor = segments_of(noise, time)[1].mean(axis=-1)
+    frequency, segments = segments_of(left, CELL * time)
+    floor = segments_of(noise, CELL * time)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
     white = np.mean([part[2] for part in parts], axis=0)
     follows = followed(frequency, floor, white, model.reference_mass)
-    band = inside(frequency * time)[:, None] & (follows >= FOLLOWED)
-    around = AROUND / time
+    # What the smoother does not follow comes from the commands.
+    band = inside(frequency * time)[:, None] & (follows >= 1.0 / PEAK)
+    around = float(np.ptp(BAND)) / time
     level, found = peak(frequency, power, floor, band, around)
     count = segments.shape[-1]
     least = PEAK + FEW / count
     if found.height < least:
         return None
-    draws = rng.integers(0, count, (REPLICATES, count))
-    heights = [
-        peak(frequency, segments[..., d].mean(axis=-1), floor, band, around)[1].height for d in draws
-    ]
+    drawn = (segments[..., d].mean(axis=-1) for d in rng.integers(0, count, (REPLICATES, count)))
+    heights = np.array([peak(frequency, each, floor, band, around)[1].height for each in drawn])
     at = float(frequency[found.row])
-    near = np.abs(frequency - at) < NEAR * at
+    near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
     return Waves(
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        float(np.mean(np.array(heights) >= least)),
+        float(np.mean(heights >= least)),
     )
 
 
@@ -105,27 +101,22 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    run, time, rate = smoothed.track.run, smoothed.time, RATE / smoothed.scale.time
+    run, time, step = smoothed.track.run, smoothed.time, CELL * smoothed.scale.time
     motion = without_commands(smoothed)
     error, noise = model_error(run, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
         pose = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * each, smoothed.track.pose)
         other = model_error(run, without_commands(smoothed, pose), model)
-        noise += stretches(other - error, time, rate)
+        noise += stretches(other - error, time, step)
     white = 2.0 * smoothed.noise**2 * smoothed.track.period
-    return stretches(error, time, rate), noise, white
+    return stretches(error, time, step), noise, white
 
 
-def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments).
-
-    Args:
-        parts: (n, 3), of each signal.
-        time: scale of the ship.
-    """
-    length = round(SEGMENT * RATE)
-    found = [spectra(x, time / RATE, length) for x in parts]
-    return np.fft.rfftfreq(length, time / RATE), np.concatenate(found, axis=-1)
+def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and spectra (m, 3, segments) of signals (n, 3), a row each ``step`` [s]."""
+    length = round(SEGMENT / CELL)
+    found = [spectra(x, step, length) for x in parts]
+    return np.fft.rfftfreq(length, step), np.concatenate(found, axis=-1)
 
 
 def spectra(x: np.ndarray, step: float, length: int) -> np.ndarray:
@@ -133,11 +124,6 @@ def spectra(x: np.ndarray, step: float, length: int) -> np.ndarray:
 
     Segments overlap by an eighth, are without their linear trend, and tapered over a quarter (Tukey), as
     those of ``scipy.signal.spectrogram``, which takes longer to import than waves take to look for.
-
-    Args:
-        x: the signal, a row each ``step`` [s].
-        step: see there.
-        length: of a segment [rows].
     """
     t = np.arange(length)
     window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(1.0, 8.0 * np.minimum(t, length - t) / length))
@@ -180,20 +166,18 @@ def peak(
     """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
 
     Args:
-        frequency: (m,) [Hz].
-        power: (m, 3), spectrum.
+        frequency, power: (m,) [Hz] and (m, 3), the spectrum.
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
-        band: (m, 3), where a peak counts.
-        around: width of the spectrum around [Hz].
+        band, around: (m, 3), where a peak counts, and width of the spectrum around [Hz].
     """
     reach = int(around / frequency[1] / 2.0)
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
     level = floor * running_median(power / floor, reach)
     # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
     above = np.zeros_like(band)
-    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
+    for axis, spectrum in enumerate(np.log(np.maximum(power, np.finfo(float).tiny)).T):
         above[prominent(spectrum, np.log(PEAK)), axis] = True
-    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
+    height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
 
@@ -230,17 +214,17 @@ def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
     return (nu_dot - free - driven) @ model.reference_mass.T
 
 
-def stretches(error: np.ndarray, time: np.ndarray, rate: float) -> list[np.ndarray]:
-    """Parts (m, 3) without a gap and long enough for a spectrum, at a rate [Hz]."""
+def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, a row each ``step`` [s]."""
     known = np.isfinite(error).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     found = []
     for first, end in edges.reshape(-1, 2):
-        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / rate)
-        if even.size <= SEGMENT * RATE:  # one is lost by the difference
+        even = np.arange(float(time[first]), float(time[end - 1]), step)
+        if even.size <= SEGMENT / CELL:  # one is lost by the difference
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
         at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
-        found.append(np.diff(at, axis=0) * rate)
+        found.append(np.diff(at, axis=0) / step)
     return found

@@ -1,6 +1,8 @@
 """From files to runs that can be judged: each prepared, two at a time, and cut into windows."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -8,18 +10,14 @@ import numpy as np
 
 from cosim import InputError
 
-from .assessment.plausibility import refuse_implausible
-from .assessment.trial_errors import measured_passage
-from .execution.parallel import for_each
-from .execution.progress import Advance, silent
-from .predictors import Model, WeakWindows, weak_windows
-from .predictors.weak_form import WIDTH
-from .runs import PreparedRun, Run, Smoothed, prepare, read_each
-from .runs.columns.unit_check import GO_ON
-
-# Samples in a window of the weak form. Derived: with so many its kernel's slope integrates a velocity
-# that grows evenly to 2 %, with five to 3 %, with three to 23 %.
-FEWEST = 6
+from ..execution.parallel import for_each
+from ..execution.progress import Advance, silent
+from ..predictors import Model, WeakWindows, weak_windows
+from ..predictors.weak_form import EVERY, WIDTH
+from ..runs import PreparedRun, Run, Smoothed, prepare, read_each
+from ..runs.columns.unit_check import GO_ON
+from .plausibility import refuse_implausible
+from .trial_errors import measured_passage
 
 
 def gather(
@@ -65,17 +63,20 @@ def gather(
 
 
 def motion(prepared: PreparedRun) -> Smoothed:
-    """The smoothed motion of a run whose samples are not too rare for windows of the weak form.
+    """The smoothed motion of a run that has a sample at least for each window of the weak form.
+
+    With six in a window the slope of its kernel integrates a velocity that grows evenly to 2 %, with
+    five to 3 %, with three to 23 %.
 
     Raises:
         InputError: they are, or do not determine a motion.
     """
     track = prepared.track
-    width = WIDTH * track.scale.time
-    if not prepared.anyway and track.period > width / (FEWEST - 0.5):  # up to rounding
+    width, every = WIDTH * track.scale.time, EVERY * track.scale.time
+    if not prepared.anyway and round(width / track.period) < WIDTH / EVERY:
         raise InputError(
             f"run '{track.run.name}': a measurement every {track.period:.3g} s is too rare where forces "
-            f"are averaged over {width:.3g} s; log one every {width / FEWEST:.3g} s or "
+            f"are averaged over {width:.3g} s; log one every {every:.3g} s or "
             f"more often; {GO_ON}"
         )
     return prepared.smoothed
@@ -84,11 +85,7 @@ def motion(prepared: PreparedRun) -> Smoothed:
 def usable(
     smoothed: Sequence[Smoothed], model: Model, anyway: bool = False, horizon: float | None = None
 ) -> list[WeakWindows]:
-    """Windows of smoothed runs, if these can be what their files state.
-
-    Args:
-        smoothed: the runs.
-        model, anyway, horizon: see :func:`gather`.
+    """Windows of smoothed runs, if these can be what their files state; see :func:`gather`.
 
     Raises:
         InputError: a run's thrusters are never at work, too much of it is missing, it is not the trial
@@ -107,3 +104,16 @@ def usable(
     if not anyway:
         refuse_implausible(windows, model)
     return windows
+
+
+def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
+    """Runs of which no two have the same name: those that had it are numbered."""
+    found, seen = [], Counter[str]()
+    for w in data:
+        name, s = w.run.name, w.smoothed
+        seen[name] += 1
+        if seen[name] > 1:
+            run = replace(w.run, name=f"{name} ({seen[name]})")
+            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
+        found.append(w)
+    return found
