@@ -339,7 +339,7 @@ def _parser() -> argparse.ArgumentParser:
         "benchmarks.constants",
         "Count the numbers in the code of a package.",
         "examples:\n"
-        "  python -m benchmarks.constants --without analysis open_loop\n"
+        "  python -m benchmarks.constants --without report acceptance\n"
         "  python -m benchmarks.constants --kinds module field --most 200\n"
         "  python -m benchmarks.constants --list --kinds literal\n"
         "  python -m benchmarks.constants --page > docs/constants.md\n"

@@ -40,13 +40,13 @@ __all__ = [
 BAD_INPUT, FAILED = 2, 3
 # Libraries that not every installation has, as they are imported -> the extra that brings them.
 EXTRAS = {
-    "cryptography": "sign",
+    "cryptography": "diagnosis",
     "distributed": "campaign",
     "fmu_manipulation_toolbox": "export",
     "jinja2": "diagnosis",
     "pandas": "diagnosis",
-    "pyarrow": "parquet",
-    "pysindy": "hidden",
+    "pyarrow": "tables",
+    "pysindy": "analysis",
     "scipy": "diagnosis",
     "sklearn": "analysis",
     "ziglang": "native",

@@ -350,7 +350,7 @@ def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
     from diagnosis.acceptance.signature import sign
 
     monkeypatch.setitem(__import__("sys").modules, "cryptography", None)
-    with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[sign\]'"):
+    with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[diagnosis\]'"):
         sign(b"", key)
 
 

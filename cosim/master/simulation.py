@@ -145,7 +145,7 @@ def _run(
     for warning in system.warnings:
         show(f"warning: {warning}")
     if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
-        raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
+        raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[tables]'")
     demand_memory(system, pictures)
     if note := prepare_library(scenario.native):
         show(f"note: {note}")

@@ -65,10 +65,10 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     made.add_argument(
         "--effects",
         type=Path,
-        metavar="FILE.py",
+        metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own; may be repeated",
+        help="a file of model effects of your own, or one of an installed package; may be repeated",
     )
     ship_option(made)
     anyway_option(made)
@@ -109,52 +109,6 @@ def anyway_option(made: argparse.ArgumentParser) -> None:
         help="use a run whose units, signs or columns seem to be other ones than stated, or whose "
         "channels have faults that they cannot repair",
     )
-
-
-def analysis_parser(
-    name: str, description: str, epilog: str, estimates: str, fewest: str = "+"
-) -> argparse.ArgumentParser:
-    """A parser with what the analyses of the thesis share: runs, ``--estimates``, ``--out``.
-
-    Args:
-        name: of the command, and of its result folder.
-        description: what it does.
-        epilog: examples and exit codes.
-        estimates: where velocities come from by default.
-        fewest: ``+``: one run at the least; ``*``: none.
-    """
-    made = command_parser(f"diagnosis.{name}", description, epilog)
-    made.add_argument(
-        "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
-    )
-    made.add_argument(
-        "--estimates",
-        choices=("smoothed", "mdf"),
-        default=estimates,
-        help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
-        f"derivative filter ({estimates})",
-    )
-    anyway_option(made)
-    out_options(made, Path("results", name))
-    return made
-
-
-def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
-    """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
-    made = command_parser(f"diagnosis.{name}", description, epilog)
-    made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
-    made.add_argument(
-        "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"
-    )
-    made.add_argument(
-        "--scenario",
-        type=Path,
-        metavar="FILE",
-        help="observer, guidance and controller's parameters, in place of the run's own scenario",
-    )
-    anyway_option(made)
-    out_options(made, Path("results", name))
-    return made
 
 
 def out_options(made: argparse.ArgumentParser, usual: Path) -> None:

@@ -84,7 +84,7 @@ def method(name: str = DEFAULT) -> Method:
         return getattr(import_module(f".{module}", __package__), made)()
     except ModuleNotFoundError as error:
         library = (error.name or "a library").partition(".")[0]
-        raise InputError(f"method '{name}' needs {library}: pip install 'cybership[hidden]'") from None
+        raise InputError(f"method '{name}' needs {library}: pip install 'cybership[analysis]'") from None
 
 
 def _from_file(path: Path) -> Method:

@@ -17,6 +17,7 @@ from cybership.scratch_folder import sweep
 
 from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD
+from ..installed import plus_files
 from ..interruption import program, run_interruptible
 from ..ship import Ship
 from ..ship import ship as make_ship
@@ -67,10 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--effects",
         type=Path,
-        metavar="FILE.py",
+        metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own, for vessel and thrusters; may be repeated",
+        help="a file of model effects of your own, or one of an installed package, for vessel and "
+        "thrusters; may be repeated",
     )
     parser.add_argument(
         "--ship",
@@ -101,9 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--target and --source need --native")
     sweep()
     try:
-        effects = STANDARD
-        for file in options.effects:
-            effects = effects.plus_file(file)
+        effects = plus_files(STANDARD, options.effects)
         ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)

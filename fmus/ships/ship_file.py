@@ -16,9 +16,11 @@ from pydantic import (
 
 from cybership.message_text import Location, brief, first_fault
 
+from .. import installed
 from ..actuators import actuation as actuation  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
+from ..effects import STANDARD
 from ..effects.all_thrusters import LONGEST
 from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
@@ -84,12 +86,13 @@ def json_schema() -> dict[str, Any]:
 
 
 def shipped_ships() -> list[str]:
-    """The names of the shipped ships."""
-    return sorted(path.stem for folder in FOLDERS for path in folder.glob("*.toml"))
+    """The names of the shipped ships, and of those of installed packages."""
+    shipped = {path.stem for folder in FOLDERS for path in folder.glob("*.toml")}
+    return sorted(shipped.union(installed.names(installed.SHIPS)))
 
 
 def find_ship(name: str | Path) -> Path:
-    """The file of a ship: a path, or the name of a shipped one.
+    """The file of a ship: a path, or the name of a shipped one, or of one of an installed package.
 
     Raises:
         DeclarationError: there is none.
@@ -103,6 +106,8 @@ def find_ship(name: str | Path) -> Path:
     for folder in FOLDERS:
         if (folder / f"{name}.toml").is_file() and Path(str(name)).name == str(name):
             return folder / f"{name}.toml"
+    if (found := installed.ship_file(str(name))) is not None:
+        return found
     known = shipped_ships()
     hint = nearest(str(name), known) or f"; there are {', '.join(known)}, or give a .toml file"
     raise DeclarationError(f"no ship '{name}'{hint}")
@@ -261,20 +266,27 @@ def _values(
 
 
 def _function(name: str, given: Mapping[str, Given], prime: Prime | None) -> Part:
-    if name not in FUNCTIONS:
-        raise DeclarationError(f"hull.functions: there is no '{name}'{_among(name, FUNCTIONS)}")
+    _require(name, FUNCTIONS, f"hull.functions: there is no '{name}'")
     declared = parameters_of(name, 3, FUNCTIONS[name])
     return Part(name, name, name, _values(f"hull.functions.{name}", given, declared, prime))
 
 
-def _among(name: str, known: Mapping[str, Any]) -> str:
-    return nearest(name, known) or f"; there are {', '.join(known)}"
+def _require(name: str, known: Mapping[str, Any], lacking: str) -> None:
+    """Refuse a law that is neither registered nor in an installed package, which then registers it.
+
+    Raises:
+        DeclarationError: there is none.
+    """
+    if name not in known and (file := installed.module_file(installed.LAWS, name)) is not None:
+        STANDARD.plus_file(file)
+    if name not in known:
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
+        raise DeclarationError(f"{lacking}{hint}")
 
 
 def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
     where = f"actuator '{a.name}'"
-    if a.law not in Law.known:
-        raise DeclarationError(f"{where}: there is no law '{a.law}'{_among(a.law, Law.known)}")
+    _require(a.law, Law.known, f"{where}: there is no law '{a.law}'")
     law = Law.known[a.law]
     rates = [
         Variable(f"{c.name}_rate", f"{c.unit}/s", "limit of a command's rate", 0.0, Range(0.0))

@@ -163,7 +163,7 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
         wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of.commands)}
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
     except ImportError:
-        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
     except InputError:
         raise
     except Exception as error:  # a broken file makes the readers stumble in many ways
