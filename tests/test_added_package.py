@@ -52,6 +52,7 @@ def run(site, *arguments):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_its_command_is_one_of_cybership(site):
     usage = run(site, "cybership", "--help").stdout
     assert "  bollard-pull compute the force of a ship's thrusters at rest and full command\n" in usage
@@ -66,6 +67,7 @@ def test_its_command_is_one_of_cybership(site):
     )
 
 
+@pytest.mark.slow
 def test_fmus_carry_its_law_hull_function_and_effect(site, tmp_path):
     done = run(
         site, "fmus.build", "vessel", "thrusters", "--ship", "jet_boat", "--effects", "weed", "--out", tmp_path,
@@ -86,6 +88,7 @@ def test_fmus_carry_its_law_hull_function_and_effect(site, tmp_path):
     assert speeds["weed"] < speeds["plain"] - 0.05
 
 
+@pytest.mark.slow
 def test_the_diagnosis_knows_what_it_adds_where_it_is_named(installed):
     plain, weedy = ship_with([], "jet_boat"), ship_with(["weed"], "jet_boat")
     assert "loss_port" in plain.candidates

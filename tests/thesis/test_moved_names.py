@@ -8,7 +8,11 @@ from support.project import ROOT
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("diagnosis.pca", "thesis.pca"), ("studies.chapter5", "thesis.chapter5")]
+    ("old", "new"),
+    [
+        ("diagnosis.pca", "thesis.pca"),
+        pytest.param("studies.chapter5", "thesis.chapter5", marks=pytest.mark.slow),
+    ],
 )
 def test_old_paths_of_moved_commands_run_and_say_so(old, new):
     done = subprocess.run(
@@ -18,6 +22,7 @@ def test_old_paths_of_moved_commands_run_and_say_so(old, new):
     assert done.stderr == f"note: {old} is now {new}; the old name goes with the next release\n"
 
 
+@pytest.mark.slow
 def test_an_old_name_is_the_module_itself():
     """In a process of its own, where no other test has used the old name."""
     code = """if True:
