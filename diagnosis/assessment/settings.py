@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from ..runs.cleaning import CHANCE
+
 
 @dataclass(frozen=True)
 class AssessmentSettings:
@@ -10,7 +12,7 @@ class AssessmentSettings:
     Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
     """
 
-    chance: float = 0.01  # 1, of an error of the first kind, all tests of a question together; contract
+    chance: float = CHANCE  # 1, of an error of the first kind, all tests of a question together
     negligible: float = 0.05  # 1, share of commands or windows that may be false or unexplained; chosen
     explained: float = 0.5  # 1, share from which on most is explained, so that it has this cause
     # 1, of accelerations over commands, of commands over full thrust. Derived: half of the way, in

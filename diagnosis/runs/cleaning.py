@@ -17,8 +17,11 @@ from .files.reading import Run
 from .files.telegrams import filled
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-SHORTEST = 8.0  # s, of a run: one prediction window
+# s, of predictions, and of the shortest run. Chosen: motions of the unstable nominal hull of CyberShip
+# Enterprise 1 grow at up to 0.18 1/s.
+HORIZON = 8.0
 WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
+CHANCE = 0.01  # 1, of a report where nothing is, in all places that are looked at together; contract
 BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
 # Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
 # which nothing can be differentiated.
@@ -130,7 +133,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         notes.append("rows between two measurements were filled by straight lines: they do not count")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
-    steps = np.minimum(np.diff(run.time), SHORTEST * scale.time)
+    steps = np.minimum(np.diff(run.time), HORIZON * scale.time)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
@@ -174,7 +177,7 @@ def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
     with np.errstate(over="ignore"):
         row = float(np.median(np.diff(run.time))) if run.time.size > 1 else 0.0
     seconds = float(run.time[-1] - run.time[0]) + row if run.time.size > 1 else 0.0
-    shortest = SHORTEST * scale.time
+    shortest = HORIZON * scale.time
     if seconds < shortest * (1.0 - 1e-6):
         raise InputError(
             f"run '{run.name}' is too short: {seconds:.3g} s, at least {shortest:.3g} s are needed"

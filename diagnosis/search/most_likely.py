@@ -14,11 +14,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from ..predictors.evaluation import quantile
+from ..runs.cleaning import CHANCE
 
 STEPS = 6  # of whatever is iterated, and halvings of a step, at the most; two or three are usual
 ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
 LEVEL = 0.95  # probability of the intervals of values, and of the sets of ids; contract
-CHANCE = 0.01  # of a report where there is nothing, in all places that are looked at; as of a remainder
 ROUNDING = np.sqrt(np.finfo(float).eps)  # relative, far above that of a sum: collinear parameters share
 
 At = TypeVar("At")

@@ -11,7 +11,7 @@ import numpy as np
 
 from fmus.scale import REFERENCE_LENGTH, Scale
 
-from ..cleaning import SHORTEST
+from ..cleaning import HORIZON
 from .evidence import Evidence, integral
 
 Needs = Literal["velocity", "rate"]
@@ -102,7 +102,7 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[Column]:
     offset = _path(e, turn=e.time[0] - e.time)
     return [
         Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST),
-        Column("r", "offset", "rad/s", "rate", offset, LEAST / (SHORTEST * scale.time)),
+        Column("r", "offset", "rad/s", "rate", offset, LEAST / (HORIZON * scale.time)),
         Column("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
     ]
 

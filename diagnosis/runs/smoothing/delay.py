@@ -17,14 +17,13 @@ import numpy as np
 from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
-from ..cleaning import BRIEF, DIGITS, WIDTH
+from ..cleaning import BRIEF, CHANCE, DIGITS, WIDTH
 from .command_motion import FORGETTING, Commands
 from .penalised import Fit, Problem
 from .spline import middles
 
 # s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
 LONGEST = 1.0
-CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
 
 
 class Regression:

@@ -18,7 +18,7 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import BRIEF, LONG, SHORTEST, WIDTH, Counts, Track, noise
+from ..cleaning import BRIEF, HORIZON, LONG, WIDTH, Counts, Track, noise
 from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
@@ -182,7 +182,7 @@ def _problem(track: Track, rows: np.ndarray) -> tuple[Problem, np.ndarray]:
     sigma = np.maximum(noise(z), np.multiply(LEAST_NOISE, (scale.length, scale.length, 1.0)))
     stiffness = np.ones((3, int(grid.intervals.sum())))
     # The squared jerk is averaged over a prediction window.
-    average = max(1, round(SHORTEST * scale.time / grid.spacing))
+    average = max(1, round(HORIZON * scale.time / grid.spacing))
     spline = Spline(grid, basis(grid, time[dense]), stiffness, Rates.none(grid))
     return Problem(dense, z, sigma, average, spline), origin
 
