@@ -411,12 +411,11 @@ def component(
     return Component(name, description, params, state, inputs, outputs, init, step, **more)
 
 
-def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
+def discover(ship: Any) -> Iterator[tuple[str, Component]]:
     """Every (module name, component) of this project, found by importing the modules of all kinds.
 
     Args:
-        ship: a :class:`~fmus.ship.Ship` that the components are to be made for; by default CyberShip
-            Enterprise 1 with the effects of this project.
+        ship: a :class:`~fmus.ship.Ship` that the components are to be made for.
     """
     root = __package__ or "fmus"
     for kind in KINDS:
@@ -424,8 +423,6 @@ def discover(ship: Any = None) -> Iterator[tuple[str, Component]]:
         for info in pkgutil.iter_modules(package.__path__):
             name = f"{root}.{kind}.{info.name}"
             module = importlib.import_module(name)
-            component = getattr(module, "COMPONENT", None)
-            if isinstance(component, Component):
-                made = component if ship is None else ship.component(component, module)
-                if made is not None:
-                    yield name, made
+            made = ship.component(module)
+            if made is not None:
+                yield name, made

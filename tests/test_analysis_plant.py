@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from support.command import command
+from support.cse1 import VESSEL as COMPONENT
 from support.measured import sail, smoothed
 
 from cosim import InputError
@@ -29,7 +30,7 @@ from fmus.effects import STANDARD
 from fmus.effects.linear_map import AXES, REGRESSORS, parameter, regressors
 from fmus.hull import RotationalDamping
 from fmus.signals import Force
-from fmus.vessel.vessel import COMPONENT, State
+from fmus.vessel.vessel import State
 from studies.basin_trials import sysid4
 
 MAP = STANDARD["linear_map"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.cse1 import VESSEL
 
 from fmus.declare import flatten, packer
 from fmus.hull import (
@@ -19,7 +20,6 @@ from fmus.hull import (
     mass_matrix,
 )
 from fmus.signals import Force
-from fmus.vessel.vessel import COMPONENT as VESSEL
 from fmus.vessel.vessel import Start, State, integrate, motion
 
 speed = st.floats(-1.0, 1.0)

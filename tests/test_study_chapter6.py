@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from support.cse1 import VESSEL
 
 import cosim
 from cosim.dispatch import FinishedRun
 from diagnosis import Model
 from diagnosis.predictors import write_model
 from fmus.hull import RotationalDamping
-from fmus.vessel import vessel
 from studies import chapter6
 from studies.basin_trials import (
     causes,
@@ -40,7 +40,7 @@ def run(content, folder):
 def test_plant_has_the_coefficients_of_table_7_1():
     named = sysid4.parameters()
     own = {k.removeprefix("vessel."): x for k, x in named.items() if k.startswith("vessel.")}
-    damping = vessel.COMPONENT.prepare(parameters(vessel.COMPONENT, own)).hull.damping
+    damping = VESSEL.prepare(parameters(VESSEL, own)).hull.damping
     assert damping.rotational == pytest.approx(
         RotationalDamping(-0.014, 1.55, 0.017, 0.2, 0.017, -1.8, -0.02, -0.2)
     )

@@ -14,6 +14,7 @@ from fmus.declare import variables
 from fmus.effects.linear_map import REGRESSORS, parameter
 from fmus.hull import RotationalDamping
 from fmus.ship import Ship, ship
+from fmus.ships.naming import DEFAULT
 
 from ..predictors import Model
 from ..report.formatting import number
@@ -100,9 +101,9 @@ def as_model(c: np.ndarray, B: np.ndarray, columns: Sequence[str], of: Ship | No
     """
     of = of or ship()
     values = (
-        {}
-        if of.description is not None
-        else {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+        {f"delta_{v.name}": -v.start for v in variables(RotationalDamping) if v.start}
+        if of.name == DEFAULT
+        else {}
     )
     for k, axis in enumerate(AXES):
         values[parameter(axis, "1")] = float(c[k])

@@ -15,6 +15,7 @@ from fmus.hull import mass_matrix
 from fmus.observer import mdf
 from fmus.observer.screen import Inputs
 from fmus.ship import Ship, ship
+from fmus.ships.naming import DEFAULT
 from fmus.signals import Force, Measurement
 from fmus.vessel.vessel import State, disturbed
 
@@ -78,7 +79,7 @@ def model_error(
         nu, nu_dot, tau: (n, 3), velocity, acceleration and force.
         of: the ship; by default control model (2.27), of a described ship its nominal model.
     """
-    if of is None or of.description is None:
+    if of is None or of.name == DEFAULT:
         error = ROTATIONAL.error(tuple(nu.T), tuple(nu_dot.T), tuple(tau.T), Belief())
         return np.column_stack(np.broadcast_arrays(*error))
     body = Model(ship=of).hull

@@ -1,4 +1,4 @@
-"""The hull of CyberShip Enterprise 1 in surge, sway and yaw, (2.1)-(2.9), and what acts on it.
+"""The hull of a ship in surge, sway and yaw, (2.1)-(2.9), and what acts on it.
 
 Integrated by the classical fourth-order Runge-Kutta method with the force held over the step; a
 communication step above 0.02 s is divided. A force input that is NaN or infinite acts as zero. Every
@@ -11,7 +11,6 @@ from typing import Annotated, Any, NamedTuple
 from ..declare import (
     FIXED,
     Component,
-    Outline,
     Variable,
     bundle,
     group_of,
@@ -19,7 +18,7 @@ from ..declare import (
     redeclared,
     variables,
 )
-from ..effects import STANDARD, EffectSet, Loaded, Motion
+from ..effects import EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
@@ -39,22 +38,13 @@ from ..hull import (
 )
 from ..hull_functions import FUNCTIONS
 from ..ops import Condition, Number, finite, when, wrap
-from ..scale import REFERENCE_LENGTH
 from ..ship_description import Description, Part, Value
-from ..signals import Force, Measurement, Velocity, VelocityInCurrent
+from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
 
 _TOWED = len(TowedDamping._fields)
 _ROTATIONAL = _TOWED + len(RotationalDamping._fields)
 _EXTRA = _ROTATIONAL + len(ExtraDamping._fields)
-
-
-# As long and wide as the waterline of the model ship.
-CSE1_OUTLINE = Outline(
-    "cse1",
-    REFERENCE_LENGTH,
-    ((0.5525, 0.0), (0.2431, 0.124), (-0.5525, 0.10416), (-0.5525, -0.10416), (0.2431, -0.124)),
-)
 
 
 class Start(NamedTuple):
@@ -82,7 +72,7 @@ class Outputs(NamedTuple):
     """Outputs of every vessel; behind them come the forces of its effects."""
 
     pose: Pose = Pose()
-    velocity: Velocity = Velocity()
+    velocity: VelocityInCurrent = VelocityInCurrent()
     u_dot: Annotated[float, "m/s2", "surge acceleration"] = 0.0
     v_dot: Annotated[float, "m/s2", "sway acceleration"] = 0.0
     r_dot: Annotated[float, "rad/s2", "yaw acceleration"] = 0.0
@@ -259,9 +249,11 @@ def described(ship: Description) -> tuple[Number, Number, Number]:
     """Inertia, damping and start of a described ship, with where their values come from."""
     given = ship.values()
 
+    groups_of = {v.name: v.known.group for v in variables(Inertia) if v.known is not None}
+
     def valued(v: Variable) -> Variable:
         start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
-        return start.of(v, "inertia" if v.name in Inertia._fields else "damping")
+        return start.of(v, groups_of.get(v.name, "damping"))
 
     own = [v.name for v in variables(Damping)]
     further = [v for v in ship.terms if v.name not in own]
@@ -286,14 +278,14 @@ def _function(part: Part) -> type[Any]:
     )
 
 
-def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Component:
+def make(effects: EffectSet, ship: Description) -> Component:
     """The FMU of the vessel with some effects, each off until a parameter says otherwise.
 
     Args:
         effects: that it has.
-        ship: whose hull it is; None: CyberShip Enterprise 1's.
+        ship: whose hull it is.
     """
-    inertia, damping, start = (Inertia(), Damping(), Start()) if ship is None else described(ship)
+    inertia, damping, start = described(ship)
     groups = vessel_effects(effects, type(damping))
     unchanged, undisturbed = groups.change_forces(), groups.outside_forces()
     params = bundle(
@@ -307,8 +299,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         measurement=groups.measurement.params(),
         start=start,
     )
-    moving = {} if ship is None else {"velocity": VelocityInCurrent()}
-    outputs = bundle("Outputs", Outputs, **moving, change=unchanged, outside=undisturbed)
+    outputs = bundle("Outputs", Outputs, change=unchanged, outside=undisturbed)
 
     def init(i: Force, p: Any) -> State:
         return State(*p.start)
@@ -331,10 +322,9 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
         u_dot, v_dot, r_dot = nu_dot
         omega_X, omega_Y, omega_N = omega
-        nu = Velocity(after.u, after.v, after.r)
         return after, outputs(
             Pose(after.x, after.y, after.psi),
-            nu if ship is None else VelocityInCurrent(*nu, *water_velocity(after, b)),
+            VelocityInCurrent(after.u, after.v, after.r, *water_velocity(after, b)),
             u_dot,
             v_dot,
             r_dot,
@@ -354,7 +344,7 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
 
     return Component(
         name="vessel",
-        description=f"Hull of {ship.title if ship else 'CyberShip Enterprise 1'} in surge, sway and yaw",
+        description=f"Hull of {ship.title} in surge, sway and yaw",
         params=params,
         state=State,
         inputs=Force,
@@ -362,12 +352,9 @@ def make(effects: EffectSet = STANDARD, ship: Description | None = None) -> Comp
         init=init,
         step=step,
         sampled=False,
-        max_step=0.02 * (ship.scale.time if ship else 1.0),
+        max_step=0.02 * ship.scale.time,
         hold_nonfinite=False,
         prepare=prepare,
         prepared_step=prepared_step,
-        outline=CSE1_OUTLINE if ship is None else ship.drawn,
+        outline=ship.drawn,
     )
-
-
-COMPONENT = make()

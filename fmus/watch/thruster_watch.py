@@ -20,7 +20,6 @@ from ..declare import POSITIVE, Range, component
 from ..hull import inertia_force
 from ..ops import Number, choose, clip, exp, fmax, fmin, log, sqrt, when, where
 from ..signals import Force
-from ..thrusters.allocation import Allocation, allocate
 
 Triple = tuple[Number, Number, Number]
 
@@ -35,6 +34,31 @@ START = 5.0  # s of judging that the first values of mean square and ratios coun
 HUBER = 3.0  # standard deviations that a single sample counts for at the most (chosen)
 NOISE = 0.05  # N; of g before anything is known; chosen: what a millimetre of noise gives
 NEVER_SURE = 40.0  # largest logarithm of odds, so that no exponential overflows
+
+
+# The allocation divides by forces and by the distance between the thrusters.
+DIVISOR = Range(min=0.01)
+AFT = Range(max=-0.01)
+FORE = Range(min=0.01)
+
+
+class Allocation(NamedTuple):
+    """What the allocation believes of the thrusters."""
+
+    F_vsp: Annotated[float, "N", "force of the VSP at full command", DIVISOR] = 1.165
+    F_bow: Annotated[float, "N", "force of the bow thruster at full command", DIVISOR] = 2.629
+    l_vsp: Annotated[float, "m", "VSP position forward of the body origin", AFT] = -0.4575
+    l_bow: Annotated[float, "m", "bow thruster position forward of the body origin", FORE] = 0.3875
+    p_x: Annotated[float, "m", "assumed point of attack, forward"] = 0.0
+    p_y: Annotated[float, "m", "assumed point of attack, to starboard"] = 0.0
+
+
+def allocate(X: Number, Y: Number, N: Number, p: Allocation) -> Triple:
+    """Shares of full force that give a force, before limiting: the inverse of :func:`thrust`."""
+    F_vsp, F_bow, l_vsp, l_bow, p_x, p_y = p
+    moment = N + p_y * X - p_x * Y
+    f_bow = (moment - l_vsp * Y) / (l_bow - l_vsp)
+    return X / F_vsp, (Y - f_bow) / F_vsp, f_bow / F_bow
 
 
 class Params(NamedTuple):

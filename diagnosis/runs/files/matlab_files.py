@@ -5,20 +5,31 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
+from fmus.ship import Ship
 
-from ..columns.columns import FIVE, POSE, POWER
+from ..columns.columns import POSE
 
 MATLAB = "cse1_data"
-MATLAB_POSE, MATLAB_FIVE = [1, 2, 6], slice(7, 12)
-# Two power settings: by hand that of the bow first, in dynamic positioning that of the VSP first.
+MATLAB_POSE, MATLAB_COMMANDS = [1, 2, 6], slice(7, 12)
+# Two power settings: by hand that forward first, in dynamic positioning that aft.
 MATLAB_POWER = slice(12, 14)
 # The settings in dynamic positioning, at which the thrusters give their nominal force.
-FULL_VSP, FULL_BOW = 0.4, 0.5
+FULL = (0.4, 0.5)
 SAME_COMMAND = 1e-6  # of the full command; a difference below is rounding in the file
 
 
-def read_matlab(path: Path) -> dict[str, np.ndarray]:
+def fits_matlab(of: Ship) -> bool:
+    """Whether these files have the commands of a ship: five of its units, and two power settings."""
+    width = MATLAB_COMMANDS.stop - MATLAB_COMMANDS.start
+    return len(of.layouts[-1].commands) == width and len(of.power_settings) == len(FULL)
+
+
+def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
     """Signals of one of NTNU's files: one matrix, one column for each sample.
+
+    Args:
+        path: of the file.
+        of: the ship, with the names of its commands.
 
     Raises:
         InputError: not such a file.
@@ -33,22 +44,23 @@ def read_matlab(path: Path) -> dict[str, np.ndarray]:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_FIVE], *_power(data)]
-    return dict(zip(("time", *POSE, *FIVE, *POWER), rows, strict=True))
+    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_COMMANDS], *_power(data)]
+    names = ("time", *POSE, *of.layouts[-1].commands, *of.power_settings)
+    return dict(zip(names, rows, strict=True))
 
 
 def _power(data: np.ndarray) -> np.ndarray:
-    """Thrust of VSP and bow thruster (2, n), of that in dynamic positioning, by the power settings.
+    """Thrust of the propellers aft and of the thruster forward (2, n), of that in dynamic positioning.
 
-    The settings hold for stretches. In those that a controller steers, both VSP have the same sway
-    command. The VSP's thrust goes with the square of their speed (2.11), the bow thruster's with its
-    limit.
+    The settings hold for stretches. In those that a controller steers, both propellers have the same
+    sway command. Their thrust goes with the square of their speed (2.11), that of the thruster forward
+    with its limit.
     """
-    bow, vsp = data[MATLAB_POWER]
-    alike = np.abs(data[MATLAB_FIVE][1] - data[MATLAB_FIVE][3]) < SAME_COMMAND
+    fore, aft = data[MATLAB_POWER]
+    alike = np.abs(data[MATLAB_COMMANDS][1] - data[MATLAB_COMMANDS][3]) < SAME_COMMAND
     stretch = np.cumsum(
-        np.diff(bow, prepend=bow[0]).astype(bool) | np.diff(vsp, prepend=vsp[0]).astype(bool)
+        np.diff(fore, prepend=fore[0]).astype(bool) | np.diff(aft, prepend=aft[0]).astype(bool)
     )
     steered = (np.bincount(stretch, alike) > 0.5 * np.bincount(stretch))[stretch]
-    vsp, bow = np.where(steered, (bow, vsp), (vsp, bow))
-    return np.array([(np.maximum(vsp, 0.0) / FULL_VSP) ** 2, np.maximum(bow, 0.0) / FULL_BOW])
+    aft, fore = np.where(steered, (fore, aft), (aft, fore))
+    return np.array([(np.maximum(aft, 0.0) / FULL[0]) ** 2, np.maximum(fore, 0.0) / FULL[1]])
