@@ -144,7 +144,6 @@ def addition(
         init=init,
         step=step,
         hold_nonfinite=False,
-        any_ship=False,
     )
 
 

@@ -317,7 +317,6 @@ class Component:
             anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
-        any_ship: whether it serves every ship; False where it names the parts of one.
         outline: of the ship that it is the hull of.
         trial: the manoeuvring trial that it conducts by its output ``order``; empty: none.
     """
@@ -337,7 +336,6 @@ class Component:
     prepare: Callable[[Any], Any] | None = None
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
-    any_ship: bool = True
     outline: Outline | None = None
     trial: str = ""
 

@@ -15,7 +15,7 @@ from .effects import STANDARD, EffectSet
 from .scale import Scale
 from .ship_description import Description
 from .ships.expansion import effects_of_ship, ship_parts
-from .ships.naming import DEFAULT, described_ship
+from .ships.naming import described_ship
 from .sizing import sized
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
@@ -152,9 +152,7 @@ class Ship:
         make = getattr(module, "make", None)
         if make is not None:
             return make(self.effects, self.description)
-        if component is None or not (component.any_ship or self.name == DEFAULT):
-            return None
-        return self.serving(component)
+        return None if component is None else self.serving(component)
 
     @property
     def candidates(self) -> list[str]:

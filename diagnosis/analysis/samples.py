@@ -126,7 +126,7 @@ def gather_samples(
         estimates: ``smoothed``: by the smoother, which sees the whole run and leaves spikes out;
             ``mdf``: by the thesis' causal derivative filter, spikes and lag included.
         advance: progress callback.
-        of: the ship that was measured; None: CyberShip Enterprise 1.
+        of: the ship that was measured; None: the default ship.
         anyway: see :func:`.runs.prepare`.
 
     Returns:

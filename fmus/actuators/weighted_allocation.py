@@ -92,7 +92,7 @@ def allocate(
         spans.append((count * low, count * high) if count > 1 else (low, high))
     wanted = [tau[k] for k in asked]
     if len(parts) == len(asked):
-        exact = _solution(ship, columns, wanted)
+        exact = _eliminated(ship, columns, wanted)
         found = [clip(f, low, high) for f, (low, high) in zip(exact, spans, strict=True)]
     else:
         found = _shared(columns, spans, wanted)
@@ -139,7 +139,16 @@ def _order(ship: Description) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def _solution(
+def solution(ship: Description, tau: Sequence[Number], values: Any) -> Triple:
+    """The forces [N] of as many components as axes that give a force exactly, whatever their limits."""
+    every = [law_of(a, own) for a, own in zip(actuators(ship), values, strict=True)]
+    columns = [_column(c, *every[c.actuator.k][1:]) for c in components(ship)]
+    asked = axes(ship)
+    found = _eliminated(ship, [[c[k] for k in asked] for c in columns], [tau[k] for k in asked])
+    return found[0], found[1], found[2]
+
+
+def _eliminated(
     ship: Description, columns: Sequence[Sequence[Number]], wanted: Sequence[Number]
 ) -> list[Any]:
     """f of B f = tau for the columns of a square B, by elimination."""

@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ..actuators.actuation import actuators, forces, measurable, ordered, output, parameters, variable
 from ..actuators.actuator_layout import allocating, layouts
+from ..actuators.attack import Attack, RealAttack, attacking
 from ..actuators.command_variables import commands_of, powers_of, rates_of
 from ..actuators.law import Law
 from ..actuators.response import (
@@ -27,28 +28,6 @@ from ..effects import EffectSet
 from ..ops import Number, finite, when
 from ..ship_description import Description
 from ..signals import Force, VelocityInCurrent
-
-
-class Attack(NamedTuple):
-    """How far from the places of the actuators their force acts, (2.17)-(2.19)."""
-
-    p_x: Annotated[float, "m", "assumed point of attack, forward"] = 0.0
-    p_y: Annotated[float, "m", "assumed point of attack, to starboard"] = 0.0
-
-
-class RealAttack(NamedTuple):
-    """The same of the real ship."""
-
-    plant_p_x: Annotated[float, "m", "real point of attack, forward"] = 0.0
-    plant_p_y: Annotated[float, "m", "real point of attack, to starboard"] = 0.0
-
-
-def attacking(values: Any, attack: tuple[Number, Number]) -> Any:
-    """Parameters of actuators, of which the last two are the place, with a point of attack."""
-    p_x, p_y = attack
-    return type(values)._make(
-        [type(own)._make((*own[:-2], own[-2] + p_x, own[-1] + p_y)) for own in values]
-    )
 
 
 class Applied(NamedTuple):

@@ -15,7 +15,7 @@ def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
         paths: of runs; files that are no logs say nothing.
 
     Returns:
-        The name or file of the ship; None: CyberShip Enterprise 1, or no log tells.
+        The name or file of the ship; None: the default ship, or no log tells.
 
     Raises:
         InputError: they are of several ships.
