@@ -13,7 +13,7 @@ from fmus.controller.adaptive import Disturbance
 from fmus.controller.backstepping import Gains, Inputs, control_errors
 from fmus.controller.models import ROTATIONAL, ROTATIONAL_GAINS
 from fmus.frames import rotate_to_body
-from fmus.hull import Damping, Inertia, RotationalDamping, mass_matrix
+from fmus.hull import Damping, Inertia, RotationalDamping, Terms, mass_matrix
 from fmus.signals import Estimate, Force, Target
 from fmus.vessel import vessel
 from studies.basin_trials.trials import SOFT
@@ -114,7 +114,7 @@ def test_adaptation_recovers_known_parameters_under_rich_motion():
 def test_adaptation_approaches_four_unknown_parameters():
     """r and |r|r are alike at the same yaw rates, so this takes long: the error falls to a seventh."""
     only = RotationalDamping(Y_absr_v=0.0, Y_absv_r=0.0, N_absr_v=0.0, N_absv_r=0.0)
-    plant = VESSEL.params(damping=Damping(rotational=only))
+    plant = VESSEL.params(damping=Damping(Terms()._replace(**only._asdict())))
     gamma = ROTATIONAL.gamma(0.0, 1000.0, 0.0, 8000.0, 0.0, 250.0, 0.0, 4000.0)
     params = Params(gamma=gamma)
     *_, (_, _, state, _, _) = closed_loop(ABS, params, 600.0, 0.01, plant=plant)

@@ -9,11 +9,16 @@ from support.loops import acting, closed_loop, multisine_target
 from fmus.build import build
 from fmus.controller.models import ALL_UNKNOWN, PARAMETRISATIONS, ROTATIONAL, SCALED, SURGE
 from fmus.declare import Component, packer, variables
-from fmus.hull import Damping, Inertia, RotationalDamping, TowedDamping, motion
+from fmus.hull import Damping, Inertia, RotationalDamping, Terms, TowedDamping, motion
 from fmus.signals import Force
 from fmus.vessel import vessel
 
 every_model = pytest.mark.parametrize("name", PARAMETRISATIONS)
+
+
+def terms(**values):
+    """Damping of the plant with some coefficients of another value."""
+    return Damping(Terms()._replace(**values))
 
 
 def force_by_model(model, nu, nu_dot, tau, phi):
@@ -65,7 +70,7 @@ def test_factors_of_inertia_and_damping():
     towed, rotational = ([0.7 * x for x in group()] for group in (TowedDamping, RotationalDamping))
     plant = VESSEL.params(
         inertia=heavier,
-        damping=Damping(TowedDamping(*towed), RotationalDamping(*rotational)),
+        damping=terms(**TowedDamping(*towed)._asdict(), **RotationalDamping(*rotational)._asdict()),
     )
     for _ in range(50):
         nu, tau = random_motion(rng)
@@ -183,7 +188,7 @@ def test_one_file_of_a_user_learns_what_it_likes(tmp_path):
     exec(compile(USERS, str(own), "exec"), scope)
     component: Component = scope["COMPONENT"]
     assert {"phi_hat_1", "sigma_min"} <= {v.name for v in variables(component.outputs)}
-    plant = VESSEL.params(damping=Damping(rotational=RotationalDamping(*[0.0] * 8)._replace(N_r=-1.9)))
+    plant = VESSEL.params(damping=terms(**dict.fromkeys(RotationalDamping._fields, 0.0) | {"N_r": -1.9}))
     *_, (*_, out) = closed_loop(
         component, component.params(), 60.0, 0.02, multisine_target(), plant=plant
     )

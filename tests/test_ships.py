@@ -36,13 +36,16 @@ from fmus.declare import group_of, variables
 from fmus.effects import Running
 from fmus.hull import (
     Damping,
-    HullFunctions,
     Inertia,
+    RotationalDamping,
+    TowedDamping,
     coriolis_force,
     damping_force,
-    described_damping_force,
     mass_matrix,
+    rotational_damping_force,
     term_variable,
+    terms_force,
+    towed_damping_force,
 )
 from fmus.hull_functions import cross_flow
 from fmus.ship import ship
@@ -65,10 +68,10 @@ def params(name):
 
 @given(speed, speed, speed)
 def test_terms_give_the_forces_of_the_groups_of_table_2_1(u, v, r):
-    declared = variables(Damping)
-    terms = group_of("Terms", [term_variable(v.name) for v in declared])
-    found = described_damping_force(u, v, r, terms(*[v.start for v in declared]), HullFunctions())
-    assert found == pytest.approx(damping_force(u, v, r, Damping()), rel=1e-12, abs=1e-12)
+    found = damping_force(u, v, r, Damping())
+    towed = towed_damping_force(u, v, TowedDamping())
+    turned = rotational_damping_force(v, r, RotationalDamping())
+    assert found == pytest.approx(np.add(towed, turned), rel=1e-12, abs=1e-12)
 
 
 PRODUCTS = {
@@ -89,7 +92,7 @@ PRODUCTS = {
 def test_a_term_is_the_product_of_its_name(product, axis, u, v, r):
     name = Term(axis="XYN"[axis], product=product, value=1.0).name
     terms = group_of("Terms", [term_variable(name)])
-    found = described_damping_force(u, v, r, terms(2.5), HullFunctions())
+    found = terms_force(u, v, r, terms(2.5))
     expected = [0.0, 0.0, 0.0]
     expected[axis] = 2.5 * PRODUCTS[product](u, v, r)
     assert found == pytest.approx(tuple(expected), rel=1e-12)

@@ -41,12 +41,12 @@ def test_plant_has_the_coefficients_of_table_7_1():
     named = sysid4.parameters()
     own = {k.removeprefix("vessel."): x for k, x in named.items() if k.startswith("vessel.")}
     damping = VESSEL.prepare(parameters(VESSEL, own)).hull.damping
-    assert damping.rotational == pytest.approx(
+    assert [getattr(damping.terms, n) for n in RotationalDamping._fields] == pytest.approx(
         RotationalDamping(-0.014, 1.55, 0.017, 0.2, 0.017, -1.8, -0.02, -0.2)
     )
-    assert damping.towed.X_u == pytest.approx(-0.6555 - 3.5)
-    assert damping.towed.X_absu_u == pytest.approx(0.3545 - 0.26)
-    assert damping.extra.X_absu_r == pytest.approx(0.2)
+    assert damping.terms.X_u == pytest.approx(-0.6555 - 3.5)
+    assert damping.terms.X_absu_u == pytest.approx(0.3545 - 0.26)
+    assert damping.terms.X_absu_r == pytest.approx(0.2)
     assert [named[f"thrusters.loss_{a}"] for a in ("surge", "sway", "yaw")] == [0.3, 0.0, 0.31]
 
 

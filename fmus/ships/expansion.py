@@ -7,7 +7,7 @@ from ..actuators.failings import failings, named_effects
 from ..actuators.law_changes import changes
 from ..declare import variables
 from ..effects import STANDARD, EffectSet
-from ..effects.force import further_change
+from ..effects.force import change
 from ..hull import Damping, term_variable
 from ..ship_description import Description
 from .hull_errors import hull_errors
@@ -44,7 +44,7 @@ def effects_of_ship(ship: Description, effects: EffectSet = STANDARD) -> EffectS
             *changes(every),
             *hull_errors(ship),
             *[e for e in others.values() if e.needs <= names and e not in acting],
-            *[further_change(term_variable(t.name)) for t in ship.terms if t.name not in own],
+            *[change(term_variable(t.name)) for t in ship.terms if t.name not in own],
         ],
         effects.files,
         effects.general,

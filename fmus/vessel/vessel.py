@@ -22,11 +22,10 @@ from ..effects import EffectSet, Loaded, Motion
 from ..frames import rotate_to_earth
 from ..hull import (
     Damping,
-    ExtraDamping,
     Hull,
     Inertia,
     RotationalDamping,
-    TowedDamping,
+    Terms,
     Triple,
     coriolis_force,
     damping_force,
@@ -41,10 +40,6 @@ from ..ops import Condition, Number, finite, when, wrap
 from ..ship_description import Description, Part, Value
 from ..signals import Force, Measurement, VelocityInCurrent
 from .vessel_effects import NONE, VesselEffects, forces_of, vessel_effects
-
-_TOWED = len(TowedDamping._fields)
-_ROTATIONAL = _TOWED + len(RotationalDamping._fields)
-_EXTRA = _ROTATIONAL + len(ExtraDamping._fields)
 
 
 class Start(NamedTuple):
@@ -90,14 +85,8 @@ def hull(p: Any, effects: VesselEffects) -> Hull:
     inertia = p.inertia
     for member in effects.inertia.members:
         inertia = member.apply(member.acting(p.heavier), p.heavier, inertia, inertia)
-    nominal, change = p.damping, p.change
-    damping = Damping(
-        TowedDamping._make(map(add, nominal.towed, change[:_TOWED])),
-        RotationalDamping._make(map(add, nominal.rotational, change[_TOWED:_ROTATIONAL])),
-        ExtraDamping._make(map(add, nominal.extra, change[_ROTATIONAL:_EXTRA])),
-        type(nominal.further)._make(map(add, nominal.further, change[_EXTRA:])),
-        nominal.functions,
-    )
+    terms, functions = p.damping
+    damping = Damping(type(terms)._make(map(add, terms, p.change)), functions)
     return Hull(inertia, inverse_mass(inertia), damping)
 
 
@@ -255,18 +244,12 @@ def described(ship: Description) -> tuple[Number, Number, Number]:
         start = given.get(v.name, Value(v.name, 0.0, "", 0.0))
         return start.of(v, groups_of.get(v.name, "damping"))
 
-    own = [v.name for v in variables(Damping)]
-    further = [v for v in ship.terms if v.name not in own]
-    groups = {
-        name: redeclared(type(group), valued)()
-        for name, group in zip(Damping._fields, Damping(), strict=True)
-    }
-    groups["further"] = group_of("FurtherDamping", [valued(term_variable(v.name)) for v in further])()
-    groups["functions"] = bundle(
-        "HullFunctions", **{part.law: _function(part)() for part in ship.functions}
-    )()
+    own = [v.name for v in variables(Terms)]
+    further = [term_variable(v.name) for v in ship.terms if v.name not in own]
+    terms = group_of("Terms", map(valued, [*variables(Terms), *further]))()
+    functions = bundle("HullFunctions", **{part.law: _function(part)() for part in ship.functions})()
     start = redeclared(Start, ship.scale.of)()
-    return redeclared(Inertia, valued)(), bundle("Damping", **groups)(), start
+    return redeclared(Inertia, valued)(), bundle("Damping", terms=terms, functions=functions)(), start
 
 
 def _function(part: Part) -> type[Any]:
@@ -319,7 +302,8 @@ def make(effects: EffectSet, ship: Description) -> Component:
         omega = when(wrong, lambda: model_error(after, nu_dot, tau, p), lambda: NONE)
         change = when(b.changed, lambda: change_forces(after, b), lambda: unchanged)
         outside = when(b.disturbed, lambda: outside_forces(after, tau, b), lambda: undisturbed)
-        _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, p.damping.rotational)
+        phi = [getattr(p.damping.terms, name) for name in RotationalDamping._fields]
+        _, phi_Y, phi_N = rotational_damping_force(after.v, after.r, RotationalDamping._make(phi))
         u_dot, v_dot, r_dot = nu_dot
         omega_X, omega_Y, omega_N = omega
         return after, outputs(
