@@ -40,7 +40,8 @@ def scaled(d: Description, ratio: float) -> Description:
         command = next((c for c in a.law.commands if name == f"{c.name}_rate"), None)
         if command is not None:
             return {"1": "1/s", "1/s": "1/s2"}.get(command.unit, f"{command.unit}/s")
-        return "s" if name == "lag" else units[f"{a.part.name}_{name}"]
+        placed = {"lag": "s", "abreast": "m"}
+        return placed[name] if name in placed else units[d.called(f"{a.part.name}_{name}")]
 
     return d._replace(
         length=d.length * ratio,
