@@ -317,6 +317,7 @@ class Component:
             anew in every step would cost time.
         prepared_step: ``step`` with what ``prepare`` gives in place of the parameters.
         starts: start values of parameters and inputs that are not those of the declaration.
+        any_ship: whether it serves every ship; False where it serves the default one alone.
         outline: of the ship that it is the hull of.
         trial: the manoeuvring trial that it conducts by its output ``order``; empty: none.
     """
@@ -336,6 +337,7 @@ class Component:
     prepare: Callable[[Any], Any] | None = None
     prepared_step: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     starts: Mapping[str, float] = field(default_factory=dict)
+    any_ship: bool = True
     outline: Outline | None = None
     trial: str = ""
 
@@ -421,6 +423,6 @@ def discover(ship: Any) -> Iterator[tuple[str, Component]]:
         for info in pkgutil.iter_modules(package.__path__):
             name = f"{root}.{kind}.{info.name}"
             module = importlib.import_module(name)
-            made = ship.component(module)
+            made = ship.component(getattr(module, "COMPONENT", None), module)
             if made is not None:
                 yield name, made

@@ -15,7 +15,7 @@ from .effects import STANDARD, EffectSet
 from .scale import Scale
 from .ship_description import Description
 from .ships.expansion import effects_of_ship, ship_parts
-from .ships.naming import described_ship
+from .ships.naming import DEFAULT, described_ship
 from .sizing import sized
 from .thrusters.thrusters import make as make_thrusters
 from .vessel.vessel import make as make_vessel
@@ -142,17 +142,19 @@ class Ship:
         """A component that is no part of the ship, such as a controller, made for it."""
         return sized(component, self.description)
 
-    def component(self, module: ModuleType) -> Component | None:
-        """The component of a module, made for this ship; None: it has none for such a ship.
+    def component(self, component: Component | None, module: ModuleType) -> Component | None:
+        """A component of a module, made for this ship; None: it has none for such a ship.
 
         Args:
+            component: as its module declares it, if it does.
             module: that declares it; one that makes components of effects and of a ship has ``make``.
         """
-        component: Component | None = getattr(module, "COMPONENT", None)
         make = getattr(module, "make", None)
         if make is not None:
             return make(self.effects, self.description)
-        return None if component is None else self.serving(component)
+        if component is None or not (component.any_ship or self.name == DEFAULT):
+            return None
+        return self.serving(component)
 
     @property
     def candidates(self) -> list[str]:
