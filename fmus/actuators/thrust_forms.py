@@ -9,73 +9,78 @@ line commands are allocated.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from ..declare import Range, Variable, group_of, variables
 from ..effects.curve import hats
 from ..ops import Number, signed_root
-from .law import Flow
-from .laws import Cycloidal, Tunnel, TunnelThruster, VoithSchneider
+from .law import Flow, Law
+from .laws import TunnelThruster, VoithSchneider
 
 COMMANDS = 9
 SPEEDS = 3
 NODES = COMMANDS * SPEEDS
-
-
-class SquaredTunnelThruster(TunnelThruster):
-    """Thruster in a tunnel across the ship, whose force is by the square of its command, (2.11)."""
-
-    name = "squared_tunnel_thruster"
-    proportional = False
-    variants: ClassVar[Mapping[str, str]] = {}
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
-        (u,) = commands
-        return 0.0 * u, p.F * (abs(u) * u)
-
-    @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
-        return (signed_root(forces[0] / p.F),)
-
-
-class SquaredVoithSchneider(VoithSchneider):
-    """Voith Schneider propeller whose force is by the square of each command, (2.11)."""
-
-    name = "squared_voith_schneider"
-    proportional = False
-    variants: ClassVar[Mapping[str, str]] = {}
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
-        surge, sway = commands
-        return p.F * (abs(surge) * surge), p.F * (abs(sway) * sway)
-
-    @classmethod
-    def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
-        return signed_root(forces[0] / p.F), signed_root(forces[1] / p.F)
-
-
-def _table(prefix: str, what: str) -> list[Variable]:
-    """The table of one component of a force, command by command."""
-    at = [2.0 * i / (COMMANDS - 1) - 1.0 for i in range(COMMANDS)]
-    return [
-        Variable(
-            f"{prefix}_{i}_{j + 1}",
-            "1",
-            f"share of full {what} at command {c:g}, speed {j} of 2",
-            c,
-            Range(),
-            False,
-        )
-        for i, c in enumerate(at, 1)
-        for j in range(SPEEDS)
-    ]
-
-
 TABLE_SPEED = Variable(
     "table_speed", "m/s", "largest inflow speed of the table", 0.4, Range(min=0.01), False
 )
+
+
+def squared(line: type[Law]) -> type[Law]:
+    """The law of actuators whose force is by the square of each command of one that is in proportion."""
+
+    class Squared(line):
+        name = f"squared_{line.name}"
+        proportional = False
+        variants = {}  # noqa: RUF012
+
+        @classmethod
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+            return line.force(tuple([abs(c) * c for c in commands]), flow, p)
+
+        @classmethod
+        def commanded(cls, forces: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, ...]:
+            return tuple([signed_root(c) for c in line.commanded(forces, flow, p)])
+
+    return Squared
+
+
+def tabulated(line: type[Law], tables: Mapping[str, str]) -> type[Law]:
+    """The law of actuators whose force has a table over each command and the inflow.
+
+    Args:
+        line: law of the force at a straight line.
+        tables: for each command the name of its table -> its inflow, a speed of :class:`.law.Flow`.
+    """
+    cells = [v for name in tables for v in _table(name)]
+
+    class Tabulated(line):
+        name = f"tabulated_{line.name}"
+        proportional = False
+        allocated = line
+        variants = {}  # noqa: RUF012
+        limiting = (*line.limiting, TABLE_SPEED.name)
+        Parameters = group_of("Tabulated", [*variables(line.Parameters), *cells, TABLE_SPEED])
+
+        @classmethod
+        def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
+            first = len(p) - 1 - len(cells)
+            shares = [
+                looked_up(c, abs(getattr(flow, speed)), p[first + k * NODES :][:NODES], p.table_speed)
+                for k, (c, speed) in enumerate(zip(commands, tables.values(), strict=True))
+            ]
+            return line.force(tuple(shares), flow, p)
+
+    return Tabulated
+
+
+def _table(name: str) -> list[Variable]:
+    """The table of one command, row by row."""
+    text = "share of full force at command {:g}, speed {} of 2"
+    return [
+        Variable(f"{name}_{i}_{j + 1}", "1", text.format(c, j), c, Range(), False)
+        for i, c in enumerate([2.0 * k / (COMMANDS - 1) - 1.0 for k in range(COMMANDS)], 1)
+        for j in range(SPEEDS)
+    ]
 
 
 def looked_up(command: Number, speed: Number, table: Any, most: Number) -> Any:
@@ -88,47 +93,9 @@ def looked_up(command: Number, speed: Number, table: Any, most: Number) -> Any:
     return total
 
 
-class TabulatedTunnelThruster(TunnelThruster):
-    """Thruster in a tunnel across the ship with a table of its force over command and |u|, (2.12)."""
-
-    name = "tabulated_tunnel_thruster"
-    proportional = False
-    allocated = TunnelThruster
-    variants: ClassVar[Mapping[str, str]] = {}
-    limiting = ("table_speed",)
-    Parameters: ClassVar[type[Any]] = group_of(
-        "Tabulated", [*variables(Tunnel), *_table("table", "force"), TABLE_SPEED]
-    )
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
-        (u,) = commands
-        return 0.0 * u, p.F * looked_up(u, abs(flow.hull_u), p[-NODES - 1 : -1], p.table_speed)
-
-
-class TabulatedVoithSchneider(VoithSchneider):
-    """Voith Schneider propeller with tables of its force over command and |u| or |v|, (2.12)."""
-
-    name = "tabulated_voith_schneider"
-    proportional = False
-    allocated = VoithSchneider
-    variants: ClassVar[Mapping[str, str]] = {}
-    limiting = (*VoithSchneider.limiting, "table_speed")
-    Parameters: ClassVar[type[Any]] = group_of(
-        "Tabulated",
-        [
-            *variables(Cycloidal),
-            *_table("table_x", "surge force"),
-            *_table("table_y", "sway force"),
-            TABLE_SPEED,
-        ],
-    )
-
-    @classmethod
-    def force(cls, commands: tuple[Number, ...], flow: Flow, p: Any) -> tuple[Number, Number]:
-        surge, sway = commands
-        ahead, aside = p[-2 * NODES - 1 : -NODES - 1], p[-NODES - 1 : -1]
-        return (
-            p.F * looked_up(surge, abs(flow.hull_u), ahead, p.table_speed),
-            p.F * looked_up(sway, abs(flow.hull_v), aside, p.table_speed),
-        )
+FORMS = (
+    squared(TunnelThruster),
+    squared(VoithSchneider),
+    tabulated(TunnelThruster, {"table": "hull_u"}),
+    tabulated(VoithSchneider, {"table_x": "hull_u", "table_y": "hull_v"}),
+)
