@@ -2,7 +2,7 @@
 
 from setuptools import find_packages, setup
 
-PACKAGES = ("cybership*", "fmus*", "fmucheck*", "cosim*", "diagnosis*", "studies*")
+PACKAGES = ("cybership*", "fmus*", "fmucheck*", "cosim*", "diagnosis*", "studies*", "thesis*")
 SHIPPED = {
     "cosim.shipped": "scenarios",
     "cosim.shipped.campaigns": "scenarios/campaigns",

@@ -24,7 +24,7 @@ from cosim.command import command_parser, run_command
 KINDS = ("module", "field", "default", "literal", "data")
 PACKAGE = Path(__file__).parents[1] / "diagnosis"
 # Rooms whose constants act on a verdict; the others show it, or judge a model by criteria of a user's.
-DECIDING = ("runs", "predictors", "search", "verdict", "assessment", "gathering.py", "session.py")
+DECIDING = ("runs", "predictors", "search", "verdict", "assessment", "session.py")
 UNIT = r"(?:1/s|rad2?|m2?|s|Hz|kg|N2?|N m|K|deg|bytes|%|1)(?:/s2?)?(?!\w)"
 LEADING_UNIT = re.compile(rf"^{UNIT}(?:(?:,| and| or) {UNIT})*(?=[;,.: ]|$)|\[({UNIT}[^\]]*)\]")
 # An entry of a docstring, with its continuation lines.
@@ -339,7 +339,7 @@ def _parser() -> argparse.ArgumentParser:
         "benchmarks.constants",
         "Count the numbers in the code of a package.",
         "examples:\n"
-        "  python -m benchmarks.constants --without analysis open_loop\n"
+        "  python -m benchmarks.constants --without report acceptance\n"
         "  python -m benchmarks.constants --kinds module field --most 200\n"
         "  python -m benchmarks.constants --list --kinds literal\n"
         "  python -m benchmarks.constants --page > docs/constants.md\n"

@@ -18,17 +18,28 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.util import resolve_name
-from pathlib import Path
+from pathlib import Path, PurePath
 from xml.etree import ElementTree
 
 from coverage import CoverageData
 
 LEFT_OUT = (".git", "__pycache__", ".*_cache", "*.fmu", "*.egg-info")
 MADE = {"results", "site"}  # folders of the project itself
-OURS = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "cybership", "benchmarks", "tests")
+OURS = (
+    "fmus",
+    "fmucheck",
+    "cosim",
+    "diagnosis",
+    "studies",
+    "thesis",
+    "cybership",
+    "benchmarks",
+    "tests",
+)
 # Results of this code lie in caches: the test that runs it need not be the one that uses the result.
 CACHED = ("fmus/", "cosim/compiled/")
 PHASE = r"(\|\w+| \(\w+\))$"  # of a test, at the end of its name
+NODE = "node_id"  # property of a test in the report, by tests/conftest.py
 EACH = 0.05  # s, pytest's own time for a test
 # Processes that a test starts are measured under its name; the source inside of an FMU counts as ours.
 COVERAGE = """
@@ -43,6 +54,7 @@ include =
     */cosim/*
     */diagnosis/*
     */studies/*
+    */thesis/*
     */resources/*_????????????????/*
 [paths]
 fmus =
@@ -113,7 +125,7 @@ class Covering:
         now = {path.relative_to(root).as_posix(): self._hash(path) for path in every}
         old = json.loads(kept.read_text("utf-8")) if kept.exists() else {"hashes": {}, "seconds": {}}
         self.hashes, self.seconds = old["hashes"], old["seconds"]
-        tests = [name for name in now if name.startswith("tests/test_")]
+        tests = [name for name in now if PurePath(name).match("test_*.py")]
         changed = [name for name in tests if now[name] != self.hashes.get(name)]
         if changed:
             measured = self._measure(changed if kept.exists() else [], processes)
@@ -147,8 +159,7 @@ class Covering:
         seconds = {}
         for case in ElementTree.parse(report).iter("testcase"):
             if not [child for child in case if child.tag in ("failure", "error", "skipped")]:
-                module, *classes = case.get("classname", "").removeprefix("tests.").split(".")
-                name = "::".join([f"tests/{module}.py", *classes, case.get("name", "")])
+                (name,) = (p.get("value") for p in case.iter("property") if p.get("name") == NODE)
                 seconds[name] = float(case.get("time", "0"))
         return seconds
 
@@ -175,7 +186,7 @@ class Covering:
         files = [path for name in OURS for path in self.root.glob(f"{name}/**/*.py")]
         graph = {path: list(dict.fromkeys(imported(self.root, path))) for path in files}
         found: defaultdict[str, dict[str, int]] = defaultdict(dict)
-        for test in self.root.glob("tests/test_*.py"):
+        for test in self.root.glob("tests/**/test_*.py"):
             for module, steps in distances(test, graph).items():
                 name = test.relative_to(self.root).as_posix()
                 found[module.relative_to(self.root).as_posix()][name] = steps

@@ -10,7 +10,7 @@ import statistics
 import sys
 from collections.abc import Sequence
 
-from studies.monte_carlo import run_all, shipped, vary
+from thesis.monte_carlo import run_all, shipped, vary
 
 CONTROLLERS = ("controller_bs.fmu", "controller_abs.fmu", "controller_cl_win_eps.fmu")
 

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 import diagnosis
 from diagnosis.predictors import Model, WeakWindows
 from diagnosis.search.candidates import model_error
-from diagnosis.search.gram import RUN, noise
+from diagnosis.search.gram import noise
 from diagnosis.search.most_likely import ENOUGH, most_likely
 from diagnosis.search.prediction_fit.fit import PredictionFit, fit_to, shootings, whitened
 from diagnosis.search.prior import MEASURED, NominalPrior
@@ -61,10 +61,9 @@ def refinement(runs: Sequence[WeakWindows], driver: str) -> Tally:
     """The candidate refined along with all nominal coefficients, on the model error."""
     model, count = Model(), Counter[str]()
     prior, at = (p := NominalPrior.of(model, None, MEASURED)), Estimate.at(model, p)
-    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(runs)])
     base = model_error(runs, model)
-    nuisance = nuisance_of(TrainingSet(runs, blocks, None, prior), at, base)
-    t = TrainingSet(runs, blocks, noise(base, nuisance.columns, FLOOR), prior)
+    nuisance = nuisance_of(TrainingSet(runs, None, prior), at, base)
+    t = TrainingSet(runs, noise(base, nuisance.columns, FLOOR), prior)
     problem = Refinement(t, at, nuisance, Start({EFFECT: 0.0}, [EFFECT], np.zeros((1, 1))))
     begun, begin, L = time.process_time(), problem.begin(), root(problem.precision)
     first = problem.theta(begin.estimate)

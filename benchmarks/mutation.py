@@ -5,8 +5,8 @@ quick tests run once with coverage, which tells the tests that execute a line; e
 its line in a process of its own, the quickest of every test function first, until one fails. One that no
 test kills, and that ``benchmarks/equivalent_mutants.toml`` does not call equivalent, survives.
 
-Needs ``pip install -e ".[dev,mutation]"`` and a system that can fork. The log has each mutant as it is
-judged; what stands there is not done again. ``--again`` takes its survivors, where they still exist.
+Needs ``pip install -e ".[dev]" --group mutation`` and a system that can fork. The log has each mutant as
+it is judged; what stands there is not done again. ``--again`` takes its survivors, where they exist.
 """
 
 import argparse
@@ -42,7 +42,7 @@ else:
     import tomli as tomllib
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies")
+PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "studies", "thesis")
 EQUIVALENT = ROOT / "benchmarks" / "equivalent_mutants.toml"
 # What the tests import that is not ours: taken over by every process that is forked.
 LIBRARIES = (
@@ -52,11 +52,12 @@ LIBRARIES = (
 )
 # Package -> those that may import it; cosim and fmus know nothing of each other.
 USERS = {
-    "studies": ("studies", "benchmarks", "cybership"),
-    "diagnosis": ("diagnosis", "studies", "benchmarks", "cybership"),
-    "cosim": ("cosim", "diagnosis", "studies", "benchmarks", "cybership"),
+    "thesis": ("thesis", "benchmarks"),
+    "studies": ("studies", "thesis", "benchmarks"),
+    "diagnosis": ("diagnosis", "studies", "thesis", "benchmarks", "cybership"),
+    "cosim": ("cosim", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
     "fmucheck": ("fmucheck", "fmus"),
-    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "benchmarks", "cybership"),
+    "fmus": ("fmus", "fmucheck", "diagnosis", "studies", "thesis", "benchmarks", "cybership"),
 }
 KILLED, SURVIVED, SAME, UNTESTED, GONE = "killed", "survived", "equivalent", "no test", "gone"
 STRICT = r",?\s*strict=\w+,?"

@@ -2,7 +2,7 @@
 
 Random data sets: a motion and forces as of a run, and a model error that is a random linear map of them
 with noise. Most such maps drive the ship on, or reverse a force. Each is fitted by least squares and by
-:func:`diagnosis.analysis.nearest_stable`.
+:func:`thesis.analysis.nearest_stable`.
 """
 
 import argparse
@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.analysis import as_model, effective_thrust, nearest_stable
 from diagnosis.assessment import least_dissipation
 from diagnosis.predictors import Model
+from thesis.analysis import as_model, effective_thrust, nearest_stable
 
 COLUMNS = ["u", "v", "r", "tau_X", "tau_Y", "tau_N"]
 COLUMNS += ["|u|u", "|u|v", "|u|r", "|v|v", "|v|r", "|r|v", "|r|r"]

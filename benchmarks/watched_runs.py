@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.basin_trials import sysid4
+from thesis.basin_trials import sysid4
 
 from .hidden_effects.fleet import Fleet, Order
 from .hidden_effects.manoeuvres import manoeuvres

@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import re
 import sys
 from collections import namedtuple
 from collections.abc import Callable
@@ -11,7 +10,15 @@ from typing import NoReturn
 
 from rich.console import Console
 
-from .interrupts import INTERRUPTED, ignore_interrupts, raise_on_interrupt
+from cybership.message_text import printable as printable
+
+from .interrupts import (
+    INTERRUPTED,
+    has_interrupted,
+    hide_lost_interrupts,
+    ignore_interrupts,
+    raise_on_interrupt,
+)
 from .process.run_state import STATE
 
 __all__ = [
@@ -31,39 +38,19 @@ __all__ = [
 
 # Exit codes; 130 is what shells report after Ctrl-C (128 + SIGINT).
 BAD_INPUT, FAILED = 2, 3
-# Longest word and line of a message [characters]; chosen: longer than any path or name in use.
-LONGEST_WORD, LONGEST_LINE = 400, 4000
 # Libraries that not every installation has, as they are imported -> the extra that brings them.
 EXTRAS = {
-    "cryptography": "sign",
+    "cryptography": "diagnosis",
     "distributed": "campaign",
     "fmu_manipulation_toolbox": "export",
     "jinja2": "diagnosis",
     "pandas": "diagnosis",
-    "pyarrow": "parquet",
-    "pysindy": "hidden",
+    "pyarrow": "tables",
+    "pysindy": "analysis",
     "scipy": "diagnosis",
     "sklearn": "analysis",
     "ziglang": "native",
 }
-
-
-def printable(text: str) -> str:
-    """A message as one line for the terminal.
-
-    Names in files and messages of FMUs may hold control characters, which would move the cursor or
-    change colours, or be very long: these are shown as Python writes them, and cut.
-    """
-    line = " ".join(text.split())
-    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
-    line = re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: _cut(word[0], LONGEST_WORD), line)
-    return _cut(line, LONGEST_LINE)
-
-
-def _cut(text: str, longest: int) -> str:
-    """Both ends of a text that is too long."""
-    half = (longest - 3) // 2
-    return text if len(text) <= longest else f"{text[:half]}...{text[-half:]}"
 
 
 def complain(message: object, kind: str = "error: ") -> None:
@@ -142,6 +129,7 @@ def run_command(main: Callable[[], int]) -> NoReturn:
     A request to terminate counts as Ctrl-C. A reader that closes the pipe (``| head``) is no error.
     """
     code = FAILED
+    hide_lost_interrupts()
     try:
         raise_on_interrupt()
         try:
@@ -165,7 +153,12 @@ def run_command(main: Callable[[], int]) -> NoReturn:
         complain(line or f"this should not have happened: {error!r}; please report it")
         code = BAD_INPUT if line else FAILED
     except Exception as error:
-        complain(f"this should not have happened: {error!r}; please report it")
+        # Python wraps what is raised while a class is made, and libraries what they meet.
+        if has_interrupted():
+            complain("interrupted", kind="")
+            code = INTERRUPTED
+        else:
+            complain(f"this should not have happened: {error!r}; please report it")
     STATE.end(code)
     # Text left in the buffer of a closed pipe must not raise again while Python exits.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -118,6 +118,16 @@ def raise_on_interrupt() -> None:
     on_interrupt(_raise)
 
 
+def hide_lost_interrupts() -> None:
+    """From now on nothing is printed where an interrupt is lost, see :func:`raise_if_interrupted`."""
+    sys.unraisablehook = _show_unraisable
+
+
+def _show_unraisable(lost: sys.UnraisableHookArgs) -> None:
+    if not (_interrupted and issubclass(lost.exc_type, KeyboardInterrupt)):
+        sys.__unraisablehook__(lost)
+
+
 def _raise() -> None:
     global _interrupted
     _interrupted = True
@@ -133,6 +143,11 @@ def raise_if_interrupted() -> None:
     """
     if _interrupted:
         raise KeyboardInterrupt
+
+
+def has_interrupted() -> bool:
+    """Whether an interrupt has raised since :func:`raise_on_interrupt`."""
+    return _interrupted
 
 
 def was_lost() -> bool:

@@ -1,3 +1,3 @@
-"""The command ``cybership``: one name for the commands of the project."""
+"""The command ``cybership``: one name for the commands of the project; and what all of them share."""
 
 __all__: list[str] = []

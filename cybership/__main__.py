@@ -8,7 +8,7 @@ if __name__ == "__main__":
 import runpy
 import sys
 
-from .subcommands import SUBCOMMANDS
+from .subcommands import SUBCOMMANDS, all_modules, purpose
 
 USAGE = """usage: cybership COMMAND [...]
 
@@ -21,7 +21,9 @@ Exit codes: 0 done, 2 bad input, 3 failed, 130 interrupted."""
 
 def usage() -> str:
     """The text of ``cybership --help``."""
-    lines = (f"  {name:11}{command.purpose}" for name, command in SUBCOMMANDS.items())
+    modules = all_modules()
+    wide = max(map(len, modules))
+    lines = (f"  {name:{wide}} {purpose(name, module)}" for name, module in modules.items())
     return USAGE.format(commands="\n".join(lines))
 
 
@@ -36,16 +38,18 @@ def main() -> int:
 
         print(f"cybership {version('cybership')}")
         return 0
-    if name not in SUBCOMMANDS:
+    own = SUBCOMMANDS.get(name)
+    modules = all_modules() if own is None else {name: own.module}
+    if name not in modules:
         from cosim.errors import nearest
 
-        print(f"error: no command '{name}'{nearest(name, SUBCOMMANDS)}", file=sys.stderr)
+        print(f"error: no command '{name}'{nearest(name, modules)}", file=sys.stderr)
         return 2
     sys.argv = [f"cybership {name}", *sys.argv[2:]]
     try:
         # As python -m does it: what a command does before its imports happens here, too. But sys.argv[0]
         # stays the name of the command, by which usage lines call it.
-        runpy.run_module(SUBCOMMANDS[name].module, run_name="__main__")
+        runpy.run_module(modules[name], run_name="__main__")
     except ModuleNotFoundError as error:
         from cosim.command import BAD_INPUT, complain, missing_extra
 

@@ -3,7 +3,7 @@
 import sys
 
 from cosim import shipped_names
-from cybership.subcommands import SUBCOMMANDS
+from cybership.subcommands import all_modules
 
 # One match a line, as names of files may have blanks. Options are those of the usage line, which ends at
 # the first blank line of the help; what follows names options of other commands as well.
@@ -47,7 +47,7 @@ def main(arguments: list[str]) -> int:
         print("usage: cybership completion bash|zsh|fish\n", __doc__, file=sys.stderr)
         return 2
     between = " " if arguments[0] == "fish" else r"\n"
-    names = {"commands": between.join(SUBCOMMANDS), "scenarios": between.join(shipped_names())}
+    names = {"commands": between.join(all_modules()), "scenarios": between.join(shipped_names())}
     print(SHELLS[arguments[0]].format(**names), end="")
     return 0
 

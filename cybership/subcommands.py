@@ -1,6 +1,16 @@
-"""The commands behind ``cybership NAME``, each a module that ``python -m`` runs as well."""
+"""The commands behind ``cybership NAME``, each a module that ``python -m`` runs as well.
 
+An installed package adds commands by entry points of the group ``cybership.commands``: name = module.
+The first line of the module's docstring is the command's purpose.
+"""
+
+import ast
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import NamedTuple
+
+GROUP = "cybership.commands"
 
 
 class Subcommand(NamedTuple):
@@ -15,7 +25,7 @@ class Subcommand(NamedTuple):
     purpose: str
 
 
-# In the order in which people meet them.
+# Those that are always there, in the order in which people meet them.
 SUBCOMMANDS = {
     "demo": Subcommand("cybership.demo", "all in one: sail, diagnose, sail with what was found"),
     "run": Subcommand("cosim.run", "run a scenario: log, metrics, pictures"),
@@ -35,10 +45,25 @@ SUBCOMMANDS = {
     "export": Subcommand("cosim.export", "a scenario for other tools: SSP, OSP, one FMU"),
     "interface": Subcommand("cosim.interface", "what each FMU of a scenario gets and gives"),
     "schema": Subcommand("cosim.scenario", "the JSON schema of scenario files"),
-    "replay": Subcommand("diagnosis.replay", "a measured run through an observer: what it blocks"),
-    "sysid": Subcommand("diagnosis.sysid", "system identification by concurrent learning"),
-    "watch": Subcommand("diagnosis.watch", "thrusters that fail during a run"),
-    "pca": Subcommand("diagnosis.pca", "principal components and outliers of runs"),
-    "pls": Subcommand("diagnosis.pls", "partial least squares of the model error"),
     "completion": Subcommand("cybership.completion", "completion for bash, zsh or fish"),
 }
+
+
+def all_modules() -> dict[str, str]:
+    """Command -> module: those above, and those of installed packages, which replace none of them."""
+    own = {name: command.module for name, command in SUBCOMMANDS.items()}
+    return {**own, **{p.name: p.value for p in sorted(entry_points(group=GROUP))}, **own}
+
+
+def purpose(name: str, module: str) -> str:
+    """The purpose of a command in one line; the module of an installed package is read, not run."""
+    if name in SUBCOMMANDS:
+        return SUBCOMMANDS[name].purpose
+    try:
+        spec = find_spec(module)  # imports the package around it
+        source = Path(spec.origin if spec and spec.origin else "").read_text(encoding="utf-8")
+        told = ast.get_docstring(ast.parse(source)) or ""
+    except (Exception, SystemExit) as error:
+        return f"cannot be run: {module}: {error}"
+    first = told.partition("\n")[0].rstrip(".")
+    return first[:1].lower() + first[1:]

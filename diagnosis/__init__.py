@@ -21,4 +21,7 @@ or all at once, as ``python -m diagnosis.learn`` does it::
 
 from cosim.lazy import lazy_names
 
+from .moved import keep_old_names
+
 __all__, __getattr__, __dir__ = lazy_names(__name__, __file__)
+keep_old_names()

@@ -4,9 +4,9 @@ from . import compare as compare
 from .acceptance import Validation as Validation
 from .acceptance import validate as validate
 from .acceptance import verify_record as verify_record
+from .assessment.gathering import gather as gather
 from .assessment.stability import Stability as Stability
 from .assessment.stability import check_stability as check_stability
-from .gathering import gather as gather
 from .interactive import ShownDiagnosis as ShownDiagnosis
 from .interactive import diagnose as diagnose
 from .interactive import load as load

@@ -40,8 +40,8 @@ def compare(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
     from .acceptance import FILES as RECORD
     from .acceptance import lines, read_criteria, validate
+    from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .gathering import gather  # only now: it takes a while to import
     from .predictors import MAP, ship_with
     from .report import ReportData, file_content, show_comparison, write_report
     from .report.document import write_json

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from cosim import InputError, Result
 
 from . import session
+from .assessment.gathering import gather
 from .execution.progress import Advance, silent
-from .gathering import gather
 from .predictors import Model, ModelSource, WeakWindows, nominal, open_model, ship_with, write_model
 from .report.content import Content, file_content
 from .report.notebook import Plots, as_html
@@ -97,6 +97,20 @@ def _model_of(model: Model | None, name: str | Path | None, runs: Sequence[Any])
         told = ship_of_logs(Path(f) for f in files if isinstance(f, (str, Path)))
         name = told[0] if told else None
     return Model(ship=ship_with((), name))
+
+
+def _opened(
+    model: Model | ModelSource | str | Path | None,
+    map: str | Path | None,  # noqa: A002
+    ship: str | Path | None,
+    runs: Sequence[Any],
+) -> tuple[Model | ModelSource, Model]:
+    """The initial model, read if it is a file, and the model of the ship by which runs are read."""
+    of = _model_of(model if isinstance(model, Model) else None, ship, runs)
+    if isinstance(model, (str, Path)):
+        model = open_model(model, map, of.ship)
+        of = model.start or of
+    return model or of, of
 
 
 def _are_loaded(runs: Any) -> bool:
@@ -199,12 +213,9 @@ def compare(
         InputError: a run or the model cannot be used.
     """
     given = _listed(runs)
-    of = _model_of(model if isinstance(model, Model) else None, ship, given)
-    if isinstance(model, (str, Path)):
-        model = open_model(model, map, of.ship)
-        of = model.start or of
+    model, of = _opened(model, map, ship, given)
     loaded = given if _are_loaded(given) else load(given, model=of)
-    return session.evaluate(loaded, model or of, advance=advance)
+    return session.evaluate(loaded, model, advance=advance)
 
 
 def diagnose(
@@ -240,13 +251,10 @@ def diagnose(
         InputError: too little data, or a prior that is negative, not finite, or of what is none.
     """
     parts = [_listed(runs), _listed(validate), _listed(held_out)]
-    of = _model_of(model if isinstance(model, Model) else None, ship, [r for p in parts for r in p])
-    if isinstance(model, (str, Path)):
-        model = open_model(model, ship=of.ship)
-        of = model.start or of
+    model, of = _opened(model, None, ship, [r for p in parts for r in p])
     shares(of.ship, prior)  # before any work
     train, decide, test = (
         p if _are_loaded(p) or not (p or p is parts[0]) else load(p, model=of) for p in parts
     )
-    found = session.diagnose(train, test, prior, model or of, advance, seed, by, decide, pruning)
+    found = session.diagnose(train, test, prior, model, advance, seed, by, decide, pruning)
     return ShownDiagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

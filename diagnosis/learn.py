@@ -47,12 +47,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def learn(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
+    from .assessment.gathering import gather  # only now: it takes a while to import
     from .commands.initial_model import initial_model, proposing
-    from .gathering import gather  # only now: it takes a while to import
     from .predictors import WRITTEN, DescribedShip, ship_with
     from .search import shares
 
-    method(options.method)  # before any work: an unknown name, or a library that is missing
+    by = method(options.method)  # before any work: an unknown name, or a library that is missing
+    criterion(options.pruning)
     possible = [*dict.fromkeys((*FILES, *WRITTEN))]
     with together(options.out, possible) as new:
         craft = ship_with(options.effects, options.ship)
@@ -61,8 +62,6 @@ def learn(options: argparse.Namespace, advance: Advance) -> Done:
         if options.fit and not model.parametric:
             raise InputError(f"--fit needs a model with parameters, which {model.name} does not have")
         shares(craft, options.prior)
-        by = method(options.method)
-        criterion(options.pruning)
         paths = [*options.train, *options.validate, *options.test]
         runs = gather(paths, advance, options.anyway, start, options.horizon, import_later_parts)
         from . import session

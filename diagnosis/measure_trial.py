@@ -54,8 +54,8 @@ def _measured(options: argparse.Namespace, advance: Advance) -> tuple[Outcome, l
     Raises:
         InputError: the run cannot be read, or its kind of trial is not stated.
     """
+    from .assessment.gathering import motion, usable
     from .assessment.trial_errors import length_of, measured_passage
-    from .gathering import motion, usable
     from .predictors import Model, ship_with
     from .runs import prepare, read, sensor_lines
 

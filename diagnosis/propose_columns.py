@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def columns(options: argparse.Namespace, advance: Advance) -> Done:
     """Run the command with parsed options."""
-    from .gathering import gather
+    from .assessment.gathering import gather
     from .predictors import Model, ship_with
     from .runs import propose  # only now: they take a second to import
 

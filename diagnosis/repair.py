@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from .runs import Examined, Run
 
-WINDOW = 8.0  # s, times the scale of the ship: of a prediction
 KINDS = (".csv", ".parquet")
 
 
@@ -75,9 +74,10 @@ def _found(sensors: "Examined") -> list[str]:
 
 def _closed(before: "Run", after: "Run", scale: "Scale") -> list[str]:
     """Errors of windows of the length of a prediction, before and after."""
+    from .predictors.weak_form import HORIZON
     from .runs import closure
 
-    window = WINDOW * scale.time
+    window = HORIZON * scale.time
     pairs = [closure(run, window, window) for run in (before, after)]
     names = {
         "position by speed and heading": ("median", "m", 1.0),

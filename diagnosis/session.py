@@ -12,6 +12,7 @@ from typing_extensions import deprecated
 
 from cosim import InputError
 
+from .assessment.gathering import told_apart
 from .assessment.regions import ErrorRegions, find_regions
 from .assessment.stability import OperatingRegion, Stability, check_stability
 from .execution.parallel import for_each
@@ -26,20 +27,17 @@ from .predictors import (
     evaluate_run,
     nominal,
     open_model,
-    told_apart,
 )
 from .predictors.uncertainty import omega_std
 from .predictors.weak_form import BLOCK
 from .search import DEFAULT, Method, Prior, method
+from .search.gram import PARTS
 from .search.prediction_fit.predicted_bands import prediction_bands
 from .search.prior import NominalPrior
 from .search.prior import shares as prior_shares
 from .verdict.judging import Verdict, judge
 from .verdict.pruning_criteria import USUAL, criterion
 from .verdict.validation_data import ValidationData
-
-MIN_BLOCKS = 4  # of the training runs, so that cross-validation has folds: 60 s; chosen
-REACHED = 0.9  # quantile of |nu| that counts as a speed that the ship reached; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +81,7 @@ class Diagnosis(Verdict):
         comparison: errors before and after, on training, validation and test runs, in this order.
         start: the initial model.
         stability: of the learned model.
-        speeds: u, v, r that the ship reached [m/s, m/s, rad/s].
+        speeds: u, v, r that hold 99 % of the training runs [m/s, m/s, rad/s].
         prior: of the nominal coefficients, as it was given.
         seed: of everything random.
     """
@@ -159,13 +157,12 @@ def _compared(
     advance: Advance,
 ) -> Comparison:
     """The errors of a predictor, and of it with additions, on runs and on those held out."""
-    every = [*runs, *held_out]
+    every, model = [*runs, *held_out], predictor.model
     advance(f"predicting {', '.join(w.run.name for w in every)}")
 
     def of_run(k: int) -> Evaluation:
         return evaluate_run(every[k], predictor, after, k >= len(runs))
 
-    model = predictor.model
     known = [predictor, model, after, *every, *(w.smoothed for w in every)]
     each = range(len(every))
     # What is not of this project may not outlive a fork.
@@ -185,29 +182,17 @@ def diagnose(
     validate: Sequence[WeakWindows] = (),
     pruning: str = USUAL,
 ) -> Diagnosis:
-    """Learn what a model lacks.
-
-    Args:
-        train: runs to learn from, see :func:`diagnosis.gather`.
-        held_out: test runs: they are predicted, and decide nothing.
-        prior: relative standard deviation of every nominal coefficient, or of those named (coefficients
-            or groups); 0: exact; None: by where each value comes from.
-        model: the initial one; the nominal one of the runs' ship by default; an FMU, a Python function,
-            or the path of what ``--model`` takes. The effects of the ship are tried in addition to it.
-        advance: receives the name of each step when it begins.
-        seed: of everything random.
-        by: method of identification, or the name of one.
-        validate: validation runs: they decide what is kept; without any, training data left out in turn.
-        pruning: criterion of pruning, see :mod:`diagnosis.verdict.pruning_criteria`.
-
-    Raises:
-        InputError: too little data, or a prior that is negative, not finite, or of what is none.
-    """
+    """Learn what a model lacks; arguments as of :func:`diagnosis.diagnose`, of runs that are loaded."""
     runs = told_apart([*train, *validate, *held_out])
     source = _source(model, runs)
     prior_shares((source.start or nominal(runs)).ship, prior)  # before any work
     harms, chosen = criterion(pruning), method(by) if isinstance(by, str) else by
-    _refuse_short(train)
+    blocks, block = sum(np.unique(w.block).size for w in train), BLOCK * runs[0].scale.time
+    if blocks < PARTS:
+        raise InputError(
+            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
+            f"at least {PARTS * block:.3g} s are needed"
+        )
     train, validate = runs[: len(train)], runs[len(train) : len(runs) - len(held_out)]
 
     predictor = source.on(runs, advance)
@@ -221,32 +206,15 @@ def diagnose(
     comparison = _predicted(verdict, predictor, runs, data, advance)
     advance("stability")
     stability = check_stability(verdict.learned.model, start, advance, region)
-
-    u, v, r = np.quantile(np.abs(nu), REACHED, axis=0).tolist()
     return Diagnosis(
         **{f.name: getattr(verdict, f.name) for f in fields(verdict)},
         comparison=comparison,
         start=start,
         stability=stability,
-        speeds=(u, v, r),
+        speeds=region,
         prior=prior,
         seed=seed,
     )
-
-
-def _refuse_short(train: Sequence[WeakWindows]) -> None:
-    """Refuse training runs that are too short for folds.
-
-    Raises:
-        InputError: they are.
-    """
-    blocks = sum(np.unique(w.block).size for w in train)
-    if blocks < MIN_BLOCKS:
-        block = BLOCK * train[0].scale.time
-        raise InputError(
-            f"too little to learn from: {blocks * block:.3g} s with thrusters at work, "
-            f"at least {MIN_BLOCKS * block:.3g} s are needed"
-        )
 
 
 def _predicted(
@@ -261,10 +229,9 @@ def _predicted(
     final = learned if verdict.changed else None
     found = _compared(predictor.in_windows(), runs[:decide], final, runs[decide:], advance)
     uses = ["train"] * len(data.train) + ["validate"] * len(data.validate) + ["test"] * len(runs)
-    evaluations = []
-    for e, use in zip(found.evaluations, uses, strict=False):
-        bands = prediction_bands(
-            e.smoothed, e.windows, learned, verdict.posterior, verdict.unrecorded.push
-        )
-        evaluations.append(replace(e, bands=bands, use=use))
+    known = learned, verdict.posterior, verdict.unrecorded.push
+    evaluations = [
+        replace(e, bands=prediction_bands(e.smoothed, e.windows, *known), use=use)
+        for e, use in zip(found.evaluations, uses, strict=False)
+    ]
     return replace(found, evaluations=evaluations, predictor=predictor)

@@ -7,7 +7,6 @@ from pathlib import Path
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, printable, run_command
 
-DIFFERS = 1
 TOLD = {True: "holds    ", False: "DIFFERS  ", None: "unknown  "}
 
 
@@ -24,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     output = Output(highlight=False, markup=False, soft_wrap=True)
     for check in checks:
         output.print(f"{TOLD[check.holds]}{printable(check.line)}")
-    return DIFFERS if any(check.holds is False for check in checks) else 0
+    return int(any(check.holds is False for check in checks))
 
 
 def _parser() -> argparse.ArgumentParser:

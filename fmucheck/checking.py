@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
+from cybership.message_text import printable
 from fmus.build import BuildError, build
 from fmus.declare import DeclarationError
 from fmus.interruption import program
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(error: Exception) -> int:
-    print("error:", " ".join(str(error).split()), file=sys.stderr)
+    print("error:", printable(str(error)), file=sys.stderr)
     return BAD_INPUT
 
 

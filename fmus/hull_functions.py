@@ -8,7 +8,7 @@ A function gets u, v and r through the water [m/s, m/s, rad/s] and then its para
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from .declare import POSITIVE
+from .declare import POSITIVE, DeclarationError
 from .ops import Number, atan2, fmax, sqrt, where
 
 Function = Callable[..., tuple[Number, Number, Number]]
@@ -42,6 +42,9 @@ def hull_function(*changes: Change) -> Callable[[Function], Function]:
     """Decorator that registers a function of the hull's damping, and what may be otherwise."""
 
     def register(function: Function) -> Function:
+        taken = FUNCTIONS.get(function.__name__)
+        if taken is not None and taken.__module__ == __name__:
+            raise DeclarationError(f"there is a function of the hull '{function.__name__}' already")
         FUNCTIONS[function.__name__] = function
         CHANGES[function.__name__] = changes
         return function

@@ -1,17 +1,21 @@
 """A ship: a set of effects, and the components of vessel and thrusters that have them."""
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from .actuators.actuation import command_units
 from .actuators.actuator_layout import layouts
+from .actuators.law import Law
 from .actuators.response import Layout, Prepared
 from .actuators.weighted_allocation import axes
 from .declare import Component, Known, Variable, variables
 from .effects import STANDARD, EffectSet
+from .hull_functions import FUNCTIONS
 from .scale import Scale
 from .ship_description import Description
 from .ships.expansion import effects_of_ship, ship_parts
@@ -177,8 +181,19 @@ def ship(effects: EffectSet = STANDARD, description: Description | None = None) 
 
 @cache
 def _ship(effects: EffectSet, description: Description) -> Ship:
+    for file in sorted(_files_of_laws(description) - {file.resolve() for file in effects.files}):
+        effects = effects.plus_file(file)
     own = effects_of_ship(description, effects)
     parts = make_vessel(own, description), make_thrusters(own, description)
     for part in parts:
         _ = part.variables  # refuses names that are there twice
     return Ship(own, *parts, description)
+
+
+def _files_of_laws(description: Description) -> set[Path]:
+    """Files that are not the project's, in which laws of the ship are; its FMUs carry them."""
+    laws = [*(Law.known[part.law] for part in description.actuators)]
+    functions = [*(FUNCTIONS[part.law] for part in description.functions)]
+    modules = {sys.modules[law.__module__] for law in (*laws, *functions)}
+    files = {Path(str(module.__file__)).resolve() for module in modules}
+    return {file for file in files if not file.is_relative_to(Path(__file__).parent)}

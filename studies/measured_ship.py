@@ -18,8 +18,8 @@ from diagnosis.execution.progress import Advance, progress
 from diagnosis.search import shares
 
 from .measured import bollard, ship_tables
+from .measured.data_folder import measured_files
 from .measured.leave_one_out import Fold, gather, leave_out
-from .observers import basin
 from .study_command import run_study, study_parser
 from .study_report import Report
 
@@ -47,7 +47,7 @@ def with_all(folds: Sequence[Fold], found: Diagnosis) -> list[Fold]:
 
 def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
     """Learn from the measured runs and write the report; returns its path."""
-    pulls, files = bollard.read(data), basin.files(data)
+    pulls, files = bollard.read(data), measured_files(data)
     with progress(Console(stderr=True)) as advance:
         runs = gather(files, advance)
         folds = learned(runs, prior, quick, advance)
@@ -87,7 +87,7 @@ def study(data: Path, out: Path, prior: float | None, quick: bool) -> Path:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = study_parser(
-        "measured_ship",
+        "studies.measured_ship",
         "Learn what the model lacks of the real ship, each measured run left out in turn.",
         "  python -m studies.measured_ship ~/data\n"
         "  python -m studies.measured_ship ~/data --prior 0.1 --out results/careful\n"

@@ -84,7 +84,9 @@ def folds_command(
         study: ``study(data, out, folds, by, quick)``, by the method of identification.
     """
     command = f"  python -m studies.{name} {example}"
-    parser = study_parser(name, description, f"{command}\n{command} --folds 3", seeds=None, jobs=False)
+    parser = study_parser(
+        f"studies.{name}", description, f"{command}\n{command} --folds 3", seeds=None, jobs=False
+    )
     parser.add_argument("data", type=Path, metavar="DATA", help=data)
     parser.add_argument("--folds", type=int, metavar="N", help=f"folds left out (one for each {one})")
     parser.add_argument(

@@ -15,23 +15,23 @@ from cosim.command import BAD_INPUT, FAILED, command_parser, folder_name, run_co
 
 
 def study_parser(
-    name: str, description: str, examples: str, seeds: int | None = 10, jobs: bool = True
+    module: str, description: str, examples: str, seeds: int | None = 10, jobs: bool = True
 ) -> argparse.ArgumentParser:
     """A parser with the options that studies share: ``--out``, ``--seeds``, ``--jobs``, ``--quick``.
 
     Args:
-        name: of the study's module.
+        module: of the study, as ``studies.tanker``.
         description: what it does.
         examples: lines for the end of the help.
         seeds: how many by default; None where there is nothing to repeat.
         jobs: whether several runs go on at a time.
     """
     parser = command_parser(
-        f"studies.{name}",
+        module,
         description,
         f"examples:\n{examples}\nexit codes: 0 done, 2 bad input, 3 a run failed, 130 interrupted",
     )
-    out = Path("results") / f"study_{name}"
+    out = Path("results") / f"study_{module.rpartition('.')[2]}"
     parser.add_argument(
         "--out", type=folder_name, metavar="DIR", default=out, help=f"report folder ({out})"
     )

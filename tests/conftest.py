@@ -14,7 +14,7 @@ from support.opened import Opened
 from support.plain import make_fmu, ramp_and_gain, with_unit
 from support.project import ROOT
 from support.shared import keep_in, once, shared_folder
-from support.slow_tests import PROCESSOR, slow_tests
+from support.slow_tests import NODE, PROCESSOR, slow_tests
 
 from cosim.dispatch import analyse_runs
 from cosim.fmu import LocalInstance, Model, archive_check
@@ -73,7 +73,7 @@ def pytest_runtest_call(item):
         return (yield)
     finally:
         used = sum(os.times()[:4]) - sum(before[:4])
-        item.user_properties.append((PROCESSOR, f"{used:.2f}"))
+        item.user_properties += [(PROCESSOR, f"{used:.2f}"), (NODE, item.nodeid)]
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -215,7 +215,7 @@ def serial(monkeypatch):
     def here(scenarios, analyse, folders, _, advance):
         return analyse_runs(scenarios, analyse, folders, 0, advance)
 
-    monkeypatch.setattr("studies.monte_carlo.analyse_runs", here)
+    monkeypatch.setattr("thesis.monte_carlo.analyse_runs", here)
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 from support.project import ROOT
 
 # Each may import those before it, and nothing else of the project.
-PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership", "studies", "benchmarks")
+PACKAGES = ("fmus", "fmucheck", "cosim", "diagnosis", "cybership", "studies", "thesis", "benchmarks")
 
 # The modules and packages directly in cosim, lowest first; each line may import the lines before it only.
 COSIM_LAYERS = (
@@ -37,16 +37,14 @@ COSIM_LAYERS = (
 
 # The same of diagnosis: the steps of the work, in their order.
 DIAGNOSIS_LAYERS = (
+    ("moved",),
     ("execution",),
     ("runs",),
     ("predictors",),
     ("search", "assessment"),
     ("verdict",),
-    ("gathering",),
     ("session",),
     ("report",),
-    ("analysis",),
-    ("open_loop",),
     ("acceptance",),
     ("commands",),
     ("interactive",),
@@ -55,25 +53,22 @@ DIAGNOSIS_LAYERS = (
         "criteria",
         "learn",
         "measure_trial",
-        "pca",
-        "pls",
         "propose_columns",
         "repair",
-        "replay",
-        "sysid",
         "verify",
-        "watch",
     ),  # commands
 )
 # And of fmus: what all components share, effects, components, the ship of them, their FMI face, the same in C,
 # the tools.
 FMUS_LAYERS = (
-    ("ops", "declare", "base_units", "signals", "interruption", "docstring"),
+    ("ops", "declare", "base_units", "signals"),
+    ("docstring", "interruption"),
     ("scale",),
     ("ship_description",),
     ("hull_functions",),
     ("frames", "hull", "sizing"),
     ("effects",),
+    ("installed",),
     ("actuators",),
     ("controller", "guidance", "observer", "thrusters", "vessel"),
     ("watch",),
@@ -113,21 +108,27 @@ PUBLIC_TO_DIAGNOSIS = (
     "cosim.lazy",
     "cosim.process",
     "cosim.results",
+    "cosim.scenario",  # shipped ones, for the stability of the closed loop
     "cosim.supervision",
     "cosim.system",
     "cosim.trials",
 )
-# What studies and benchmarks may import of fmus, beside the modules of components: what is public to files of
+# The methods of the thesis are commands, and play runs to FMUs by the master.
+PUBLIC_TO_THESIS = (*PUBLIC, "cosim.lazy", "cosim.process", "cosim.supervision")
+# What studies, thesis and benchmarks may import of fmus, beside the modules of components: what is public to files of
 # components and effects of a user's own. A module without ``__all__`` offers what it defines.
 PUBLIC_OF_FMUS = (
     "fmus.actuators.response",
     "fmus.build",
     "fmus.declare",
     "fmus.effects",
+    "fmus.effects.text",
+    "fmus.effects.linear_map",
     "fmus.frames",
     "fmus.hull",
     "fmus.ops",
     "fmus.ship",
+    "fmus.ships.ship_file",
     "fmus.signals",
     "fmus.actuators.law",
     "fmus.actuators.laws",
@@ -135,9 +136,11 @@ PUBLIC_OF_FMUS = (
 COMPONENTS = ("controller", "guidance", "observer", "thrusters", "vessel", "watch")
 PUBLIC_OF_DIAGNOSIS = (
     "diagnosis",
-    "diagnosis.analysis",
     "diagnosis.assessment",
+    "diagnosis.commands",
+    "diagnosis.execution",
     "diagnosis.execution.progress",
+    "diagnosis.moved",
     "diagnosis.predictors",
     "diagnosis.report",
     "diagnosis.runs",
@@ -282,7 +285,7 @@ def foreign_uses(package, other, allowed):
                 yield f"{module} uses {name}.{what}"
 
 
-@pytest.mark.parametrize("package", ["cosim", "fmus", "fmucheck", "diagnosis"])
+@pytest.mark.parametrize("package", ["cosim", "fmus", "fmucheck", "diagnosis", "studies", "thesis"])
 def test_no_import_circles(package):
     try:
         TopologicalSorter(graph(package)).prepare()
@@ -316,23 +319,34 @@ def test_modules_import_modules_inside_cosim():
         assert not targets & packages, module
 
 
+# What any command shares, whatever it is about.
+SHARED = {"cybership.message_text", "cybership.scratch_folder"}
+
+
 @pytest.mark.parametrize("package", ["fmus", "cosim"])
 def test_packages_below_import_nothing_of_others(package):
     for module, targets in graph(package).items():
         if module != "fmus.check":  # where the command of fmucheck is called
-            assert {name.partition(".")[0] for name in targets} <= {package}, module
+            assert {name.partition(".")[0] for name in targets - SHARED} <= {package}, module
 
 
 def test_checks_know_the_build_and_nothing_of_the_ship():
     """Beside that only what any command shares: they hold anybody's FMUs against the standard."""
-    shared = {"fmus.base_units", "fmus.build", "fmus.declare", "fmus.docstring", "fmus.interruption"}
+    shared = SHARED | {
+        f"fmus.{n}" for n in ("base_units", "build", "declare", "docstring", "interruption")
+    }
     for module, targets in graph("fmucheck").items():
         assert {name for name in targets if not name.startswith("fmucheck")} <= shared, module
 
 
 @pytest.mark.parametrize(
     ("package", "allowed"),
-    [("diagnosis", PUBLIC_TO_DIAGNOSIS), ("studies", PUBLIC), ("benchmarks", PUBLIC)],
+    [
+        ("diagnosis", PUBLIC_TO_DIAGNOSIS),
+        ("studies", PUBLIC),
+        ("thesis", PUBLIC_TO_THESIS),
+        ("benchmarks", PUBLIC),
+    ],
 )
 def test_other_packages_use_public_names_of_cosim(package, allowed):
     assert list(foreign_uses(package, "cosim", allowed)) == []
@@ -342,8 +356,8 @@ def test_other_packages_use_public_names_of_cosim(package, allowed):
 MEASURE_PARTS = ("benchmarks.calibration", "benchmarks.fit_drivers", "benchmarks.learning_time")
 
 
-@pytest.mark.parametrize("package", ["studies", "benchmarks"])
-def test_studies_and_benchmarks_use_public_names(package):
+@pytest.mark.parametrize("package", ["studies", "thesis", "benchmarks"])
+def test_studies_thesis_and_benchmarks_use_public_names(package):
     components = [
         name for name in sources("fmus") if name.split(".")[1:2] and name.split(".")[1] in COMPONENTS
     ]
@@ -352,6 +366,20 @@ def test_studies_and_benchmarks_use_public_names(package):
         *foreign_uses(package, "diagnosis", PUBLIC_OF_DIAGNOSIS),
     ]
     assert [use for use in found if use.partition(" ")[0] not in MEASURE_PARTS] == []
+
+
+@pytest.mark.parametrize("package", [name for name in PACKAGES if name not in ("thesis", "benchmarks")])
+def test_nothing_of_the_product_imports_the_thesis(package):
+    """Its commands are found by entry points, its old names by :mod:`diagnosis.moved`."""
+    for module, targets in graph(package).items():
+        assert not [name for name in targets if name.partition(".")[0] == "thesis"], module
+
+
+def test_the_thesis_takes_of_the_studies_what_they_share():
+    used = {
+        name for targets in graph("thesis").values() for name in targets if name.startswith("studies")
+    }
+    assert used == {"studies.measured.data_folder", "studies.study_command", "studies.study_report"}
 
 
 @pytest.mark.parametrize("module", PUBLIC_OF_DIAGNOSIS)
@@ -383,7 +411,7 @@ def test_file_names_are_unique(package):
     assert not set(names) & set(others) - ALSO_ELSEWHERE
 
 
-# cosim.command is a public path; studies.allocation, benchmarks.constants and benchmarks.ellipse are commands,
+# cosim.command is a public path; thesis.allocation, benchmarks.constants and benchmarks.ellipse are commands,
 # fmus and diagnosis have files of these names.
 ALSO_ELSEWHERE = {"command", "allocation", "constants", "ellipse"}
 
@@ -400,8 +428,8 @@ PARTS = re.compile(
     r"(?<![a-z])(vsp\d?|bow(?! to))(?![a-z])|^((matlab_)?five|otter|cse1|kvlcc2|gunnerus)$",
     re.IGNORECASE,
 )
-# The name of the default ship, and a page of the thesis' analysis. The parts of a ship are named in its file.
-OF_ONE_SHIP = {"fmus.ships.naming", "diagnosis.open_loop.thruster_report"}
+# The name of the default ship. The parts of a ship are named in its file.
+OF_ONE_SHIP = {"fmus.ships.naming"}
 
 
 def words(path):

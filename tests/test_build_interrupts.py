@@ -11,8 +11,10 @@ import zipfile
 import pytest
 from support.project import ROOT
 
+from cybership.scratch_folder import scratch_folder
 from fmus import interruption
 from fmus.build import building
+from fmus.native import compilers
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no signals to send")
 
@@ -61,6 +63,36 @@ def test_an_interrupt_ends_a_command_whatever_it_does(work):
         capture_output=True, text=True, cwd=ROOT, check=False, timeout=30,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+@posix
+def test_temporary_files_of_a_compiler_lie_in_the_folder_of_the_build(tmp_path, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    seen = []
+    with scratch_folder() as work:
+        (compiler := work / "gcc").write_text("#!/bin/sh\nmktemp\nexit 1\n")
+        compiler.chmod(0o755)
+        found = compilers.Compiler(((str(compiler),),), (), "")
+        monkeypatch.setattr(compilers, "compiler_for", lambda _: found)
+        with pytest.raises(compilers.CompilerError):
+            compilers.compiled(work / "a.c", "linux64", work)
+        seen = [path.name for path in work.iterdir()]
+        (outer,) = (tmp_path / "temporary").iterdir()
+        assert outer.name.startswith(f"cybership_{os.getpid()}_")
+    assert any(name.startswith("tmp.") for name in seen)
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_a_build_that_takes_long_says_so(tmp_path, monkeypatch):
+    monkeypatch.setenv("CYBERSHIP_CACHE", str(tmp_path))
+    monkeypatch.setattr(building, "LONG", 0.0)
+    notes = []
+    building.build("guidance_ellipse", note=notes.append)
+    assert notes == ["building guidance_ellipse takes longer than 0 s"]
+    building.build("guidance_ellipse", note=notes.append)  # from the cache
+    assert len(notes) == 1
 
 
 def test_a_build_that_is_interrupted_makes_no_folder(tmp_path, monkeypatch):

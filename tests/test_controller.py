@@ -16,7 +16,7 @@ from fmus.frames import rotate_to_body
 from fmus.hull import Damping, Inertia, RotationalDamping, Terms, mass_matrix
 from fmus.signals import Estimate, Force, Target
 from fmus.vessel import vessel
-from studies.basin_trials.trials import SOFT
+from thesis.basin_trials.trials import SOFT
 
 ABS = abs_module.COMPONENT
 Params = ABS.params

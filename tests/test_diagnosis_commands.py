@@ -25,9 +25,9 @@ from support.shared import once
 
 import diagnosis
 from cosim import InputError
+from cybership import scratch_folder
 from diagnosis import compare, learn, session
 from diagnosis.assessment.stability import OPERATING, least_dissipation
-from diagnosis.execution import result_folder
 from diagnosis.execution.result_folder import together
 from diagnosis.predictors import DescribedShip
 from diagnosis.report.formatting import finite
@@ -485,7 +485,7 @@ def written(monkeypatch, tmp_path):
         ("write_report", write_report),
     ):
         monkeypatch.setattr(f"diagnosis.report.{name}", stub)
-    monkeypatch.setattr("diagnosis.gathering.gather", lambda paths, *_: list(paths))
+    monkeypatch.setattr("diagnosis.assessment.gathering.gather", lambda paths, *_: list(paths))
     monkeypatch.setattr(session, "diagnose", lambda *_, **__: given)
     monkeypatch.setattr(session, "evaluate", lambda *_, **__: given.comparison)
     return given
@@ -546,20 +546,20 @@ def write(out, text, error=None, names=("a", "b")):
     with together(out, ["a", "b"]) as new:
         for name in names:
             (new / name).write_text(text)
-        assert not error or new.parent == out
+        assert not error or new.parent.parent == out
         if error:
             raise error
 
 
 def test_folder_that_another_command_takes_away_is_made_again(tmp_path, monkeypatch):
-    out, made = tmp_path / "a" / "b", result_folder.mkdtemp
+    out, made = tmp_path / "a" / "b", scratch_folder.tempfile.mkdtemp
 
     def taken_away(**options):
-        monkeypatch.setattr(result_folder, "mkdtemp", made)
+        monkeypatch.setattr(scratch_folder.tempfile, "mkdtemp", made)
         out.rmdir()
         return made(**options)
 
-    monkeypatch.setattr(result_folder, "mkdtemp", taken_away)
+    monkeypatch.setattr(scratch_folder.tempfile, "mkdtemp", taken_away)
     with together(out, ["x"]) as new:
         (new / "x").write_text("x")
     assert [f.name for f in out.iterdir()] == ["x"]

@@ -11,14 +11,14 @@ from diagnosis.assessment import remainder_text
 from diagnosis.assessment.recurrence import Recurrence
 from diagnosis.assessment.remainder import AxisRemainder
 from diagnosis.predictors import Model
-from diagnosis.predictors.evaluation import POINTS, Bands, quantile
+from diagnosis.predictors.evaluation import Bands, quantile
 from diagnosis.predictors.uncertainty import NOISE_TOLERANCE
 from diagnosis.predictors.windows import WindowErrors, Windows, between_steps
 from diagnosis.search.conclusion import interval, laplace_std, suspected
 from diagnosis.search.effect_evidence import Evidence, evidence, variation
 from diagnosis.search.findings import Finding, Findings
 from diagnosis.search.gram import Nuisance
-from diagnosis.search.nonlinear.multistart import Landscape, linear_ones, same
+from diagnosis.search.nonlinear.multistart import Landscape, linear_ones
 from diagnosis.search.prior import NominalPrior
 from diagnosis.verdict import coefficients
 from diagnosis.verdict.coefficients import concluded
@@ -100,11 +100,11 @@ def test_bands_have_the_covariance_of_their_time_and_the_probability_of_their_le
     step = np.sqrt(quantile(0.9, 1) * 0.25 * np.array([1.0, 3.0, 4.0]))
     assert b.headings(1, 0.9) == pytest.approx(b.predicted[1, :, 2] + np.array([[-1.0], [1.0]]) * step)
     ellipses = b.ellipses(1, 0.5)
-    assert ellipses.shape == (3, POINTS, 2)
     assert ellipses[:, 0] == pytest.approx(ellipses[:, -1])
     off = ellipses - b.predicted[1, :, None, :2]
     squares = np.einsum("tpi,ij,tpj->tp", off, np.linalg.inv(V[:2, :2]), off)
-    assert squares == pytest.approx(np.tile(quantile(0.5, 2) * size[1][:, None], POINTS))
+    level = quantile(0.5, 2) * size[1][:, None]
+    assert squares == pytest.approx(np.tile(level, squares.shape[1]))
     for share, within in ((0.99, True), (1.01, False)):
         root = np.linalg.cholesky(V[:2, :2]) @ [0.6, -0.8]
         place = share * np.sqrt(quantile(0.9, 2) * np.array([1.5, 5.0, 3.5]))[:, None] * root
@@ -276,7 +276,8 @@ def landscape(force=lambda v: np.ones(4), values=None, shape=("s",), coefficient
     names = dict.fromkeys([*shape, *coefficients])
     parameters = tuple(declared(n, *ranges.get(n, ("1",))) for n in names)
     effect = SimpleNamespace(parameters=parameters, shape_parameters=shape, coefficients=coefficients)
-    return Landscape(effect, force, np.ones(4), 20.0, values or dict.fromkeys(names, 0.0), {"k": 5.0})
+    units = dict.fromkeys(names, 1.0) | {"k": 5.0}
+    return Landscape(effect, force, np.ones(4), 20.0, values or dict.fromkeys(names, 0.0), units)
 
 
 @pytest.mark.parametrize(
@@ -305,8 +306,6 @@ def test_values_are_tried_over_the_limits_or_far_to_both_sides(range_, value, pl
     assert tried[0] == value
     assert len(tried) == 33
     assert of.within(p, 31.0 / 32.0) == pytest.approx(max(tried[1:]))
-    assert same(of, {"s": 1.0}, {"s": 1.0 + 0.0099 * of.scale(p)})
-    assert not same(of, {"s": 1.0}, {"s": 1.0 + 0.0101 * of.scale(p)})
 
 
 def test_coefficients_are_linear_idle_or_neither():
@@ -319,7 +318,6 @@ def test_coefficients_are_linear_idle_or_neither():
     of = landscape(lambda v: force({**none, **v}), none, ("s",), tuple("abcd"))
     assert linear_ones(of) == (["a"], ["c", "d"])
     assert of.columns({"s": 0.0}, ["a", "b"]) == pytest.approx(np.column_stack([x, np.tanh(1.0) * x**2]))
-    assert of.size({"a": 2.0}) == pytest.approx(2.0 * np.sqrt(np.mean(x**2)))
     line = np.ones(4) - x * (x.sum() / (x @ x))
     assert of.left({"s": 0.0}, ["a"]) == pytest.approx(line)
     assert of.left({"a": 0.5}, []) == pytest.approx(np.ones(4) - 0.5 * x)

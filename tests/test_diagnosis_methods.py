@@ -116,7 +116,7 @@ def test_missing_library_is_named_with_the_extra(name, library, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(InputError) as raised:
         diagnosis.method(name)
-    assert str(raised.value) == f"method '{name}' needs {library}: pip install 'cybership[hidden]'"
+    assert str(raised.value) == f"method '{name}' needs {library}: pip install 'cybership[analysis]'"
 
 
 def test_default_method_imports_no_library_of_the_others():

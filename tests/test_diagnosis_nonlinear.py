@@ -10,7 +10,7 @@ from support.measured import sail, smoothed
 
 from diagnosis import Model, Windows, omega
 from diagnosis.predictors import read_model, weak_windows, write_model
-from diagnosis.search.candidates import additions, candidate, covered, model_error
+from diagnosis.search.candidates import SMALL, additions, candidate, covered, model_error
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.nonlinear.multistart import Landscape, best_values
 from fmus.declare import Range, Variable
@@ -135,7 +135,9 @@ def test_the_shape_of_an_effect_is_found_far_from_its_start():
     declared = tuple(Variable(n, "m", n, s, Range(min=least.get(n)), False) for n, s in starts.items())
     tether = effect("t", "force", "XY", parameters=declared, description="tether")(pull)
     truth = {"k": 0.2, "to_x": -3.0, "to_y": 5.0, "slack": 2.0}
-    of = Landscape(tether, lambda v: pull(**{**starts, **v}), pull(**truth), 8.0, starts)
+    of = Landscape(
+        tether, lambda v: pull(**{**starts, **v}), pull(**truth), 8.0, starts, dict.fromkeys(starts, 1.0)
+    )
     values, fitted = best_values(of, lambda shape: ())
     assert fitted == ["k"]
     assert values[0] == pytest.approx({n: v for n, v in truth.items() if n != "k"}, abs=1e-3)
@@ -151,17 +153,18 @@ def test_a_curve_is_fitted_where_the_data_reach_it():
 
 @pytest.mark.parametrize(("growth", "rough"), [(0.0, False), (-0.4, True)])
 def test_a_slope_that_depends_on_its_step_is_none(growth, rough, monkeypatch):
-    name, t = "thrust_curve_deadband", SimpleNamespace(prior=None, error=lambda at: "left")
+    name, t = "thrust_curve_deadband", SimpleNamespace(data=(), prior=None, error=lambda at: "left")
     at = SimpleNamespace(start=Model(), values={name: 0.2}, model=lambda prior: Model())
-    sizes = []
+    places = []
 
     def slope(given, model, left, parameter, size):
-        assert (given, left, parameter) == (t, "left", name)
-        sizes.append(size)
-        return np.full((5, 3), 1.0 + growth * len(sizes))
+        assert (given, parameter, size) == (t, name, 0.2)
+        places.append((left, model.value(name)))
+        return np.full((5, 3), 1.0 + growth * len(places))
 
     monkeypatch.setattr(profile, "slope", slope)
+    monkeypatch.setattr(profile, "model_error", lambda data, model: "left below")
     assert profile.is_rough(t, at, name) == rough
-    assert sizes == pytest.approx([0.2, 0.2 * profile.COARSER])
+    assert places == [("left", 0.0), ("left below", pytest.approx(-0.2 * SMALL))]
     assert not profile.is_rough(t, at, "loss_surge"), "a linear one has one slope"
-    assert len(sizes) == 2
+    assert len(places) == 2

@@ -8,9 +8,9 @@ from multiprocessing import get_context
 
 import pytest
 
-from diagnosis.execution.parallel import FORKS, for_each
+from diagnosis.execution.parallel import for_each, forks
 
-forked = pytest.mark.skipif(not FORKS, reason="needs fork and two cores")
+forked = pytest.mark.skipif(not forks(), reason="needs fork and two cores")
 
 
 def patient(x):

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from diagnosis.predictors.weak_form import OVERLAP
 from diagnosis.search import candidates
 from diagnosis.search.candidates import Candidate, Shape, scaled, smoothness
-from diagnosis.search.gram import RUN, Nuisance, block_folds, gram_table, noise
+from diagnosis.search.gram import Nuisance, block_folds, gram_table, noise
 from diagnosis.search.map_regression import Scored, held_out_loss, regression, score
 from diagnosis.search.nonlinear import profile
 from diagnosis.search.shortlist import in_order, novelty
@@ -19,7 +19,7 @@ from fmus.declare import Range
 
 K, BLOCK = 240, 12
 SIGMA = np.array([0.5, 2.0, 0.1])
-BLOCKS = np.arange(K) // BLOCK + RUN * (np.arange(K) >= 150)
+BLOCKS = np.column_stack([np.arange(K) >= 150, np.arange(K) // BLOCK])
 PRIOR = np.array([[0.0, 0.0], [0.0, 1.0]])
 
 
@@ -58,7 +58,7 @@ def direct(s, rows, nuisance=NUISANCE):
     X, z = A[rows].reshape(-1, at.size), y[rows].ravel()
     b = np.linalg.solve(X.T @ X + P, X.T @ z - P @ at)
     left = np.square(y - A @ b).sum(axis=1)
-    losses = np.array([left[k == BLOCKS].sum() for k in np.unique(BLOCKS)])
+    losses = np.bincount(np.unique(BLOCKS, axis=0, return_inverse=True)[1].ravel(), left)
     H = X[:, : len(start)].T @ X[:, : len(start)]
     size = np.trace(np.linalg.solve(H + P[: len(start), : len(start)], H)) + len(
         set(s.given) - set(s.fitted)
@@ -82,14 +82,13 @@ def test_a_fit_by_gram_matrices_is_direct_least_squares(table, candidate, number
 @pytest.mark.parametrize("candidate", [2, 3])
 @pytest.mark.parametrize("by_run", [False, True])
 def test_blocks_are_judged_by_fits_that_have_not_seen_them(table, by_run, candidate):
-    names = np.unique(BLOCKS)
-    number = names // RUN if by_run else np.arange(names.size) % 8
-    expected = np.empty(names.size)
+    names, block = np.unique(BLOCKS, axis=0, return_inverse=True)
+    number = names[:, 0] if by_run else np.arange(len(names)) % 8
+    expected = np.empty(len(names))
     for n in np.unique(number):
-        train = np.flatnonzero(~np.isin(BLOCKS, names[number == n]))
-        at = np.isin(BLOCKS, BLOCKS[train])
+        train = np.flatnonzero(number[block.ravel()] != n)
         found = [direct(s, train) for s in SHAPES[candidate]]
-        training = [f[1][np.isin(names, BLOCKS[at])].sum() + f[2] for f in found]
+        training = [f[1][number != n].sum() + f[2] for f in found]
         expected[number == n] = found[int(np.argmin(training))][1][number == n]
     options = [regression(table, candidate, k) for k in range(2)]
     found = held_out_loss(table, options, table.by_run if by_run else table.by_block)
@@ -111,14 +110,14 @@ def test_a_score_has_the_shape_that_fits_best_and_log_n_for_each_parameter(table
     nothing = score(table, -1, 1)
     assert nothing.complexity == 0.0
     assert nothing.prior == pytest.approx(regression(table, -1, 0).fitted(table.total).penalty)
-    first = BLOCKS < RUN
+    first = BLOCKS[:, 0] == 0
     alone = gram_table(Y[first], BLOCKS[first], [], replace(NUISANCE, columns=FORCED[first]), SIGMA)
     assert score(alone, -1, 1).runs == pytest.approx(score(alone, -1, 1).blocks)
     assert alone.rows.tolist() == [BLOCK] * 12 + [6]
 
 
 def test_a_column_that_holds_nothing_is_not_fitted_unless_it_has_a_prior():
-    empty = PLAIN.columns * [1.0, 1e-9]
+    empty = PLAIN.columns * [1.0, 1e-12]
     prior = np.eye(2)
     made = [Candidate(None, [shape(empty)]), Candidate(None, [shape(empty, precision=prior)])]
     t = gram_table(Y, BLOCKS, made, NUISANCE, SIGMA)

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosis import Model
-from diagnosis.assessment.remainder import CHANCE, SHARE_OF_FIRST, SPAN, TESTS, axis_remainders, spans
+from diagnosis.assessment.remainder import axis_remainders, level, span_windows, spans
+from diagnosis.assessment.settings import SETTINGS
 from diagnosis.predictors.uncertainty import SHARE_OF_COMMAND
 from diagnosis.predictors.weak_form import EVERY
 
+SPAN = span_windows()
 K, NOISE = 100 * SPAN, 0.02
 
 
@@ -46,7 +48,7 @@ def test_noise_is_no_remainder(seed):
     for found in left(noise(seed=seed)).values():
         assert not found.significant
         assert not found.beyond_chance
-        assert found.p_value > 10.0 * CHANCE / TESTS
+        assert found.p_value > 10.0 * level()
         assert found.uncertainty == pytest.approx(NOISE)
         assert found.rms == pytest.approx(NOISE, rel=0.1)
 
@@ -84,7 +86,7 @@ def test_a_force_that_changes_sign_from_span_to_span_lasts_too():
 
 
 @pytest.mark.parametrize(
-    ("before", "command"), [(0.02 / SHARE_OF_FIRST, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
+    ("before", "command"), [(0.02 / SETTINGS.share_of_first, 0.01), (0.01, 0.02 / SHARE_OF_COMMAND)]
 )
 def test_what_is_little_beside_the_first_error_or_the_command_does_not_matter(before, command):
     after = noise()

@@ -10,11 +10,11 @@ from support.measured import sail
 import diagnosis
 from diagnosis import Model
 from diagnosis.assessment.closed_loop import REFERENCES
-from diagnosis.assessment.covariates import MIN_TIME_BIN
+from diagnosis.assessment.gathering import gather
 from diagnosis.assessment.stability import OperatingRegion, largest_distance
 from diagnosis.compare import main as compare
-from diagnosis.gathering import gather
 from diagnosis.predictors.uncertainty import omega_std
+from diagnosis.predictors.weak_form import BLOCK
 from fmus.actuators.law import Law
 from fmus.declare import variables
 from fmus.effects import STANDARD
@@ -180,7 +180,7 @@ def test_profiles_over_time_have_bins_of_the_size():
 
     for scale in (REFERENCE, SIZES[0]):
         time = covariates_by_axis(loaded(scale))[0][-2]
-        assert np.diff(time.edges).min() >= MIN_TIME_BIN * scale.time
+        assert np.diff(time.edges).min() >= BLOCK * scale.time
 
 
 def test_another_horizon(tmp_path):

@@ -8,8 +8,8 @@ import pytest
 from scipy.sparse import csc_matrix
 
 from diagnosis.predictors.weak_form import OVERLAP
+from diagnosis.search.most_likely import rise
 from diagnosis.search.nonlinear.segmentation import (
-    LIKELY,
     Problem,
     Section,
     around,
@@ -175,7 +175,7 @@ def test_likely_ends_are_those_whose_cost_is_within_the_quantile():
         for place, within in ((at[0], False), (at[0] + 1, True), (at[1] - 1, True), (at[1], False)):
             trial = [list(s) for s in best]
             trial[k][end] = place
-            assert (p.cost([tuple(s) for s in trial]) <= p.cost(best) + LIKELY) == within
+            assert (p.cost([tuple(s) for s in trial]) <= p.cost(best) + rise()) == within
 
 
 @pytest.mark.parametrize(("most", "lasting"), [(1, False), (2, False), (1, True)])

@@ -158,7 +158,7 @@ def test_what_a_curve_has_in_it_is_no_candidate_beside_it():
     prior = NominalPrior.of(Model(), 0.1)
     free = np.zeros((len(names), len(names)))
     at = Estimate(Model(), np.zeros(prior.size), curve, free)
-    step = rank(TrainingSet([w], w.block, None, prior), at, {effect.id})
+    step = rank(TrainingSet([w], None, prior), at, {effect.id})
     new = {
         c.effect.id: novelty(step.table, k, len(names)) * step.size >= NEW
         for k, c in enumerate(step.candidates)

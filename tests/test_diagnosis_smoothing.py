@@ -68,7 +68,7 @@ def kalman_and_rauch(time, z, valid, q, sigma):
 
 def test_same_as_kalman_filter_and_rauch_smoother(monkeypatch):
     monkeypatch.setattr(
-        "diagnosis.runs.smoothing.likelihood.ADAPTIONS", 0
+        "diagnosis.runs.smoothing.likelihood.ROUNDS", 0
     )  # the jerk is equally strong throughout
     time = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.03, 1000))
     run, _ = white_jerk(time, 2)

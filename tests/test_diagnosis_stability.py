@@ -12,13 +12,12 @@ from support.cases import slow
 from cosim import InputError
 from diagnosis.assessment import stability
 from diagnosis.assessment.closed_loop import (
-    BOUND,
     REFERENCES,
-    STEP,
     closed_loop,
     distances,
     largest_distance,
 )
+from diagnosis.assessment.settings import SETTINGS
 from diagnosis.assessment.stability import (
     OPERATING,
     OperatingRegion,
@@ -111,7 +110,7 @@ def test_the_nominal_model_is_as_good_as_itself(whole, request):
     assert found.nominal_min_dissipation == found.learned_min_dissipation < 0.0
     assert (found.mass_definite, found.bounded, found.safe, found.region) == (True, True, True, None)
     references = stability.REFERENCES
-    assert all(largest_distance(r, NOMINAL) < 0.1 * BOUND for r in references)
+    assert all(largest_distance(r, NOMINAL) < 0.1 * SETTINGS.bound for r in references)
 
 
 @pytest.mark.parametrize(
@@ -214,10 +213,10 @@ def test_recorded_loop_gives_the_same_bits(model):
     reference = REFERENCES[1]._replace(seconds=6.0)
     now, step = closed_loop(reference, model)
     h, expected = 0.0, []
-    for _ in range(round(reference.seconds / STEP)):
+    for _ in range(round(reference.seconds / SETTINGS.step)):
         now, distance = step(now, h)
         expected.append(distance)
-        h = STEP
+        h = SETTINGS.step
     assert list(distances(reference, model)) == expected
     assert max(expected) > 0.01
 

@@ -46,7 +46,7 @@ def test_a_long_run_keeps_motion_and_impulse_and_says_so(run, monkeypatch):
 def test_no_row_is_further_from_the_next_than_the_kernel_bears(run, monkeypatch):
     monkeypatch.setattr(thinning, "MOST_ROWS", 10)
     found = thinned(clean(run[0]))
-    assert np.median(np.diff(found.run.time)) == pytest.approx(thinning.LONGEST)
+    assert np.median(np.diff(found.run.time)) == pytest.approx(thinning.BRIEF)
 
 
 def test_parts_without_a_measurement_keep_what_they_were(run, monkeypatch):

@@ -6,18 +6,26 @@ from support.cases import in_part
 from support.measured import sail, smoothed
 
 from diagnosis.predictors import Model
-from diagnosis.search.nonlinear.waves import AROUND, PEAK, find_waves, followed, inside, peak
+from diagnosis.search.nonlinear.waves import BAND, PEAK, find_waves, followed, inside, peak
 
 MASS = Model().reference_mass
 
 
 def test_waves_are_found_with_their_peak():
-    run = smoothed(sail(150.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
+    run = smoothed(sail(240.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
     found = find_waves([run], Model(), np.random.default_rng(0))
     assert found is not None
     assert found.peak == pytest.approx(4.0, abs=0.6)
     assert 0.03 < found.force < 0.2
     assert found.confidence > 0.9
+
+
+def test_a_run_of_few_segments_does_not_make_sure():
+    """Each of its segments shows the waves, and so does each bootstrap replicate."""
+    run = smoothed(sail(80.0, ship={"wave_force": 0.1, "wave_peak": 4.0})[0])
+    found = find_waves([run], Model(), np.random.default_rng(0))
+    assert found is not None
+    assert found.confidence < 0.9
 
 
 CALM = [(quick, noise, seed) for quick in (0.0, 0.3) for noise in (1.0, 4.0, 10.0) for seed in (1, 2)]
@@ -55,7 +63,7 @@ def test_the_flank_of_a_slow_motion_is_no_peak(line, found):
     power = slow * (1.0 + line * np.exp(-(((frequency - 0.5) / 0.04) ** 2)))
     ones = np.ones((frequency.size, 3))
     band = inside(frequency)[:, None] & np.ones((1, 3), bool)
-    _, highest = peak(frequency, power[:, None] * ones, ones, band, AROUND)
+    _, highest = peak(frequency, power[:, None] * ones, ones, band, float(np.ptp(BAND)))
     assert (highest.height > PEAK) == found
     if found:
         assert frequency[highest.row] == pytest.approx(0.5, abs=0.05)

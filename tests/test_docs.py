@@ -95,7 +95,9 @@ def test_links_lead_to_files(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_files_that_a_page_names_exist(page):
     text = page.read_text(encoding="utf-8")
-    for name in re.findall(r"`((?:fmus|cosim|diagnosis|tests|studies|benchmarks)/[\w./]+)`", text):
+    for name in re.findall(
+        r"`((?:fmus|cosim|diagnosis|tests|studies|thesis|benchmarks)/[\w./]+)`", text
+    ):
         assert (ROOT / name).exists() or name in EXAMPLES, name
 
 
@@ -117,7 +119,7 @@ def test_python_of_the_pages_is_run_by_the_test_that_a_page_names(page, reason, 
         tests = ["tests/test_own_effects.py", "tests/test_fmus.py", "tests/test_faults.py"]
         assert all("CONTRIBUTING.md" in (ROOT / test).read_text("utf-8") for test in tests)
     elif reason:
-        (test,) = re.findall(r"tests/\w+\.py", reason)
+        (test,) = re.findall(r"tests/[\w/]+\.py", reason)
         assert (ROOT / test).is_file()
         assert page.name in (ROOT / test).read_text("utf-8") or ":" in reason, "what it does instead"
     else:
@@ -153,7 +155,7 @@ def test_commands_of_the_pages_have_the_options_that_are_shown(page):
         for text in re.findall(rf"```{kind}\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
             for line in text.replace("\\\n", " ").splitlines():
                 for module, rest in re.findall(
-                    r"python -m ((?:cosim|fmus|diagnosis|studies|benchmarks)[\w.]*)([^#&]*)", line
+                    r"python -m ((?:cosim|fmus|diagnosis|studies|thesis|benchmarks)[\w.]*)([^#&]*)", line
                 ):
                     for option in re.findall(r"(?<=\s)--[\w-]+", rest):
                         assert option in help_of(module), f"{module} {option}"
@@ -197,7 +199,7 @@ def commands(text):
 
 @pytest.mark.parametrize(("page", "reason", "text"), [*blocks("sh")])
 def test_shell_of_the_pages_is_run_or_says_why_not(page, reason, text):
-    tests = re.findall(r"tests/\w+\.py", reason)
+    tests = re.findall(r"tests/[\w/]+\.py", reason)
     assert all((ROOT / test).is_file() for test in tests)
     assert reason.startswith("not run: ") or tests or [*commands(text)]
 

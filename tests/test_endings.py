@@ -112,7 +112,7 @@ def test_fmu_that_exits_with_0_is_no_success_of_a_replay(plain_fmu, tmp_path):
     fmu = plain_fmu("Law", inputs + outputs, f"if t > 1.0: {EXIT}\nreturn True")
     out = tmp_path / "new" / "out"
     code, lines = ended(
-        started("diagnosis.replay", tmp_path / "run.csv", "--controller", fmu, "--out", out)
+        started("thesis.replay", tmp_path / "run.csv", "--controller", fmu, "--out", out)
     )
     assert code == 3, lines
     assert lines[-1] == "error: controller: the simulating process died in a step (exit code 0)"

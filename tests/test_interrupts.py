@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -17,8 +18,8 @@ from test_diagnosis_commands import frame
 from cosim.interrupts import Held, on_interrupt, raise_on_interrupt, restore
 from cosim.master.loop_surroundings import interruptible
 from cosim.process import run_state
-from diagnosis.execution import result_folder
-from diagnosis.execution.result_folder import together
+from cybership import scratch_folder
+from diagnosis.execution.result_folder import default_folder, together
 
 posix = pytest.mark.skipif(os.name != "posix", reason="no SIGINT to send")
 
@@ -87,6 +88,74 @@ def test_an_interrupt_that_was_lost_acts_at_the_next_step():
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
 
 
+WRAPPED = """
+import signal
+from cosim.command import run_command
+
+class Bad:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(signal.SIGINT)
+
+def main():
+    class Made:
+        bad = Bad()
+    return 0
+
+run_command(main)
+"""
+UNRAISABLE = """
+import signal, time
+from cosim.command import run_command
+from cosim.interrupts import raise_if_interrupted
+
+class Bad:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+def main():
+    Bad()
+    raise_if_interrupted()
+    return 0
+
+run_command(main)
+"""
+
+
+@pytest.mark.parametrize("code", [WRAPPED, UNRAISABLE], ids=["wrapped", "unraisable"])
+def test_an_interrupt_is_one_line_wherever_it_is_raised(code):
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def gone():
+    """The number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_what_a_killed_call_has_left_goes_with_the_next_one(tmp_path, capsys):
+    usual = tmp_path / "comparison"
+    for name in (f".new-{gone()}_a", f".new-{os.getpid()}_b", ".new-mine"):
+        (usual / name / "files").mkdir(parents=True)
+        (usual / name / "files" / "report.html").write_text("half")
+    assert default_folder(usual, {"run.csv": "hash"}) == usual.with_name("comparison_2")  # of others
+    assert {p.name for p in usual.iterdir()} == {f".new-{os.getpid()}_b", ".new-mine"}
+    told = "note: removed 1 unfinished result(s) of killed calls from"
+    assert capsys.readouterr().err.startswith(f"{told} '{usual}'")
+    (usual / f".new-{gone()}_c").mkdir()
+    with together(usual, ["file"]) as new:
+        (new / "file").write_text("x")
+    assert {p.name for p in usual.iterdir()} == {f".new-{os.getpid()}_b", ".new-mine", "file"}
+    assert told in capsys.readouterr().err
+
+
+def test_a_folder_with_what_a_killed_call_has_left_alone_is_free(tmp_path):
+    usual = tmp_path / "comparison"
+    (usual / f".new-{gone()}_a" / "files").mkdir(parents=True)
+    assert default_folder(usual, {"run.csv": "hash"}) == usual
+
+
 LOST_RUN = """
 import signal
 from contextlib import suppress
@@ -147,7 +216,7 @@ def test_other_threads_hold_nothing():
 
 @pytest.mark.parametrize("step", ["mkdtemp", "rmtree"])
 def test_interrupt_while_folders_come_and_go(step, tmp_path, monkeypatch):
-    home = result_folder if step == "mkdtemp" else result_folder.shutil
+    home = scratch_folder.tempfile if step == "mkdtemp" else scratch_folder.shutil
     original = getattr(home, step)
 
     def interrupted(*args, **kwargs):
@@ -205,7 +274,8 @@ def test_interrupts_at_any_time_leave_nothing(tmp_path):
             if process.returncode != 130:  # before the first line of ours
                 assert str(ROOT) not in said
                 continue
-            assert (text, said) == ("", "interrupted\n")
+            # Where there is no terminal, a line every half a minute says what is being done.
+            assert (text, re.sub(r"\d+ s: .*\n", "", said)) == ("", "interrupted\n")
     finally:
         for each in load:
             each.kill()

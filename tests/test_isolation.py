@@ -139,6 +139,10 @@ def test_crash_or_hang_ends_in_one_message_with_the_log_kept(plain_fmu, tmp_path
         ("os._exit(3)", "its process died in its instantiation"),
         ("self.enter_initialization_mode = lambda: os._exit(3)", "died in fmi2EnterInitializationMode"),
         ("self.exit_initialization_mode = lambda: time.sleep(99)", "took longer than 1 s"),
+        (
+            "self.setup_experiment = lambda *_: time.sleep(99)",
+            "fmi2SetupExperiment took longer than 1 s",
+        ),
     ],
 )
 def test_crash_before_the_first_step_is_one_message_too(plain_fmu, tmp_path, init, message):
@@ -156,6 +160,15 @@ def test_crash_at_the_end_does_not_spoil_the_run(plain_fmu, tmp_path):
     result = cosim.simulate(cosim.load_scenario(one(fmu)), tmp_path / "out", show=shown.append)
     assert result.status == "done"
     assert any("died in fmi2Terminate (exit code 3)" in line for line in shown)
+
+
+def test_a_hang_at_the_end_does_not_spoil_the_run(plain_fmu, tmp_path):
+    fmu = plain_fmu("Stays", f"{GAIN}\nself.terminate = lambda: time.sleep(99)\n")
+    shown = []
+    scenario = cosim.load_scenario(one(fmu, timeout=1.0))
+    result = cosim.simulate(scenario, tmp_path / "out", show=shown.append)
+    assert result.status == "done"
+    assert any("fmi2Terminate took longer than 1 s" in line for line in shown)
 
 
 def test_refused_instantiation_is_bad_input(plain_fmu, tmp_path, capfd):

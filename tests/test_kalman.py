@@ -12,8 +12,8 @@ from fmus.declare import flatten, packer, variables
 from fmus.hull import Damping, Hull, Inertia, inverse_mass, motion
 from fmus.observer.axis import MOST_DISTURBANCE, Axis, Learning, later, rates, taken
 from fmus.signals import Force
-from studies.monte_carlo import shipped, vary, without
-from studies.observers.estimates_replayed import LOGGED, OBSERVERS, SIGNALS, errors, observer, replay
+from thesis.monte_carlo import shipped, vary, without
+from thesis.observers.estimates_replayed import LOGGED, OBSERVERS, SIGNALS, errors, observer, replay
 
 KALMAN = COMPONENTS["observer_kalman"]
 NAN = math.nan

@@ -60,6 +60,13 @@ def test_a_measured_thrust_is_held_against_the_model(tanker, steady):
     assert rms(steady, right, THRUST) < 0.02 * stronger
 
 
+def test_thrust_follows_the_shaft_speed(tanker):
+    frame = zigzag(tanker, lambda t: 10.0 + 2.0 * np.sin(0.05 * t))
+    (w,) = diagnosis.load(frame, ship="kvlcc2", anyway=True)
+    model = Model(ship=tanker).plus({"plant_propeller_K_T0": STRONGER})
+    assert rms(w, model, THRUST) < 0.01 * frame[THRUST].std()
+
+
 def test_it_stands_in_the_errors_of_a_comparison(tanker, steady):
     content = comparison_content(diagnosis.evaluate([steady], Model(ship=tanker)), None, [])
     error = content.errors[0].measured[THRUST]

@@ -11,7 +11,7 @@ from support.shared import once
 
 import cosim
 from fmus.declare import packer, variables
-from studies.monte_carlo import shipped
+from thesis.monte_carlo import shipped
 
 OBSERVERS = [name for name in COMPONENTS if name.startswith("observer_")]
 SIGNALS = ["observer.x_m", "observer.y_m", "observer.psi_m"]

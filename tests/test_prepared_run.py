@@ -23,9 +23,9 @@ from diagnosis import (
     sysid,
     watch,
 )
-from diagnosis.open_loop import loop_of
-from diagnosis.open_loop.playback import fed
 from diagnosis.runs import Examined, SensorFinding, prepare, prepared_run, read_each, thinning
+from thesis.open_loop import loop_of
+from thesis.open_loop.playback import fed
 
 SPIKES = (500, 2500, 4000, 5200)  # rows at which one begins
 LOST = 10.0  # s, that the log's clock leaves out
@@ -124,7 +124,7 @@ def test_of_learning_and_comparing(prepared, monkeypatch, spoilt, tmp_path, main
 def test_of_a_trial_that_is_the_whole_run_or_a_part(prepared, monkeypatch, spoilt, tmp_path):
     """A part is that of the file's times, though the clock is repaired: it jumps at 80 s."""
     common = (spoilt, "--trial", "zigzag", "--out", tmp_path / "out")
-    place = "diagnosis.gathering.usable"
+    place = "diagnosis.assessment.gathering.usable"
     (whole,) = seen(monkeypatch, place, measure_trial.main, *common)
     assert np.array_equal(np.column_stack([whole.time, whole.track.pose])[whole.used], samples(prepared))
     (part,) = seen(monkeypatch, place, measure_trial.main, *common, "--from", 85, "--to", 110)
@@ -145,7 +145,7 @@ def test_of_the_analyses_of_the_thesis(prepared, monkeypatch, spoilt, tmp_path, 
         found.extend(gather(*arguments, **options))
         raise InputError("seen")
 
-    monkeypatch.setattr("diagnosis.analysis.gather_samples", spy)
+    monkeypatch.setattr("thesis.analysis.gather_samples", spy)
     for by in ("smoothed", "mdf"):
         command(main, spoilt, "--estimates", by, "--out", tmp_path / "out")
     smoothed, filtered = found
@@ -157,7 +157,7 @@ def test_of_the_analyses_of_the_thesis(prepared, monkeypatch, spoilt, tmp_path, 
 @pytest.mark.parametrize("main", [slow(replay.main), watch.main])
 def test_of_playing_it_to_an_observer(prepared, monkeypatch, spoilt, tmp_path, main):
     controller = ("--controller", "abs") if main is replay.main else ()
-    source = seen(monkeypatch, "diagnosis.open_loop.play", main, spoilt, *controller, "--out", tmp_path)
+    source = seen(monkeypatch, "thesis.open_loop.play", main, spoilt, *controller, "--out", tmp_path)
     inputs = fed(source, loop_of(spoilt, "abs", None, None))
     pose = np.column_stack([inputs[f"observer.{name}"] for name in ("x_m", "y_m", "psi_m")])
     rows, whole = source.prepared.samples, samples(prepared)

@@ -12,6 +12,8 @@ import yaml
 from support.project import ROOT
 from support.public_api import PACKAGES, lines, listing, page
 
+from cosim.command import EXTRAS
+
 if sys.version_info >= (3, 11):
     import tomllib
 else:
@@ -140,3 +142,12 @@ def test_metadata_have_what_their_readers_need():
     assert (str(cff["cff-version"]), cff["type"]) == ("1.2.0", "software")
     (thesis,) = cff["references"]
     assert thesis["title"] in " ".join(zenodo["references"])
+
+
+def test_the_readme_has_a_sentence_of_each_extra_for_users():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    users = project["optional-dependencies"].keys() - {"dev", "benchmark", "docs"}
+    told = re.findall(r"^- `(\w+)`: .+\.$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
+    assert sorted(told) == sorted(users)
+    assert len(users) <= 6
+    assert {*EXTRAS.values()} <= users

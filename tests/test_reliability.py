@@ -17,11 +17,19 @@ from support.project import ROOT
 from test_run import in_a_process as command
 
 import cosim
-from benchmarks.reliability import campaigns, endings, mutations, sanitized
+from benchmarks.reliability import (
+    campaigns,
+    endings,
+    killed_commands,
+    mutations,
+    sanitized,
+    ship_mutations,
+)
 from benchmarks.reliability.judgement import faults
 from cosim import files
-from cosim.command import LONGEST_WORD, printable
+from cosim.command import printable
 from cosim.results.log import LogWriter
+from cybership.message_text import LONGEST_WORD
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="no binary for this test here")
 
@@ -290,13 +298,18 @@ def test_scratch_folders_of_killed_runs_are_swept_and_those_of_others_not(
         text=True,
         check=True,
     )
-    for name in (f"cosim_{ended.stdout.strip()}_a", f"cosim_{os.getpid()}_b", "cosim_mine", "other"):
+    for name in (
+        f"cybership_{ended.stdout.strip()}_a",
+        f"cybership_{os.getpid()}_b",
+        "cybership_mine",
+        "other",
+    ):
         (tmp_path / name).mkdir()
         (tmp_path / name / "file").write_text("")
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     cosim.simulate(cosim.load_scenario(ellipse | {"stop": 0.1}), tmp_path / "out")
     left = {path.name for path in tmp_path.iterdir()}
-    assert left == {f"cosim_{os.getpid()}_b", "cosim_mine", "other", "out"}
+    assert left == {f"cybership_{os.getpid()}_b", "cybership_mine", "other", "out"}
 
 
 @pytest.mark.slow
@@ -368,6 +381,22 @@ def test_campaign_in_small(tmp_path):
     assert campaigns.interrupted_campaigns(2, 2, tmp_path, nothing) == []
     assert campaigns.deaths_elsewhere(4, 2, tmp_path, nothing) == []
     assert campaigns.spoilt_cache(2, 2, tmp_path, nothing) == []
+
+
+@linux_only
+def test_broken_ships_in_small(tmp_path, monkeypatch):
+    monkeypatch.setattr(ship_mutations, "EACH", 1000)  # none but the first is built
+    assert ship_mutations.broken_ships(20, 2, tmp_path, lambda: None) == []
+
+
+@pytest.mark.slow
+@linux_only
+def test_killed_commands_in_small(tmp_path):
+    nothing = lambda: None  # noqa: E731
+    assert killed_commands.interrupted_compares(3, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_diagnoses(4, 2, tmp_path, nothing) == []
+    assert killed_commands.ended_builds(4, 2, tmp_path, nothing) == []
+    assert killed_commands.killed_campaigns(2, 2, tmp_path, nothing) == []
 
 
 @pytest.mark.slow

@@ -59,7 +59,7 @@ def evaluations(data):
 def compared(evaluations, **before):
     """The comparison of these runs; of where the model fails, something else than there is."""
     std = [np.full_like(e.before.omega, 0.01) for e in evaluations]
-    c = Comparison(evaluations, std, evaluations[0].predicted_by)
+    c = Comparison(evaluations, std, evaluations[0].predictor)
     vars(c)["before"] = replace(c.before, **before)
     return c
 
@@ -182,6 +182,7 @@ def test_page_says_what_the_result_says(report, evaluations):
     assert "curve_vsp_x(c)" in text
     assert "97 %" in text
     assert "more than one cause" in text
+    assert "8 s of a run, predicted from where the ship was at first; of ω: 3 s" in text
     assert "−4.2" in text
 
 
@@ -241,7 +242,7 @@ def test_model_that_runs_away_is_drawn(evaluations, tmp_path):
 
 
 SHAPES = {
-    "curve_X(u)": {"curve_X_u_4": 0.2},
+    "curve_X(u)": {"curve_X_u_12": 0.2},
     "curve_vsp_x(c)": {"curve_vsp_x_c_11": -0.1},
     "curve_vsp_y(c)": {"curve_vsp_y_c_11": -0.1},
     "curve_bow(|u|)": {"curve_bow_u_1": -0.5},
@@ -375,7 +376,7 @@ def test_pictures_of_a_run_name_their_lines(data):
     assert [*lines] == ["measured", "before", "after"]
     east = e.smoothed.eta[:, 1]
     assert np.nanmax(lines["measured"].x) == pytest.approx(np.nanmax(east), abs=1e-2)
-    assert lines["measured"].width > lines["before"].width == lines["after"].width == 1.0
+    assert lines["measured"].width > lines["before"].width == lines["after"].width
     assert {"measured", "before", "after"} <= set(tracks.worst_window(e, True).legend)
 
 
@@ -394,7 +395,7 @@ def test_errors_of_runs_are_told_as_their_root_mean_square(after, shown, remark)
     assert not list(page._tile("error", [(np.nan, np.nan)], 1.0, "mm", ""))
 
 
-def test_arrows_point_where_the_missing_force_does(data):
+def test_lines_point_where_the_missing_force_does(data):
     """A force to the north and to the east by the heading of the ship, from its own axes."""
     e = evaluate_run(data[1], Model())
     north, east = 0.3, -0.2
@@ -403,7 +404,7 @@ def test_arrows_point_where_the_missing_force_does(data):
     omega = np.column_stack([c * north + s * east, c * east - s * north, 0.0 * c])
     known = replace(e, before=replace(e.before, omega=omega))
     arrows = tracks.place(known, False).legend["predicted"]
-    ends, tips = (np.column_stack([v[k :: len(tracks.ARROW_SHAPE)] for v in arrows[:2]]) for k in (0, 1))
+    ends, tips = (np.column_stack([v[k::3] for v in arrows[:2]]) for k in (0, 1))
     assert np.allclose((tips - ends)[:, 0] / (tips - ends)[:, 1], east / north)
     assert (tips > ends)[:, 1].all()
 

@@ -238,7 +238,7 @@ def test_a_summary_has_ten_lines_at_the_most():
     many = compared(True)
     many.evaluations = [run(n, "train") for n in "abcde"]
     text = summary(found(many, 3 * EFFECTS)).splitlines()
-    assert len(text) == 9
+    assert len(text) == 10
     assert text[-1] == "  and 2 more runs"
     assert summary(nothing()).splitlines()[1] == f"  {NOTHING_FOUND}"
 
@@ -302,7 +302,7 @@ def test_a_picture_can_be_saved_in_each_format(tmp_path):
 def test_a_notebook_has_finding_effects_errors_and_two_pictures(drawn):
     given = compared(True)
     given.before.profiles, given.after = "first", SimpleNamespace(profiles="last")
-    text = notebook.as_html(found(given, [effect("a<b", 0.6), EFFECTS[1]]))
+    text = notebook.as_html(found(given, [effect("a<b", 0.6), EFFECTS[1]])).replace("\n", "")
     assert "<b>Something is missing, and what it is, is not sure</b></p><p>There is sure." in text
     assert "There is a&lt;b.</p><p>Little is left.</p>" in text
     assert "<tr><td>a&lt;b</td><td>X = a&lt;b</td></tr><tr><td>sure</td><td>X = sure</td></tr>" in text

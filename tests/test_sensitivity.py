@@ -71,18 +71,17 @@ def test_a_module_is_imported_with_the_change():
     """In a process of its own; modules that import the constant have the changed one, too."""
     code = (
         "from benchmarks.sensitivity.changed_constant import import_changed\n"
-        "import_changed('diagnosis.execution.parallel:NUMBER', 2.0)\n"
-        "from diagnosis.execution.parallel import NUMBER; print(NUMBER)"
+        "import_changed('diagnosis.execution.progress:EVERY', 2.0)\n"
+        "from diagnosis.execution.progress import EVERY; print(EVERY)"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-    assert done.stdout.strip() == "4", done.stderr
+    assert done.stdout.strip() == "60.0", done.stderr
 
 
 def test_prepared_runs_serve_rooms_after_the_preparation():
     assert Task(0, "diagnosis.search.shortlist:NEW", HALF).prepared
     assert Task(0, "", 1.0).prepared
-    assert not Task(0, "diagnosis.runs.cleaning:GAP", HALF).prepared
-    assert not Task(0, "diagnosis.gathering:FEWEST", HALF).prepared
+    assert not Task(0, "diagnosis.runs.cleaning:HELD", HALF).prepared
     assert not Task(1, "diagnosis.search.shortlist:NEW", HALF).prepared
 
 

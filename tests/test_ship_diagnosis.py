@@ -11,9 +11,10 @@ import diagnosis
 from benchmarks import ship_effects
 from benchmarks.ship_effects import Cause, causes, sail
 from cosim import InputError
-from diagnosis import analysis, propose_columns
+from diagnosis import propose_columns
 from diagnosis.predictors import Model, ship_with
 from diagnosis.runs import read, read_frame
+from thesis import analysis
 
 
 @pytest.fixture(scope="module")

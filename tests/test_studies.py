@@ -9,8 +9,11 @@ import pytest
 
 import cosim
 from cosim.dispatch import FinishedRun
-from studies import monte_carlo, study_command
-from studies.monte_carlo import (
+from studies import study_command
+from studies.study_command import study_parser
+from studies.study_report import Report, Verdict, seeds_line
+from thesis import monte_carlo
+from thesis.monte_carlo import (
     Interval,
     interval,
     paired,
@@ -21,8 +24,6 @@ from studies.monte_carlo import (
     vary,
     without,
 )
-from studies.study_command import study_parser
-from studies.study_report import Report, Verdict, seeds_line
 
 
 def test_variant_leaves_the_shipped_content_alone():
@@ -116,16 +117,16 @@ def test_a_study_ends_with_its_report_or_one_line(error, code, out, err, monkeyp
 
 
 def test_options_of_studies_are_those_that_make_sense():
-    plain = study_parser("nothing", "What it does.", "an example").parse_args([])
+    plain = study_parser("studies.nothing", "What it does.", "an example").parse_args([])
     assert vars(plain) == {
         "out": Path("results/study_nothing"),
         "seeds": 10,
         "jobs": None,
         "quick": False,
     }
-    still = study_parser("nothing", "", "", seeds=None, jobs=False).parse_args(["--quick"])
+    still = study_parser("studies.nothing", "", "", seeds=None, jobs=False).parse_args(["--quick"])
     assert vars(still) == {"out": Path("results/study_nothing"), "quick": True}
-    text = study_parser("nothing", "What it does.", "an example").format_help()
+    text = study_parser("studies.nothing", "What it does.", "an example").format_help()
     for part in (
         "python -m studies.nothing",
         "What it does.",
@@ -216,5 +217,5 @@ def test_seeds_are_told_shortly():
 @pytest.mark.parametrize("wrong", [["--seeds", "0"], ["--seeds", "many"], ["--jobs", "-1"], ["--what"]])
 def test_wrong_option_ends_in_exit_code_2(wrong):
     with pytest.raises(SystemExit) as ended:
-        study_parser("nothing", "", "").parse_args(wrong)
+        study_parser("studies.nothing", "", "").parse_args(wrong)
     assert ended.value.code == 2

@@ -21,6 +21,7 @@ from support.project import ROOT
 import diagnosis
 from cosim import InputError
 from diagnosis import Evaluation, Finding, Findings, Model, PredictionError, omega, session, weak_windows
+from diagnosis.predictors import DescribedShip
 from diagnosis.search import Suspect
 from fmus.signals import Force, VelocityInCurrent
 from studies import measured_ship
@@ -137,7 +138,8 @@ def test_single_commands_explain_what_is_made_of_them_and_nothing_else():
     arriving = delayed(w.run.time, w.run.commands[:, [0, 2]], 0.2)
     omega_left = np.random.default_rng(0).normal(size=(w.middle.size, 3))
     omega_left[:, 1] = w.held @ (arriving[:, 0] - arriving[:, 1])
-    e = Evaluation(Model(), w, None, True, *[PredictionError(omega_left, np.zeros((0, 3)), None)] * 2)
+    error = PredictionError(omega_left, np.zeros((0, 3)), None)
+    e = Evaluation(DescribedShip(Model()), w, None, error, error, use="test")
     found = leave_one_out.commanded(e, model)
     assert found.single[1] == pytest.approx(1.0)
     assert max(*found.both, found.single[0], found.single[2]) < 0.1

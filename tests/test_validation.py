@@ -25,10 +25,11 @@ from diagnosis.acceptance.budget import (
 )
 from diagnosis.acceptance.criterion import Criterion
 from diagnosis.acceptance.judged_criterion import Predicted, decide, judge
-from diagnosis.acceptance.pdf import table
+from diagnosis.acceptance.pdf import laid_out
 from diagnosis.acceptance.predictions import Predictions, difference, judged
 from diagnosis.acceptance.statistics import independent, root_mean_square, share
 from diagnosis.acceptance.validity import window_means
+from diagnosis.report.document import Section, Table
 from diagnosis.search.prediction_fit.disturbance import Push
 from diagnosis.verify import main as verify_main
 
@@ -259,9 +260,9 @@ def test_only_windows_within_count(comparison, predictions):
         ('{"criterai": []}', r"criteri.*(did you mean 'criteria'|is missing)"),
         ({"quantity": "headin"}, r"'headin' cannot be judged; did you mean 'heading'"),
         ({"unit": "deg"}, "'deg' is no unit of position; there are m, mm"),
-        ({"tolerance": -1.0}, "criteria.0.tolerance: Input should be greater than 0"),
-        ({"tolerence": 1.0}, r"criteria.0.tolerence: no such key; did you mean 'tolerance'"),
-        ({"horizon": 1e400}, "criteria.0.horizon"),
+        ({"tolerance": -1.0}, r"criteria\[0\].tolerance: Input should be greater than 0"),
+        ({"tolerence": 1.0}, r"criteria\[0\].tolerence: unknown key; did you mean 'tolerance'"),
+        ({"horizon": 1e400}, r"criteria\[0\].horizon"),
         ({"statistic": "rms", "coverage": 0.5}, "coverage is of the statistic 'share'"),
         ({"within": {"u": [2, 1]}}, "within.u: 2 is not below 1"),
     ],
@@ -349,7 +350,7 @@ def test_signing_without_the_library_says_what_to_install(monkeypatch, key):
     from diagnosis.acceptance.signature import sign
 
     monkeypatch.setitem(__import__("sys").modules, "cryptography", None)
-    with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[sign\]'"):
+    with pytest.raises(InputError, match=r"needs cryptography: pip install 'cybership\[diagnosis\]'"):
         sign(b"", key)
 
 
@@ -359,10 +360,11 @@ def test_a_signature_is_of_criteria(tmp_path, capsys):
 
 
 def test_tables_fit_into_their_lines():
-    rows = [("head", "what it is"), ("a" * 30, "words " * 40)]
-    lines = list(table(rows, 60))
+    table = Table(("head", "what it is"), [("a" * 30, "words " * 40)])
+    lines = laid_out("title", [Section("heading", ["[b]", "words " * 40], [table])], 60)
     assert max(map(len, lines)) <= 60
-    assert "".join(lines).count("words") == 40
+    assert "".join(lines).count("words") == 80
+    assert "[b]" in lines
 
 
 LEFT = json.dumps({"unrecorded": {"size": [0.1, 0.2, 0.3], "time": [1.0, 2.0, 3.0]}})

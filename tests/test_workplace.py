@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,9 +27,9 @@ from cosim.results.picture_files import PictureOptions
 from cosim.results.result_files import default_folder
 from cosim.scenario import Roles, load_scenario
 from cosim.system import prepare
-from cybership import completion
+from cybership import completion, subcommands
 from cybership.__main__ import main, usage
-from cybership.subcommands import SUBCOMMANDS
+from cybership.subcommands import GROUP, SUBCOMMANDS, all_modules, purpose
 from diagnosis.commands import command_line
 from diagnosis.execution import result_folder
 from diagnosis.verdict import shares
@@ -231,9 +232,17 @@ def test_a_belief_that_nobody_can_have_is_refused(ellipse, tmp_path, chain):
 
 
 def test_every_command_of_cybership_is_a_module_and_told():
-    for name, told in SUBCOMMANDS.items():
-        assert importlib.util.find_spec(told.module) is not None, name
-        assert told.purpose in usage()
+    assert {"pca", "pls", "replay", "sysid", "watch"} < all_modules().keys(), "pip install -e . again"
+    for name, module in all_modules().items():
+        assert importlib.util.find_spec(module) is not None, name
+        assert re.search(rf"^  {name} +{re.escape(purpose(name, module))}$", usage(), re.MULTILINE)
+
+
+def test_a_package_adds_commands_and_replaces_none(monkeypatch):
+    points = [EntryPoint(n, m, GROUP) for n, m in (("mine", "no.such.module"), ("run", "no.run"))]
+    monkeypatch.setattr(subcommands, "entry_points", lambda group: points)
+    assert all_modules() == {n: c.module for n, c in SUBCOMMANDS.items()} | {"mine": "no.such.module"}
+    assert "\n  mine       cannot be run: no.such.module: " in usage()
 
 
 def test_cybership_names_the_nearest_command_and_imports_little(capsys, monkeypatch):
@@ -351,12 +360,12 @@ def test_what_two_findings_explain_alike_is_neithers_own(monkeypatch):
     "name",
     [
         n
-        for n, c in SUBCOMMANDS.items()
-        if c.module.startswith(("cosim.", "diagnosis.")) and n != "schema"
+        for n, module in all_modules().items()
+        if module.startswith(("cosim.", "diagnosis.", "thesis.")) and n != "schema"
     ],
 )
 def test_help_of_a_command_tells_what_each_argument_is(name, monkeypatch):
-    module = importlib.import_module(SUBCOMMANDS[name].module)
+    module = importlib.import_module(all_modules()[name])
     if not hasattr(module, "main"):
         module = importlib.import_module(f"{module.__name__}.__main__")
 

@@ -1,10 +1,9 @@
 """Fits the constants of the map from evidence to confidence, ``diagnosis/verdict/confidence.py``.
 
 There a finding has the confidence
-``bagged / (1 + exp(PER_LEFT left + PER_VARIATION varies - SURE))``. The
-three constants are fitted by maximum likelihood to findings of the cells that are set aside for it
-(:func:`.cells.for_fitting`), which no diagram shows. They are written to a file, and entered there by
-hand.
+``bagged / (1 + exp(PER_DOUBT (left + varies) - SURE))``. The two constants are fitted by maximum
+likelihood to findings of the cells that are set aside for it (:func:`.cells.for_fitting`), which no
+diagram shows. They are written to a file, and entered there by hand.
 """
 
 import json
@@ -22,7 +21,7 @@ from .cells import for_fitting
 from .reliability_diagram import LEAST
 from .results import Row
 
-START = (4.0, 10.0, 10.0)
+START = (4.0, 10.0)
 MOST_SURE = 12.0  # 6e-6 of doubt: more than any number of findings here can tell
 
 
@@ -49,12 +48,12 @@ def judged(rows: Iterable[Row]) -> list[Judged]:
 def confidence(
     bagged: np.ndarray, left: np.ndarray, varies: np.ndarray, p: Sequence[float]
 ) -> np.ndarray:
-    """Confidences by the constants p = (SURE, PER_LEFT, PER_VARIATION)."""
-    return bagged * expit(p[0] - p[1] * left - p[2] * varies)
+    """Confidences by the constants p = (SURE, PER_DOUBT)."""
+    return bagged * expit(p[0] - p[1] * (left + varies))
 
 
-def fitted(findings: Sequence[Judged]) -> tuple[float, float, float]:
-    """SURE, PER_LEFT and PER_VARIATION."""
+def fitted(findings: Sequence[Judged]) -> tuple[float, float]:
+    """SURE and PER_DOUBT."""
     bagged, left, varies, right = np.array(findings, dtype=float).T
     good = int(right.sum())
     # The targets of J. Platt (Probabilistic outputs for support vector machines, 1999), those of a
@@ -65,9 +64,9 @@ def fitted(findings: Sequence[Judged]) -> tuple[float, float, float]:
         rate = np.clip(confidence(bagged, left, varies, p.tolist()), 1e-9, 1.0 - 1e-9)
         return -float(np.sum(target * np.log(rate) + (1.0 - target) * np.log1p(-rate)))
 
-    limits = [(0.0, MOST_SURE), (0.0, None), (0.0, None)]
-    sure, per_left, per_variation = minimize(loss, START, method="L-BFGS-B", bounds=limits).x.tolist()
-    return sure, per_left, per_variation
+    limits = [(0.0, MOST_SURE), (0.0, None)]
+    sure, per_doubt = minimize(loss, START, method="L-BFGS-B", bounds=limits).x.tolist()
+    return sure, per_doubt
 
 
 def write_fit(rows: Sequence[Row], path: Path) -> Path:
@@ -83,7 +82,7 @@ def write_fit(rows: Sequence[Row], path: Path) -> Path:
             f"{len(findings)} findings with evidence to fit the calibration to, {LEAST} are needed: "
             "run cells of seeds from 50 on"
         )
-    names = ("SURE", "PER_LEFT", "PER_VARIATION")
+    names = ("SURE", "PER_DOUBT")
     content = dict(zip(names, fitted(findings), strict=True)) | {
         "findings": len(findings),
         "right": sum(f.true for f in findings),

@@ -88,7 +88,10 @@ def methods(names: Sequence[str], nominal: Nominal) -> Iterator[tuple[str, Asked
         final = getattr(module, "final", module.fit)
         yield name, _searching(Method(name, module.fit, module.SETTINGS, final), nominal, reference)
     if missing:
-        complain(f"not installed, left out: {', '.join(missing)}; pip install '.[peers]'", kind="")
+        complain(
+            f"not installed, left out: {', '.join(missing)}; pip install '.[analysis]' --group peers",
+            kind="",
+        )
 
 
 def _searching(method: Method, nominal: Nominal, reference: Law) -> Asked:

@@ -84,7 +84,7 @@ def deaths_elsewhere(count: int, seed: int, work: Path, advance: Callable[[], No
             process = begin("cosim.campaign", campaign, "--workers", 0, "--out", out, **where)
         else:
             process = begin(
-                "diagnosis.replay", work / "run.csv", "--controller", fmu, "--out", out, **where
+                "thesis.replay", work / "run.csv", "--controller", fmu, "--out", out, **where
             )
         stderr = finish(process)
         found = line_faults(process.returncode, stderr, {3}, 0.0)

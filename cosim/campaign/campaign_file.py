@@ -6,8 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, ValidationError, field_validator, model_validator
 
+from cybership.message_text import Location, first_fault
+
 from ..errors import InputError, nearest
-from ..scenario.load import load_scenario, telling_error
+from ..scenario.load import load_scenario
 from ..scenario.schema import Scenario
 from ..scenario.setting import place_of
 from ..scenario.shipped import find_scenario
@@ -184,19 +186,15 @@ def _read(path: Path) -> Any:
 
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line."""
-    first = telling_error(error)
-    place = ".".join(
-        str(part) for part in first["loc"] if not str(part).startswith(("literal", "list["))
-    )
-    text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        fields = (Axis if first["loc"][0] == "axes" else Campaign).model_fields
-        text = f"unknown key{nearest(str(first['loc'][-1]), fields)}"
-    elif first["type"] == "missing":
-        text = "is missing"
-    elif first["loc"][:1] == ("design",):
-        place, text = "design", 'is "grid", "list", {"latin": N} or {"sobol": N}'
-    return f"{name}: {f'{place}: ' if place else ''}{text}"
+
+    def hint(location: Location) -> str:
+        return nearest(str(location[-1]), (Axis if location[0] == "axes" else Campaign).model_fields)
+
+    def special(_: str, location: Location, __: object) -> str:
+        return 'is "grid", "list", {"latin": N} or {"sobol": N}' if location[:1] == ("design",) else ""
+
+    told = first_fault(error, hint, lambda part: part.startswith(("literal", "list[", "dict[")), special)
+    return f"{name}: {told}"
 
 
 def campaign_schema() -> dict[str, Any]:

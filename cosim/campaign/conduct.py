@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
+from cybership.scratch_folder import sweep
+
 from ..compiled.library import kind_of, prepare_library
 from ..dispatch.job import Job, Row
 from ..dispatch.measured_run import Measured
@@ -27,7 +29,6 @@ from ..errors import InputError, SimulationError
 from ..files import update_json, write_roomy_json
 from ..interrupts import Held
 from ..process.run_state import CAMPAIGN, STATE
-from ..process.scratch import sweep
 from ..scenario.load import with_settings
 from ..scenario.schema import Scenario
 from .campaign_file import LoadedCampaign

@@ -6,6 +6,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from cybership.message_text import first_fault
+
 from ..errors import InputError
 
 # Relative rounding of numbers in a file, as that of a covariance written with seven digits.
@@ -83,7 +85,4 @@ def read_posterior(path: Path) -> Posterior:
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        text = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-        raise InputError(f"'{path}': {f'{place}: ' if place else ''}{text}") from None
+        raise InputError(f"'{path}': {first_fault(error)}") from None

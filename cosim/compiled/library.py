@@ -16,7 +16,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import tempfile
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -24,6 +23,8 @@ from typing import NamedTuple
 
 from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
+
+from cybership.scratch_folder import environment_with, scratch_folder
 
 from .cache_entry import is_whole, make_folder, refusal, store
 
@@ -160,19 +161,20 @@ def _compile(path: Path, with_zig: bool) -> None:
     from .powers import powers_of_ten
 
     command = _compiler(with_zig)
-    with tempfile.TemporaryDirectory(prefix="cybership_") as work:
-        (Path(work) / "powers.h").write_text(powers_of_ten())
+    with scratch_folder() as work:
+        (work / "powers.h").write_text(powers_of_ten())
         files = [str(FOLDER / source) for source in SOURCES if source.endswith(".c")]
-        built = Path(work) / "built"
+        built = work / "built"
         linked = [] if os.name == "nt" else ["-lm"]
         done = subprocess.run(
-            [*command, *OPTIONS, "-I", work, "-o", str(built), *files, *linked],
+            [*command, *OPTIONS, "-I", str(work), "-o", str(built), *files, *linked],
             capture_output=True,
             text=True,
             errors="replace",
             check=False,
             timeout=PATIENCE,
             cwd=work,
+            env=environment_with(work),
         )
         if done.returncode != 0 or not built.is_file():
             said = [line for line in done.stderr.splitlines() if "error" in line.lower()]

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from cybership.scratch_folder import sweep
+
 from ..errors import InputError, SimulationError
 from ..master.simulation import simulate
-from ..process.scratch import sweep
 from ..results import performance
 from ..results.log import LogInMemory, read_log
 from ..scenario.load import load_scenario

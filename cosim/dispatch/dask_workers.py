@@ -24,9 +24,10 @@ from distributed import (
 )
 from distributed.deploy.spec import close_clusters
 
+from cybership.scratch_folder import Scratch
+
 from ..errors import InputError, SimulationError
 from ..interrupts import UninterruptedProcesses
-from ..process.scratch import Scratch
 from ..process.spawned import without_program
 from .dask_task import OneFile, Request, run_on_worker
 from .job import Job, Row, own_version
@@ -96,8 +97,9 @@ class DaskWorkers:
         try:
             if address is None:
                 self._program.enter_context(without_program())  # also for workers that start again
+                folder = str(self._scratch.path)
                 # A Ctrl-C is for this process alone; the workers end with it.
-                with UninterruptedProcesses(), settings(LIGHT):
+                with UninterruptedProcesses(), settings({**LIGHT, "temporary-directory": folder}):
                     self._cluster = LocalCluster(
                         n_workers=workers or os.cpu_count() or 1,
                         threads_per_worker=1,  # FMUs of one process cannot run side by side
@@ -105,7 +107,7 @@ class DaskWorkers:
                         host="127.0.0.1",
                         dashboard_address="127.0.0.1:0",  # where Dask tells of its health
                         memory_limit=0,  # what FMUs allocate is not Dask's to manage
-                        local_directory=str(self._scratch.path),
+                        local_directory=folder,
                         silence_logs=logging.CRITICAL,
                         scheduler_kwargs={"allowed_failures": DEATHS, "dashboard": False},
                     )

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
+from cybership.scratch_folder import scratch_folder
+
 from ..compiled.library import prepare_library
 from ..errors import SimulationError
 from ..master.algorithm import Master
@@ -15,7 +17,6 @@ from ..master.loops.chosen_loop import choose_loop
 from ..master.recorder import Recorder, demand_memory
 from ..master.simulation import UPDATE_INTERVAL, simulate
 from ..process.run_state import STATE
-from ..process.scratch import scratch_folder
 from ..results import performance
 from ..results.log import LogInMemory
 from ..scenario.schema import Scenario

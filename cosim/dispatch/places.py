@@ -4,8 +4,9 @@ import re
 from collections.abc import Generator, Iterable
 from typing import Protocol
 
+from cybership.scratch_folder import Scratch
+
 from ..errors import InputError
-from ..process.scratch import Scratch
 from .job import Job, Row
 from .travelling_files import Files, copy_all
 from .workplace import Workplace

@@ -1,12 +1,12 @@
 """Systems as files of other tools: SSP archive, OSP directory, container FMU."""
 
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+
+from cybership.scratch_folder import Scratch, sweep
 
 from ..errors import InputError
 from ..formats.namespaces import OSP_STRUCTURE
@@ -17,6 +17,7 @@ from .osp import write_osp
 from .portable import Format, Part
 from .ssp import write_ssp
 
+EXPORT = ".export_"  # begins the names of scratch folders
 Write = Callable[[System, Sequence[Part], Path, Path], None]
 
 
@@ -132,11 +133,12 @@ def _beside(path: Path) -> Iterator[tuple[Path, Path]]:
     try:
         resolved = Path(os.path.realpath(path))
         resolved.parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=".export_", dir=resolved.parent))
+        sweep(resolved.parent, EXPORT)
+        scratch = Scratch(resolved.parent, EXPORT)
         try:
-            yield work, resolved
+            yield scratch.path, resolved
         finally:
-            shutil.rmtree(work, ignore_errors=True)
+            scratch.remove()
     except OSError as error:
         name = Path(error.filename or path).name
         raise InputError(

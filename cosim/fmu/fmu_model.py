@@ -15,9 +15,10 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription, read_model_description
 
+from cybership.scratch_folder import Scratch
+
 from ..conversion import BASE_UNITS, Unit
 from ..errors import InputError
-from ..process.scratch import Scratch
 from . import archive_check
 
 DESCRIPTION = "modelDescription.xml"

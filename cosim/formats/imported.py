@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..process.scratch import Scratch
+from cybership.scratch_folder import Scratch
 
 
 class Unpacked:

@@ -10,11 +10,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from cybership.scratch_folder import sweep
+
 from ..compiled.library import prepare_library
 from ..errors import InputError, SimulationError
 from ..files import update_json, write_json, write_roomy_json
 from ..process.run_state import LOGGING, STATE, Owner
-from ..process.scratch import sweep
 from ..results import log as logs
 from ..results.result_files import clear_results, default_folder, others_file
 from ..scenario.load import with_settings
@@ -144,7 +145,7 @@ def _run(
     for warning in system.warnings:
         show(f"warning: {warning}")
     if scenario.log.format == "parquet" and find_spec("pyarrow") is None:
-        raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[parquet]'")
+        raise InputError("log.format = parquet needs pyarrow: pip install 'cybership[tables]'")
     demand_memory(system, pictures)
     if note := prepare_library(scenario.native):
         show(f"note: {note}")

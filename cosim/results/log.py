@@ -250,7 +250,7 @@ def _read_parquet(path: Path, columns: Sequence[str] | None) -> dict[str, np.nda
     try:
         from pyarrow import parquet
     except ImportError:
-        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
     try:
         with parquet.ParquetFile(path) as file:  # read_table would import pandas
             wanted = _wanted(file.schema_arrow.names, columns, path)

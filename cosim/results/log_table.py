@@ -28,7 +28,7 @@ def log_frame(folder: str | Path) -> pandas.DataFrame:
     try:
         import pandas
     except ImportError:
-        raise InputError("a log as a table needs pandas: pip install 'cybership[notebook]'") from None
+        raise InputError("a log as a table needs pandas: pip install 'cybership[tables]'") from None
     frame = pandas.DataFrame(read_log(folder))
     try:
         columns = json.loads((Path(folder) / SIDECAR).read_text(encoding="utf-8"))["columns"]

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+
+from cybership.message_text import Location, first_fault
 
 from ..errors import InputError, most_alike, nearest
 from ..formats.systems import is_system, read_system
@@ -18,7 +19,7 @@ from .setting import set_value
 from .shipped import find_scenario, shipped_names
 
 # Parts of pydantic's error locations that name a validator or a type, not a place in the file.
-INTERNAL = ("function-", "constrained-", "bool", "int", "float", "str", "tuple", "list[")
+INTERNAL = ("function-", "constrained-", "literal[", "bool", "int", "float", "str", "tuple", "list[")
 
 
 def load_scenario(
@@ -123,40 +124,30 @@ def _validate(content: Any, name: str, folder: Path) -> Scenario:
     return scenario
 
 
-def telling_error(error: ValidationError) -> ErrorDetails:
-    """The error to tell: the first, but a misspelt key before the one that it leaves missing."""
-    problems = error.errors()
-    return next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
-
-
 def _message(error: ValidationError, name: str) -> str:
     """The first error in one line, with the number of further ones."""
-    first, problems = telling_error(error), error.errors()
-    place = ""
-    for part in first["loc"]:
-        if isinstance(part, int):
-            place += f"[{part}]"
-        elif part not in faults.KINDS and not str(part).startswith(INTERNAL):
-            place += f".{part}" if place else str(part)
-    text = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        text = f"unknown key{nearest(str(first['loc'][-1]), _keys(first['loc']))}"
-    elif first["type"] == "union_tag_invalid":
-        wrong = first.get("ctx", {}).get("tag", "")
-        text = f"unknown kind '{wrong}'{nearest(str(wrong), faults.KINDS)}"
-    elif first["type"] == "union_tag_not_found":
-        text = "needs a 'kind'" + nearest("", faults.KINDS)
-    elif first["type"] == "missing":
-        text = "is missing"
-    elif first["loc"][:1] == ("native",):
-        place, text = "native", 'is true, false or "auto"'
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return f"{name}: {place or 'the content'}: {text}{more}"
+    told = first_fault(error, _nearest_key, _is_internal, _special, whole="the content")
+    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    return f"{name}: {told}{more}"
 
 
-def _keys(location: tuple[int | str, ...]) -> list[str]:
-    """The keys that are allowed in the place of an unknown one."""
-    first = location[0] if len(location) > 1 else ""
+def _is_internal(part: str) -> bool:
+    return part in faults.KINDS or part.startswith(INTERNAL)
+
+
+def _special(kind: str, location: Location, value: Any) -> str:
+    if kind == "union_tag_invalid":
+        wrong = str(value["kind"])
+        return f"unknown kind '{wrong}'{nearest(wrong, faults.KINDS)}"
+    if kind == "union_tag_not_found":
+        return "needs a 'kind'" + nearest("", faults.KINDS)
+    return 'is true, false or "auto"' if location[:1] == ("native",) else ""
+
+
+def _nearest_key(location: Location) -> str:
+    """A hint at the keys that are allowed in the place of an unknown one."""
+    *before, last = location
+    first = before[0] if before else ""
     classes: dict[int | str, type[BaseModel]] = {
         "fmus": FmuEntry,
         "events": Event,
@@ -165,7 +156,8 @@ def _keys(location: tuple[int | str, ...]) -> list[str]:
         "recordings": Recording,
         "roles": Roles,
         "transformations": Transformation,
-        "faults": faults.KINDS.get(str(location[-2]) if len(location) > 1 else "", faults.Fault),
+        "faults": faults.KINDS.get(str(before[-1]) if before else "", faults.Fault),
     }
     fields = classes.get(first, Scenario).model_fields
-    return [field.alias or name for name, field in fields.items()]
+    known = [field.alias or name for name, field in fields.items()]
+    return nearest(str(last), known)

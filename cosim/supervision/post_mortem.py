@@ -8,11 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from cybership.scratch_folder import is_scratch, sweep
+
 from ..command import FAILED, INTERRUPTED, complain
 from ..files import update_json, write_json
 from ..interrupts import ignore_interrupts
 from ..process.run_state import CAMPAIGN, DESCRIPTION, FOLDER, LOGGING, STATE, UNFINISHED
-from ..process.scratch import is_scratch, sweep
 from ..results.log import CSV, SIDECAR, cut_to_rows
 from ..results.pending_rows import rescue
 from ..results.result_files import clear_results

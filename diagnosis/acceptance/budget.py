@@ -26,9 +26,6 @@ from ..search.prediction_fit.disturbance import Push, covariance
 from .criterion import JUDGED
 from .predictions import Predictions, difference, judged
 
-FINER = 2  # parts of a step, by which the error of integration is known
-POSE = {"position": (0, 1), "heading": (2,)}  # quantities that the covariance of a pose tells
-
 # Quantity -> variance in each window (w,); None: not known.
 Variances = Mapping[str, np.ndarray] | None
 
@@ -156,7 +153,7 @@ def sources_of(p: Predictions, learned: Learned | None) -> Sources:
         known("initial_state", lambda: _initial(p, base)),
         known("parameters", lambda: _parameters(p, base, learned)),
         known("process_noise", lambda: _process_noise(p, learned)),
-        known("numerical", lambda: _squares(difference(p.finer(FINER), base))),
+        known("numerical", lambda: _squares(difference(p.with_half_steps(), base))),
         notes,
     )
 
@@ -217,5 +214,5 @@ def _process_noise(p: Predictions, learned: Learned | None) -> Variances:
     shots = Shooting([p.smoothed], p.windows.length)
     motion = shots.around(p.model, {}).motion
     later = covariance(motion, np.zeros_like(shots.at_start), learned.push)[:, -1, :, -1]
-    ours = np.searchsorted(shots.start, p.start - 1e-6)
-    return {q: later[ours][:, axes, axes].sum(axis=1) for q, axes in POSE.items()}
+    x, y, psi = later[np.searchsorted(shots.start, p.start - 1e-6)].diagonal(axis1=1, axis2=2).T
+    return {"position": x + y, "heading": psi}

@@ -1,26 +1,33 @@
 """What counts as agreement, written down before anybody looks: the file of ``--criteria``."""
 
 import json
-from collections.abc import Sequence
 from datetime import datetime, timezone
 from hashlib import sha256
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PositiveFloat,
+    ValidationError,
+    model_validator,
+)
 
 from cosim import InputError
 from cosim.errors import nearest
+from cybership.message_text import Location, first_fault
 
 from ..runs import UNITS
 
 # Quantity of each signal that can be judged.
 JUDGED = {"position": "length", "heading": "angle", "u": "speed", "v": "speed", "r": "rate"}
-SHOWN = 40  # characters of what a broken file holds that a message shows; chosen
 
 Quantity = Literal["position", "heading", "u", "v", "r"]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 
 
 class Criterion(BaseModel):
@@ -28,7 +35,9 @@ class Criterion(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str | None = Field(None, min_length=1, description="in the record; else made of the rest")
+    name: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="in the record; else made of the rest"
+    )
     quantity: Quantity = Field(description="distance, heading, or velocity of the body over ground")
     horizon: Positive = Field(description="time of prediction after which the error is judged [s]")
     tolerance: Positive = Field(description="largest error, in the unit")
@@ -44,7 +53,7 @@ class Criterion(BaseModel):
     runs: Annotated[list[str], Field(min_length=1)] | None = Field(
         None, description="names of the runs that count; all"
     )
-    within: dict[str, tuple[Finite, Finite]] = Field(
+    within: dict[str, tuple[FiniteFloat, FiniteFloat]] = Field(
         {}, description="lowest and highest mean of u, v, r, speed, drift or a command in windows [SI]"
     )
 
@@ -52,8 +61,8 @@ class Criterion(BaseModel):
     def _check(self) -> "Criterion":
         units = UNITS[JUDGED[self.quantity]]
         if self.unit not in units:
-            hint = nearest(self.unit[:SHOWN], units)
-            raise ValueError(f"'{self.unit[:SHOWN]}' is no unit of {self.quantity}{hint}")
+            hint = nearest(self.unit, units)
+            raise ValueError(f"{shortened(self.unit)} is no unit of {self.quantity}{hint}")
         if self.statistic != "share" and "coverage" in self.model_fields_set:
             raise ValueError(f"coverage is of the statistic 'share', not of '{self.statistic}'")
         for signal, (low, high) in self.within.items():
@@ -100,7 +109,7 @@ class Criteria(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     purpose: str | None = Field(None, description="what the model is to be used for")
-    criteria: list[Criterion] = Field(min_length=1)
+    criteria: Annotated[list[Criterion], Field(min_length=1)]
 
 
 class ReadCriteria(NamedTuple):
@@ -114,7 +123,7 @@ class ReadCriteria(NamedTuple):
     """
 
     content: Criteria
-    path: Path
+    path: str
     sha256: str
     modified: str
     read: str
@@ -131,7 +140,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
         changed, text = path.stat().st_mtime, path.read_bytes()
         content = Criteria.model_validate(json.loads(text))
     except ValidationError as error:
-        raise InputError(f"'{path}': {_told(error)}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key, special=_special)}") from None
     except FileNotFoundError:
         raise InputError(f"no such criteria: '{path}'; cybership criteria prints some") from None
     except RecursionError:
@@ -139,7 +148,7 @@ def read_criteria(path: str | Path) -> ReadCriteria:
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as criteria: {error}") from None
     modified = datetime.fromtimestamp(changed, timezone.utc)
-    return ReadCriteria(content, path, sha256(text).hexdigest(), _stamp(modified), now())
+    return ReadCriteria(content, str(path), sha256(text).hexdigest(), _stamp(modified), now())
 
 
 def now() -> str:
@@ -151,16 +160,14 @@ def _stamp(time: datetime) -> str:
     return time.isoformat(timespec="seconds")
 
 
-def _told(error: ValidationError) -> str:
-    first = error.errors()[0]
-    loc = [str(part)[:SHOWN] for part in first["loc"]]
-    text = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        known: Sequence[str] = [*(Criteria if len(loc) == 1 else Criterion).model_fields]
-        text = f"no such key{nearest(loc[-1], known)}"
-    elif first["type"] == "literal_error" and loc[-1] == "quantity":
-        text = f"'{str(first['input'])[:SHOWN]}' cannot be judged{nearest(str(first['input']), JUDGED)}"
-    return f"{'.'.join(loc)}: {text}" if loc else text
+def _nearest_key(location: Location) -> str:
+    return nearest(str(location[-1]), (Criteria if len(location) == 1 else Criterion).model_fields)
+
+
+def _special(kind: str, location: Location, value: object) -> str:
+    if kind == "literal_error" and location[-1] == "quantity":
+        return f"'{value}' cannot be judged{nearest(str(value), JUDGED)}"
+    return ""
 
 
 def template() -> dict[str, Any]:

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from ..report.chart import AFTER, BAND, BEFORE, PT, Axis, Chart, Panel
+from ..report.chart import AFTER, BAND, BEFORE, LINE, WIDTH, Axis, Chart, Panel
 from .judged_criterion import EXPANDED, Judgement
-
-HEIGHT = 173.0  # pt
 
 
 def error_figure(j: Judgement) -> Chart:
@@ -14,14 +12,13 @@ def error_figure(j: Judgement) -> Chart:
     size = np.abs(j.errors) / c.factor
     number, inside = np.arange(1, size.size + 1), size <= c.tolerance
     reach = 0.0 if j.budget is None else EXPANDED * j.budget.u_val / c.factor
-    most = 1.05 * float(np.max([*size[np.isfinite(size)], c.tolerance, reach]))
-    ends = (0.5, size.size + 0.5)
-    panel = Panel(Axis("window", ends), Axis(f"{c.quantity} [{c.unit}]", (0.0, most)))
+    ends = (0, size.size + 1)
+    panel = Panel(Axis("window", ends), Axis(f"{c.quantity} [{c.unit}]"), zero=True)
     if j.budget is not None:
-        panel.fill(np.array(ends), 0.0, reach, BAND, "2 u_val", opacity=0.3)
+        panel.fill(ends, 0.0, reach, BAND, "2 u_val")
     for k in np.flatnonzero(np.diff(j.run)):
-        panel.draw([k + 1.5, k + 1.5], [0.0, most], BAND, width=PT.thin)
+        panel.draw(np.full(2, number[k : k + 2].mean()), [0.0, c.tolerance], BAND, width=LINE / 2)
     panel.draw(ends, [c.tolerance, c.tolerance], BEFORE, "tolerance")
-    panel.draw(number[inside], size[inside], AFTER, "within", radius=PT.dot)
-    panel.draw(number[~inside], size[~inside], BEFORE, "beyond", radius=PT.dot, hollow=True)
-    return Chart(HEIGHT, [panel])
+    panel.draw(number[inside], size[inside], AFTER, "within", dots=True)
+    panel.draw(number[~inside], size[~inside], BEFORE, "beyond", dots=True, hollow=True)
+    return Chart(WIDTH / 2, [panel])

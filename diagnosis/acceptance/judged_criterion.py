@@ -102,44 +102,29 @@ def decide(c: Criterion, errors: np.ndarray, n: float, u_val: float) -> tuple[Ou
         u_val: their standard validation uncertainty [SI].
     """
     size, reach = np.abs(np.nan_to_num(errors, nan=np.inf)), EXPANDED * u_val
-    percent = f"{100.0 * c.confidence:g} %"
+    sure, more = f"{100.0 * c.confidence:g} % sure", "too few independent windows"
+    uncertain = f"the validation uncertainty, 2 u_val = {reach / c.factor:.3g} {c.unit}"
     if c.statistic == "rms":
         found = root_mean_square(size, n, c.confidence)
         least = root_mean_square(np.maximum(size - reach, 0.0), n, c.confidence)
-        sure, refused, open_ = found.high <= c.limit, least.low > c.limit, found.low <= c.limit
-        bound = f"the RMS is {found.high / c.factor:.3g} {c.unit} at the most, {percent} sure"
-        floor = f"the RMS is {found.low / c.factor:.3g} {c.unit} at least, {percent} sure"
-        more = "too few independent windows"
+        met, refused, open_ = found.high <= c.limit, least.low > c.limit, found.low <= c.limit
+        bound = f"the RMS is {found.high / c.factor:.3g} {c.unit} at the most, {sure}"
+        floor = f"the RMS is {found.low / c.factor:.3g} {c.unit} at least, {sure}"
     else:
         found = share(size <= c.limit, n, c.confidence)
         least = share(size <= c.limit + reach, n, c.confidence)
-        sure, refused, open_ = found.low >= c.wanted, least.high < c.wanted, found.high >= c.wanted
-        bound = f"{100.0 * found.low:.3g} % at least are within, {percent} sure"
-        floor = f"{100.0 * found.high:.3g} % at the most are within, {percent} sure"
+        met, refused, open_ = found.low >= c.wanted, least.high < c.wanted, found.high >= c.wanted
+        bound = f"{100.0 * found.low:.3g} % at least are within, {sure}"
+        floor = f"{100.0 * found.high:.3g} % at the most are within, {sure}"
         fewest = needed(c.wanted, c.confidence)
-        more = "too few independent windows"
-        if n < fewest:
-            more += f": {fewest} would be needed if all are within"
+        more += f": {fewest} would be needed if all are within" if n < fewest else ""
     if reach > c.limit:
-        return (
-            "cannot be judged",
-            f"within the validation uncertainty: 2 u_val is {reach / c.factor:.3g} {c.unit}, "
-            "which is more than the tolerance",
-            found,
-        )
-    if sure:
-        return "met", bound, found
-    if refused:
-        return "not met", floor, found
-    if open_:
-        told = f"{n:.3g} independent of {size.size} leave it open"
-        return "cannot be judged", f"{more} ({told})", found
-    return (
-        "cannot be judged",
-        f"what is beyond the tolerance lies within the validation uncertainty, 2 u_val = "
-        f"{reach / c.factor:.3g} {c.unit}",
-        found,
-    )
+        return "cannot be judged", f"the tolerance is within {uncertain}", found
+    if met or refused:
+        return ("met", bound, found) if met else ("not met", floor, found)
+    beyond = f"what is beyond the tolerance lies within {uncertain}"
+    left = f"{more} ({n:.3g} independent of {size.size} leave it open)"
+    return "cannot be judged", left if open_ else beyond, found
 
 
 def _counted(c: Criterion, p: Predicted) -> np.ndarray:

@@ -15,7 +15,6 @@ from ..predictors.windows import Windows
 from ..runs import Smoothed
 from .criterion import JUDGED
 
-INDEX = {"heading": 2, "u": 3, "v": 4, "r": 5}  # in a motion (x, y, psi, u, v, r)
 LATE = 0.1  # of the horizon, or 1.5 samples: by so much earlier the last sample may be; chosen
 
 
@@ -36,7 +35,7 @@ class Predictions:
     """
 
     def __init__(self, e: Evaluation, horizon: float) -> None:
-        self.smoothed, self.predictor = e.smoothed, e.predicted_by
+        self.smoothed, self.predictor = e.smoothed, e.predictor
         self._learned = [] if e.learned is None else [e.learned]
         self.model = (e.learned or e.model).during(e.name)
         none = InputError(f"run '{e.name}' has no window of {horizon:g} s with enough samples")
@@ -72,9 +71,9 @@ class Predictions:
         """(w, 6), the predicted motion at the horizon."""
         return self._predicted(self.windows)
 
-    def finer(self, parts: int) -> np.ndarray:
-        """The predicted motion (w, 6) where each step is divided into some parts."""
-        return self._predicted(self.windows.finer(parts))
+    def with_half_steps(self) -> np.ndarray:
+        """The predicted motion (w, 6) of which each step is halved."""
+        return self._predicted(self.windows.finer(2))
 
     def from_others(self, states: Sequence[Smoothed]) -> list[np.ndarray]:
         """The predicted motion (w, 6) from each of some other states of the run on."""
@@ -113,5 +112,5 @@ def difference(motion: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def judged(quantity: str, off: np.ndarray) -> np.ndarray:
     """(w,), what a difference (w, 6) is in a quantity that is judged: of position the distance."""
-    assert quantity in JUDGED
-    return np.hypot(off[:, 0], off[:, 1]) if quantity == "position" else off[:, INDEX[quantity]]
+    named = dict(zip(JUDGED, (np.hypot(off[:, 0], off[:, 1]), *off.T[2:]), strict=True))
+    return named[quantity]

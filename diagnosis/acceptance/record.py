@@ -1,33 +1,39 @@
-"""The record of a validation: criteria, what the data say of them, and all that it was made with."""
+"""The record of a validation: criteria, what the data say of them, and all that it was made with.
+
+``validation.json`` has numbers in SI, but those of a criterion in its unit; one that is not finite, or
+not known, is null. E is the mean of measured minus predicted, of position of the distance; estimate, low
+and high are the share, or the RMS, with bounds at the criterion's confidence. Of standard uncertainties
+the combined ones, u_input and u_val, hold what is known.
+"""
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim import InputError
 
-from ..execution.result_folder import sha256, together
+from ..execution.result_folder import together
 from ..predictors import ship_name
-from ..report.content import fmu_result, sensor_results, versions
+from ..report.content import Content, fmu_result, part, sensor_results, versions
 from ..session import Comparison
-from .budget import Learned, read_learned, sources_of
-from .criterion import Criterion, ReadCriteria, now, read_criteria
+from .budget import Budget, Learned, read_learned, sources_of
+from .criterion import JUDGED, ReadCriteria, now, read_criteria
 from .judged_criterion import Judgement, Predicted, judge
 from .predictions import Predictions
-from .record_files import FILES, write_record
-from .record_keys import (
-    BudgetResult,
-    CriteriaResult,
-    FileResult,
-    JudgementResult,
-    RangeResult,
-    RecordContent,
-)
+from .record_files import FILES, entry, write_record
+from .record_keys import FORM, REFERENCES, STANDING
 from .validity import covered, window_means
 
+# Attributes that the record holds; KEY=ATTRIBUTE where a key has another name.
+JUDGEMENT = (
+    "criterion=criterion.title requirement=criterion.text outcome reason runs unit=criterion.unit "
+    "tolerance=criterion.tolerance windows=errors.size independent"
+)
+BUDGET = "u_D=measurement initial_state parameters process_noise u_input u_num=numerical u_val"
 Files = Mapping[str, "Path | str | Sequence[Path | str] | None"]
 
 
@@ -40,7 +46,7 @@ class Validation:
         judgements: with the errors of all windows.
     """
 
-    content: RecordContent
+    content: Content
     judgements: Sequence[Judgement]
 
     def write(self, folder: str | Path, sign: str | Path | None = None) -> list[str]:
@@ -67,7 +73,7 @@ class Validation:
         return "\n".join(lines(self.content))
 
 
-def lines(content: RecordContent) -> Iterator[str]:
+def lines(content: Content) -> Iterator[str]:
     """The outcome, a line for each criterion."""
     for j in content.judgements:
         yield f"{j.criterion}: {j.outcome}. {j.requirement}: {j.reason}."
@@ -104,33 +110,27 @@ def validate(
     judgements = [judge(c, given, predicted[c.horizon]) for c in read.content.criteria]
     every = {**(files or {}), "learned": () if known is None else known.files}
     fmu = fmu_result(comparison)
-    content = RecordContent(
-        made=now(),
-        command=command or " ".join(sys.argv),
-        versions=versions(),
-        model=fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
-        ship=ship_name(comparison.evaluations[0].model.ship),
-        fmu=fmu,
-        files=[*_data(comparison), *_files(every)],
-        criteria=CriteriaResult(
-            path=str(read.path),
-            sha256=read.sha256,
-            modified=read.modified,
-            read=read.read,
-            purpose=read.content.purpose,
-        ),
-        judgements=[_result(j) for j in judgements],
-        validity=[
-            RangeResult(
-                signal=name, unit=unit, least=q[0], q05=q[1], median=q[2], q95=q[3], greatest=q[4]
-            )
-            for name, (unit, q) in covered(comparison.evaluations).items()
-        ],
-        sensors=[s for e in comparison.evaluations for s in sensor_results(e)],
-        notes=list(dict.fromkeys(notes)),
-        not_covered=list(_not_covered(comparison, judgements)),
-    )
-    return Validation(content, judgements)
+    content = {
+        "form": FORM,
+        "standing": STANDING,
+        "references": [*REFERENCES],
+        "made": now(),
+        "command": command or " ".join(sys.argv),
+        "versions": versions(),
+        "model": fmu.name if fmu else str((files or {}).get("model") or "nominal model"),
+        "ship": ship_name(comparison.evaluations[0].model.ship),
+        "fmu": fmu,
+        "files": [*_data(comparison), *_files(every)],
+        "criteria": part(read, "path sha256 modified read purpose=content.purpose"),
+        "judgements": [_result(j) for j in judgements],
+        "validity": covered(comparison.evaluations),
+        "sensors": [s for e in comparison.evaluations for s in sensor_results(e)],
+        "notes": [*dict.fromkeys(notes)],
+        "not_covered": [*_not_covered(comparison, judgements)],
+        "reports": [],
+        "public_key": None,
+    }
+    return Validation(Content.of(content), judgements)
 
 
 def _predicted(
@@ -148,69 +148,40 @@ def _predicted(
         yield Predicted(e.name, p, found, window_means(p))
 
 
-def _data(comparison: Comparison) -> Iterator[FileResult]:
+def _data(comparison: Comparison) -> Iterator[dict[str, str]]:
     for e in comparison.evaluations:
-        path = e.weak_windows.run.file
-        if path is not None:
-            yield _file("data", path)
+        if (path := e.weak_windows.run.file) is not None:
+            yield entry("data", path)
             beside = path.with_name(f"{path.name}.json")
             if path.is_file() and beside.is_file():
-                yield _file("layout of data", beside)
+                yield entry("layout of data", beside)
 
 
-def _files(files: Files) -> Iterator[FileResult]:
+def _files(files: Files) -> Iterator[dict[str, str]]:
     for role, paths in files.items():
         several = [] if paths is None else [paths] if isinstance(paths, (str, Path)) else paths
         for path in several:
-            yield _file(role, Path(path))
+            yield entry(role, Path(path))
 
 
-def _file(role: str, path: Path) -> FileResult:
-    return FileResult(role=role, path=str(path), sha256=sha256(path))
-
-
-def _result(j: Judgement) -> JudgementResult:
+def _result(j: Judgement) -> dict[str, Any]:
     c, f = j.criterion, j.criterion.factor
     some, whole = j.errors.size > 0, 1.0 if c.statistic != "rms" else f
     estimate, low, high = (None, None, None) if j.interval is None else (x / whole for x in j.interval)
-    return JudgementResult(
-        criterion=c.title,
-        requirement=c.text,
-        outcome=j.outcome,
-        reason=j.reason,
-        runs=[*j.runs],
-        unit=c.unit,
-        tolerance=c.tolerance,
-        windows=j.errors.size,
-        independent=j.independent,
-        E=float(np.mean(j.errors)) / f if some else None,
-        rms=float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
-        largest=float(np.max(np.abs(j.errors))) / f if some else None,
-        estimate=estimate,
-        low=low,
-        high=high,
-        budget=_budget(j, c),
-    )
+    return part(j, JUDGEMENT) | {
+        "E": float(np.mean(j.errors)) / f if some else None,
+        "rms": float(np.sqrt(np.mean(j.errors**2))) / f if some else None,
+        "largest": float(np.max(np.abs(j.errors))) / f if some else None,
+        "estimate": estimate,
+        "low": low,
+        "high": high,
+        "budget": None if j.budget is None else _budget(j.budget, f),
+    }
 
 
-def _budget(j: Judgement, c: Criterion) -> BudgetResult | None:
-    b = j.budget
-    if b is None:
-        return None
-
-    def scaled(u: float | None) -> float | None:
-        return None if u is None else u / c.factor
-
-    return BudgetResult(
-        u_D=scaled(b.measurement),
-        initial_state=scaled(b.initial_state),
-        parameters=scaled(b.parameters),
-        process_noise=scaled(b.process_noise),
-        u_input=scaled(b.u_input),
-        u_num=scaled(b.numerical),
-        u_val=scaled(b.u_val),
-        unknown=b.unknown,
-    )
+def _budget(b: Budget, factor: float) -> dict[str, Any]:
+    scaled = {name: None if u is None else u / factor for name, u in part(b, BUDGET).items()}
+    return scaled | {"unknown": b.unknown}
 
 
 def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Iterator[str]:
@@ -219,7 +190,7 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     horizons = sorted({j.criterion.horizon for j in judgements})
     yield f"Predictions over other times than {', '.join(f'{h:g}' for h in horizons)} s."
     judged = {j.criterion.quantity for j in judgements if j.outcome != "cannot be judged"}
-    rest = [q for q in ("position", "heading", "u", "v", "r") if q not in judged]
+    rest = [q for q in JUDGED if q not in judged]
     if rest:
         yield f"Errors of {', '.join(rest)}: no criterion on them is judged."
     for j in judgements:
@@ -230,7 +201,6 @@ def _not_covered(comparison: Comparison, judgements: Sequence[Judgement]) -> Ite
     if predictor.whole:
         yield f"Predictions from a measured state: the velocity of {predictor.name} cannot be set."
     yield "Systematic errors of sensors that no other channel shows."
-    if all(e.weak_windows.run.trial is None for e in comparison.evaluations):
-        yield "Measures of manoeuvring trials: no run is one."
-    else:
-        yield "Measures of manoeuvring trials, which comparison.json has, and no criterion."
+    trial = any(e.weak_windows.run.trial for e in comparison.evaluations)
+    which = ", which comparison.json has, and no criterion" if trial else ": no run is one"
+    yield f"Measures of manoeuvring trials{which}."

@@ -2,31 +2,24 @@
 
 from collections.abc import Iterator
 
+from ..report.content import Content
 from ..report.document import Section, Table
 from ..report.formatting import NO_VALUE, number
-from .record_keys import JudgementResult, RangeResult, RecordContent
 
-NOT_KNOWN = "not known"
 BUDGET = ("u_D", "initial_state", "parameters", "process_noise", "u_input", "u_num", "u_val")
 CALLED = {"u_D": "measurement u_D", "initial_state": "initial state", "process_noise": "process noise"}
 
 
-def sections(r: RecordContent) -> Iterator[Section]:
+def sections(r: Content) -> Iterator[Section]:
     """The report, in order."""
-    told = Table(("criterion", "verdict", "why"), [*map(_verdict, r.judgements)], words=True)
-    yield Section("Verdict", tables=[told])
+    told = [(f"{j.criterion}: {j.requirement}", j.outcome, j.reason) for j in r.judgements]
+    yield Section("Verdict", tables=[Table(("criterion", "verdict", "why"), told, words=True)])
     yield _errors(r)
     yield _uncertainty(r)
-    yield Section(
-        "Validity range",
-        ["What the data cover: least, quantiles and greatest over all samples that are used."],
-        [
-            Table(
-                ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest"),
-                [*map(_covered, r.validity)],
-            )
-        ],
-    )
+    heads = ("signal", "unit", "least", "5 %", "50 %", "95 %", "greatest")
+    covered = [(v.signal, v.unit, *map(number, [*v.values()][2:])) for v in r.validity]
+    text = "What the data cover: least, quantiles and greatest over all samples that are used."
+    yield Section("Validity range", [text], [Table(heads, covered)])
     faults = [f"{s['run']}: {s['sentence']}" for s in r.sensors]
     yield Section("Faults of sensors", faults or ["The channels do not contradict each other."])
     yield Section("What is not covered", r.not_covered)
@@ -36,15 +29,7 @@ def sections(r: RecordContent) -> Iterator[Section]:
     yield Section("Terms and standing", [r.standing, *r.references])
 
 
-def _verdict(j: JudgementResult) -> tuple[str, str, str]:
-    return f"{j.criterion}: {j.requirement}", j.outcome, j.reason
-
-
-def _covered(v: RangeResult) -> tuple[str, ...]:
-    return v.signal, v.unit, *map(number, (v.least, v.q05, v.median, v.q95, v.greatest))
-
-
-def _errors(r: RecordContent) -> Section:
+def _errors(r: Content) -> Section:
     rows = [
         (
             j.criterion,
@@ -63,11 +48,16 @@ def _errors(r: RecordContent) -> Section:
     return Section("Comparison error", [told], [Table(heads, rows)])
 
 
-def _uncertainty(r: RecordContent) -> Section:
-    judged = [j for j in r.judgements if j.budget is not None]
-    rows = []
-    for j in judged:
-        rows.append((j.criterion, j.unit, *(_known(getattr(j.budget, name)) for name in BUDGET)))
+def _uncertainty(r: Content) -> Section:
+    rows = [
+        (
+            j.criterion,
+            j.unit,
+            *("not known" if j.budget[n] is None else number(j.budget[n]) for n in BUDGET),
+        )
+        for j in r.judgements
+        if j.budget is not None
+    ]
     told = (
         "Standard uncertainties of the judged quantity at the horizon; u_input² is that of initial "
         "state, parameters and process noise, u_val² = u_num² + u_input² + u_D², of what is known."
@@ -76,11 +66,7 @@ def _uncertainty(r: RecordContent) -> Section:
     return Section("Uncertainty", [told], [Table(heads, rows)])
 
 
-def _known(u: float | None) -> str:
-    return NOT_KNOWN if u is None else number(u)
-
-
-def _origin(r: RecordContent) -> Section:
+def _origin(r: Content) -> Section:
     c = r.criteria
     rows = [
         ("made", r.made),

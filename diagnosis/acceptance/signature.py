@@ -28,7 +28,7 @@ def sign(content: bytes, private: str | Path) -> bytes:
     return _private(Path(private)).sign(content)
 
 
-def is_signed(content: bytes, signature: bytes, public: str | bytes, where: str) -> bool:
+def is_signed(content: bytes, signature: bytes, public: bytes, where: str) -> bool:
     """Whether a signature is that of some bytes by the key of a public one, PEM.
 
     Raises:
@@ -39,9 +39,8 @@ def is_signed(content: bytes, signature: bytes, public: str | bytes, where: str)
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
     from cryptography.hazmat.primitives.serialization import load_pem_public_key
 
-    pem = public.encode() if isinstance(public, str) else public
     try:
-        key = load_pem_public_key(pem)
+        key = load_pem_public_key(public)
     except Exception:  # of several kinds, of which the library promises none
         raise InputError(f"{where} is no public key (PEM)") from None
     if not isinstance(key, Ed25519PublicKey):

@@ -35,14 +35,11 @@ def independent(errors: np.ndarray, run: np.ndarray) -> float:
     variance = float(np.mean(off**2))
     if n < 3 or variance == 0.0:
         return float(n)
-    total = 0.0
-    for lag in range(1, n - 1):
-        pairs = off[lag:] * off[:-lag] * (run[lag:] == run[:-lag])
-        correlation = float(pairs.sum()) / (n * variance)
-        if correlation <= 0.0:
-            break
-        total += correlation
-    return float(np.clip(n / (1.0 + 2.0 * total), 1.0, n))
+    total, lag, correlation = 0.0, 1, variance
+    while correlation > 0.0 and lag < n - 1:
+        correlation = float(np.sum(off[lag:] * off[:-lag] * (run[lag:] == run[:-lag]))) / n
+        total, lag = total + max(correlation, 0.0), lag + 1
+    return float(np.clip(n / (1.0 + 2.0 * total / variance), 1.0, n))
 
 
 def share(inside: np.ndarray, n: float, confidence: float) -> Interval:

@@ -9,7 +9,7 @@ from ..predictors.evaluation import Evaluation
 from ..runs import OF_UNIT, QUANTITY, Smoothed
 from .predictions import Predictions
 
-QUANTILES = (0.05, 0.5, 0.95)
+QUANTILES = {"least": 0.0, "q05": 0.05, "median": 0.5, "q95": 0.95, "greatest": 1.0}  # 1; by keys
 MOTION = {"u": "m/s", "v": "m/s", "r": "rad/s", "speed": "m/s", "drift": "rad"}
 # By the quantity of a command.
 SI = {"force": "N", "moment": "N.m", "command": "1", "angle": "rad", "shaft speed": "1/s"}
@@ -24,9 +24,8 @@ def signals(smoothed: Smoothed) -> dict[str, np.ndarray]:
         under_way = speed > SLOW * np.nanmax(speed)
     drift = np.where(under_way, np.arctan2(-v, u), np.nan)
     motion = {"u": u, "v": v, "r": r, "speed": speed, "drift": drift}
-    return motion | {
-        n: x for n, x in at_samples(smoothed).items() if n not in {*motion, "x", "y", "psi"}
-    }
+    known = {*motion, "x", "y", "psi"}
+    return motion | {n: x for n, x in at_samples(smoothed).items() if n not in known}
 
 
 def unit_of(signal: str, evaluation: Evaluation) -> str:
@@ -51,18 +50,18 @@ def window_means(p: Predictions) -> dict[str, np.ndarray]:
     return found
 
 
-def covered(evaluations: Sequence[Evaluation]) -> dict[str, tuple[str, list[float]]]:
-    """Signal -> its unit; least, 5 %, 50 %, 95 % and largest value over all samples that are used."""
+def covered(evaluations: Sequence[Evaluation]) -> list[dict[str, str | float]]:
+    """Each signal over all samples that are used."""
     found: dict[str, list[np.ndarray]] = {}
     units = {}
     for e in evaluations:
         for name, values in signals(e.smoothed).items():
-            chosen = values[e.smoothed.used & np.isfinite(values)]
-            if chosen.size:
+            if (chosen := values[e.smoothed.used & np.isfinite(values)]).size:
                 found.setdefault(name, []).append(chosen)
                 units[name] = unit_of(name, e)
-    return {n: (units[n], _spread(np.concatenate(parts))) for n, parts in found.items()}
-
-
-def _spread(values: np.ndarray) -> list[float]:
-    return np.quantile(values, [0.0, *QUANTILES, 1.0]).tolist()
+    at = [*QUANTILES.values()]
+    spread = {n: np.quantile(np.concatenate(parts), at).tolist() for n, parts in found.items()}
+    return [
+        {"signal": n, "unit": units[n], **dict(zip(QUANTILES, values, strict=True))}
+        for n, values in spread.items()
+    ]

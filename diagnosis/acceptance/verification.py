@@ -1,18 +1,34 @@
 """Check a validation record: ``python -m diagnosis.verify validation.json``."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from cosim import InputError
+from cybership.message_text import first_fault
 
 from ..execution.result_folder import sha256
-from .record_keys import FORM, FileResult, RecordContent
+from .record_keys import FORM
 from .signature import is_signed
 
-SUFFIX = ".sig"
+
+class File(BaseModel):
+    """A file that a record names."""
+
+    role: str = "criteria"
+    path: str
+    sha256: str
+
+
+class Record(BaseModel):
+    """What is checked of a record."""
+
+    form: str
+    criteria: File
+    files: list[File]
+    reports: list[File]
+    public_key: str | None
 
 
 class Check(NamedTuple):
@@ -36,64 +52,45 @@ def verify_record(record: str | Path, key: str | Path | None = None) -> list[Che
     """
     path = Path(record)
     raw, content = _read(path)
-    files = [
-        FileResult(role="criteria", path=content.criteria.path, sha256=content.criteria.sha256),
-        *content.files,
-        *content.reports,
-    ]
-    return [*_signature(path, raw, content, key), *(_check(f, path.parent) for f in files)]
+    files = [content.criteria, *content.files, *content.reports]
+    return [_signature(path, raw, content, key), *(_check(f, path.parent) for f in files)]
 
 
-def _read(path: Path) -> tuple[bytes, RecordContent]:
+def _read(path: Path) -> tuple[bytes, Record]:
     try:
         raw = path.read_bytes()
-        content = TypeAdapter(RecordContent).validate_json(raw)
+        content = Record.model_validate_json(raw)
     except OSError as error:
         raise InputError(f"'{path}' cannot be read: {error.strerror or error}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise InputError(
-            f"'{path}' is no validation record: {f'{place}: ' if place else ''}{first['msg']}"
-        ) from None
+        raise InputError(f"'{path}' is no validation record: {first_fault(error)}") from None
     if content.form != FORM:
         raise InputError(f"'{path}' is not of the form '{FORM}' but of '{content.form[:40]}'")
     return raw, content
 
 
-def _signature(
-    path: Path, raw: bytes, content: RecordContent, key: str | Path | None
-) -> Iterator[Check]:
-    beside = path.with_suffix(SUFFIX)
-    named = content.public_key
-    if key is None and named is None and not beside.exists():
-        yield Check(None, "signature: none; a change of the record would not show")
-        return
+def _signature(path: Path, raw: bytes, content: Record, key: str | Path | None) -> Check:
+    beside, named = path.with_suffix(".sig"), content.public_key
     if not beside.exists():
-        yield Check(False, f"signature: '{beside.name}' is missing beside the record")
-        return
+        if key is None and named is None:
+            return Check(None, "signature: none; a change of the record would not show")
+        return Check(False, f"signature: '{beside.name}' is missing beside the record")
     if key is not None:
         try:
-            public: str | bytes = Path(key).read_bytes()
+            public = Path(key).read_bytes()
         except OSError as error:
             raise InputError(f"the key '{key}' cannot be read: {error.strerror or error}") from None
         where, by = f"'{key}'", f"of {key}"
+    elif named is not None:
+        public, where = named.encode(), "public_key of the record"
+        by = "that the record names (whose? --key)"
     else:
-        public, where, by = (
-            named or "",
-            "public_key of the record",
-            "that the record names (whose? --key)",
-        )
-        if named is None:
-            yield Check(False, "signature: the record names no key; --key tells one")
-            return
-    if is_signed(raw, beside.read_bytes(), public, where):
-        yield Check(True, f"signature: by the key {by}")
-    else:
-        yield Check(False, f"signature: not of this record by the key {by}")
+        return Check(False, "signature: the record names no key; --key tells one")
+    holds = is_signed(raw, beside.read_bytes(), public, where)
+    return Check(holds, f"signature: {'' if holds else 'not of this record '}by the key {by}")
 
 
-def _check(f: FileResult, folder: Path) -> Check:
+def _check(f: File, folder: Path) -> Check:
     told = f"{f.role}: {f.path}"
     places = [folder / f.path, Path(f.path), folder / Path(f.path).name]
     found = [h for h in map(sha256, places) if h]
@@ -101,6 +98,5 @@ def _check(f: FileResult, folder: Path) -> Check:
         return Check(None, f"{told}: the record has no hash of it")
     if not found:
         return Check(None, f"{told}: not found here")
-    if f.sha256 in found:
-        return Check(True, f"{told}: the same")
-    return Check(False, f"{told}: differs")
+    same = f.sha256 in found
+    return Check(same, f"{told}: {'the same' if same else 'differs'}")

@@ -7,10 +7,13 @@ Vessel and thrusters have the parameters of a model; observer, controller and pa
 ``scenarios/ellipse.json`` and ``scenarios/eight.json``, without noise and freezes.
 """
 
+import json
 from collections.abc import Callable, Iterator, Mapping
+from itertools import takewhile
 from math import inf
 from typing import Any, NamedTuple
 
+from cosim.scenario import find_scenario
 from fmus.controller import abs as adaptive
 from fmus.controller.backstepping import Inputs as ControllerInputs
 from fmus.declare import Component, flatten, rebuild
@@ -24,12 +27,7 @@ from fmus.signals import Estimate, Force, Measurement, Nothing, Target
 
 from ..predictors import Model
 from ..predictors.ship_model import parameters
-
-# Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
-STEP = 0.08  # s; chosen, distances agree with those at 0.01 s to 3 %
-# m. Chosen: some four ship lengths, most of the basin's width; a good loop stays within a tenth of it.
-BOUND = 5.0
-OBSERVER_WEIGHTS = {"a": 0.08, "b": 0.05}  # 1; those of the scenarios
+from .settings import SETTINGS
 
 
 class Reference(NamedTuple):
@@ -39,52 +37,54 @@ class Reference(NamedTuple):
         name: for people.
         guidance: the component.
         start: initial pose of the ship, as parameters of the vessel [m].
+        observer: its parameters.
         seconds: duration [s].
     """
 
     name: str
     guidance: Component
     start: Mapping[str, float]
+    observer: Mapping[str, float]
     seconds: float
+
+    @classmethod
+    def of(cls, name: str, guidance: Component, scenario: str) -> "Reference":
+        """The path of a shipped scenario."""
+        content = json.loads(find_scenario(scenario).read_text(encoding="utf-8"))
+        vessel, observer = (content["fmus"][name]["parameters"] for name in ("vessel", "observer"))
+        return cls(name, guidance, vessel, observer, content["stop"])
 
 
 REFERENCES = (
-    Reference("ellipse", ellipse.COMPONENT, {"x_0": 5.0, "y_0": 2.0}, 198.0),  # two rounds
-    Reference("figure of eight", eight.COMPONENT, {"x_0": 6.0, "y_0": 0.5}, 422.0),  # one round
+    Reference.of("ellipse", ellipse.COMPONENT, "ellipse"),
+    Reference.of("figure of eight", eight.COMPONENT, "eight"),
 )
 
 
 class Loop(NamedTuple):
-    """A closed loop at an instant: the states of its components, and what they give to each other.
+    """A closed loop at an instant: the states of its components, and what they give to each other."""
 
-    Attributes:
-        states: of vessel, path, observer, controller and thrusters.
-        velocity: of the ship, as its thrusters are told.
-        target, estimate: what path and observer give.
-        poses: measured, on their way to the observer, the oldest first.
-    """
-
-    states: tuple[Any, ...]
+    states: tuple[Any, ...]  # of vessel, path, observer, controller and thrusters
     velocity: Any
     target: Target
     estimate: Estimate
-    poses: tuple[Measurement, ...]
+    poses: tuple[Measurement, ...]  # on their way to the observer, the oldest first
 
 
 def closed_loop(
     reference: Reference, model: Model
 ) -> tuple[Loop, Callable[[Loop, float], tuple[Loop, Number]]]:
-    """A closed loop at its start, and the function that advances it by STEP.
+    """A closed loop at its start, and the function that advances it by a step.
 
     That function gets the time [s] since controller and thrusters acted last, and gives the distance [m]
     between the ship and its target as well.
     """
-    length, h_path = model.ship.scale.length, STEP * model.ship.scale.time
+    length, h_path = model.ship.scale.length, SETTINGS.step * model.ship.scale.time
     start = {name: length * x for name, x in reference.start.items()}
     ship = _Part(model.ship.vessel, {**model.vessel, **start})
     serving = model.ship.serving
     path = _Part(serving(reference.guidance), {})
-    observer = _Part(serving(mdf.COMPONENT), OBSERVER_WEIGHTS)
+    observer = _Part(serving(mdf.COMPONENT), reference.observer)
     controller = _Part(serving(adaptive.COMPONENT), {})
     drive, told = _Part(model.ship.thrusters, model.thrusters), model.ship.thrusters.inputs
     s, vessel = ship.begin(Force())
@@ -136,28 +136,25 @@ def distances(reference: Reference, model: Model) -> Iterator[float]:
     first, step = closed_loop(reference, model)
     now, distance = step(first, 0.0)
     yield distance
-    tape, values, h = Tape(Kernels()), flatten(now), STEP * model.ship.scale.time
+    tape, values, h = Tape(Kernels()), flatten(now), SETTINGS.step * model.ship.scale.time
     names = [f"s{k}" for k in range(len(values))]
     after, further = step(rebuild(now, [tape.variable(name) for name in names]), h)
     advance = function(tape.recording([*flatten(after), further]), tape.kernels, *names)
-    for _ in range(round(reference.seconds / STEP) - 1):
+    for _ in range(round(reference.seconds / SETTINGS.step) - 1):
         *values, distance = advance(*values)
         yield distance
 
 
 def bound_of(model: Model) -> float:
     """Distance [m] from its target beyond which a ship is lost."""
-    return BOUND * model.ship.scale.length
+    return SETTINGS.bound * model.ship.scale.length
 
 
 def largest_distance(reference: Reference, model: Model) -> float:
     """Largest distance [m] between the ship and its target; infinite as soon as the ship is lost."""
-    largest, bound = 0.0, bound_of(model)
+    bound = bound_of(model)
     try:
-        for distance in distances(reference, model):
-            if not distance < bound:
-                return inf
-            largest = max(largest, distance)
+        kept = [*takewhile(lambda distance: distance < bound, distances(reference, model))]
     except (OverflowError, ValueError, ZeroDivisionError):  # numbers beyond what a float holds
         return inf
-    return largest
+    return max(kept) if len(kept) == round(reference.seconds / SETTINGS.step) else inf

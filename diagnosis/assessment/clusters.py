@@ -6,6 +6,7 @@ K. Y. Liang and S. L. Zeger, Longitudinal data analysis using generalized linear
 (1986); B. L. Welch, The generalization of "Student's" problem, Biometrika 34 (1947).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,11 @@ class ClusterMean(NamedTuple):
     mean: float
     variance: float
     dof: int
+
+
+def numbered(runs: Sequence[np.ndarray]) -> np.ndarray:
+    """(K,), numbers of clusters over all runs, from those (K_i,) within each run."""
+    return np.unique(np.concatenate([k + 1j * n for k, n in enumerate(runs)]), return_inverse=True)[1]
 
 
 def cluster_mean(total: np.ndarray, count: np.ndarray) -> ClusterMean:

@@ -9,19 +9,7 @@ from ..predictors.thrust import full_thrust
 from ..runs import Run
 from ..runs.columns.columns import TAU
 from .readings import inertial, needed
-
-# Times the full thrust, beyond which a command is no force of these thrusters. Chosen: a model may count
-# one thruster of two, a request may be logged before it is clipped; the nearest wrong unit is a hundred.
-MOST_THRUST = 3.0
-NEGLIGIBLE = 0.05  # of the impulse of an axis, or of its windows: so much may be false (chosen)
-LEAST = 0.1  # of a constant force; a motion that needs less does not contradict it (chosen)
-SILENT = 1e-6  # of the largest command; less is none, and varies no more than rounding
-# Of what inertia and hull need: without a command they balance each other, up to what coefficients that
-# are known to 10 % leave. Chosen: twice that.
-UNBALANCED = 0.2
-# Of the force that the motion needs elsewhere: so much without any command was not logged. Chosen.
-MOVES_ON = 0.5
-LONG = 20  # windows without any command: the ship has forgotten the thrust before
+from .settings import SETTINGS
 
 
 def beyond_thrusters(run: Run, model: Model) -> str | None:
@@ -29,15 +17,15 @@ def beyond_thrusters(run: Run, model: Model) -> str | None:
     if run.commands is not None:
         return _beyond_limits(run, model)
     full, size = full_thrust(model), np.abs(run.tau_cmd)
-    beyond = size > MOST_THRUST * full
+    beyond = size > SETTINGS.most_gain * full
     share = (size * beyond).sum(axis=0) / np.maximum(size.sum(axis=0), np.finfo(float).tiny)
-    if share.max() <= NEGLIGIBLE:
+    if share.max() <= SETTINGS.negligible:
         return None
-    k = int(np.argmax((size / full).max(axis=0) * (share > NEGLIGIBLE)))
+    k = int(np.argmax((size / full).max(axis=0) * (share > SETTINGS.negligible)))
     rows, unit = int(beyond[:, k].sum()), "N.m" if k == 2 else "N"
     seen = (
-        f"{TAU[k]} reaches {size[:, k].max():.4g} {unit} and is more than {MOST_THRUST:g} times the "
-        f"{full[k]:.4g} {unit} that the thrusters give in {rows} of {len(size)} rows"
+        f"{TAU[k]} reaches {size[:, k].max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times "
+        f"the {full[k]:.4g} {unit} that the thrusters give in {rows} of {len(size)} rows"
     )
     if 2 * rows > len(size):
         return seen
@@ -52,13 +40,14 @@ def _beyond_limits(run: Run, model: Model) -> str | None:
     limits, form = layout.limits(model.drive.params), model.ship.form_of(run.commands)
     for k, ((name, unit), limit) in enumerate(zip(form.items(), limits, strict=True)):
         most, size = float(np.abs(limit).max()), np.abs(run.commands[:, k])
-        beyond = size > MOST_THRUST * most
-        if (layout.round and layout.round[k]) or beyond.mean() <= NEGLIGIBLE:
+        beyond = size > SETTINGS.most_gain * most
+        if (layout.round and layout.round[k]) or beyond.mean() <= SETTINGS.negligible:
             continue
         first = float(run.time[int(np.argmax(beyond))])
+        rows = f"{int(beyond.sum())} of {len(size)} rows"
         return (
-            f"{name} reaches {size.max():.4g} {unit} and is more than {MOST_THRUST:g} times its limit, "
-            f"{most:.4g} {unit}, in {int(beyond.sum())} of {len(size)} rows, from {first:.4g} s on: "
+            f"{name} reaches {size.max():.4g} {unit} and is more than {SETTINGS.most_gain:g} times its "
+            f"limit, {most:.4g} {unit}, in {rows}, from {first:.4g} s on: "
             "it seems to be in another unit there"
         )
     return None
@@ -68,22 +57,23 @@ def contradicted_commands(w: WeakWindows, model: Model) -> str | None:
     """A clause about commands that are constant, or absent, while the motion shows that others acted."""
     tau, run = w.run.tau_cmd, w.run
     largest = np.abs(tau).max()
-    varies = np.ptp(tau, axis=0) > SILENT * largest
+    varies = np.ptp(tau, axis=0) > SETTINGS.rounding * largest
     if not varies.any():
         return "none of its commands ever varies, which tells nothing of what the ship does with them"
     z = needed(w, model)
     size = np.sqrt((z**2).mean(axis=0))
     for k in np.flatnonzero(~varies):
         name, unit, given = TAU[k], "N.m" if k == 2 else "N", float(tau[0, k])
-        opposed = (z[:, k] * given > 0.0).mean() < NEGLIGIBLE and size[k] > LEAST * abs(given)
-        if opposed and abs(given) > SILENT * largest:
+        follows = (z[:, k] * given > 0.0).mean() >= SETTINGS.negligible
+        opposed = not follows and size[k] > SETTINGS.least_gain * abs(given)
+        if opposed and abs(given) > SETTINGS.rounding * largest:
             return (
                 f"{name} is {given:.3g} {unit} in all rows, and the motion needs {z[:, k].mean():.3g} "
                 f"{unit} all the time: another column is meant, or it was not logged"
             )
         inertia = inertial(w, model)[:, k]
         parts = inertia**2 + (z[:, k] - inertia) ** 2
-        if name in run.absent and size[k] > UNBALANCED * np.sqrt(parts.mean()):
+        if name in run.absent and size[k] > SETTINGS.unbalanced * np.sqrt(parts.mean()):
             return (
                 f"there is no column {name}, and the motion needs {size[k]:.3g} {unit} there; "
                 "if nothing was commanded there, give it a column of zeros"
@@ -99,10 +89,10 @@ def _moves_on(w: WeakWindows, model: Model, size: np.ndarray) -> str | None:
     always = replace(w.run, tau_cmd=np.ones_like(tau), commands=None)
     every = weak_windows(replace(s, track=replace(s.track, run=always)))
     idle = (every.held @ np.abs(tau)).max(axis=1) == 0.0
-    if idle.sum() < LONG:
+    if idle.sum() < SETTINGS.long:
         return None
     still = np.sqrt((needed(every, model)[idle] ** 2).mean(axis=0))
-    if (still < MOVES_ON * size).any():
+    if (still < SETTINGS.explained * size).any():
         return None
     return (
         f"all commands are zero for {w.every * idle.sum():.0f} s, and the motion needs "

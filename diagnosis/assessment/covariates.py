@@ -1,20 +1,19 @@
 """Covariates of the model error: time, place, speed, yaw rate, thruster level and heading of windows."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.constants import degree
+
+from fmus.scale import REFERENCE, Scale
 
 from ..predictors import WeakWindows
+from ..predictors.weak_form import BLOCK
 
 AXES = "XYN"
-QUANTILE_BINS = 8  # bins of equal numbers of windows; chosen
-SECTORS = 8  # of heading, 45 degrees each; chosen
-MAX_TIME_BINS = 16  # chosen, so that a profile of a long run stays short
-# s, times the scale of the ship: a block of the cross-validation: shorter bins are not independent
-MIN_TIME_BIN = 15.0
-SMALLEST_LEVEL = 1e-9  # N or N m, keeps the relative level defined where an axis is never commanded
+BINS = 8  # of equal numbers of windows, or sectors of heading; of time twice as many at most; chosen
+DISPLAYED = {"rad": 1.0 / degree, "rad/s": 1.0 / degree, "1": 100.0}  # degrees and percent for people
 
 
 @dataclass(frozen=True)
@@ -24,82 +23,55 @@ class Covariate:
     Attributes:
         id: its name in results.
         unit: of its values.
-        display_factor: what a value is multiplied by for people, such as degrees for radians.
+        bin_edges: from values (K,) and the size of the ship to the edges (bins + 1,) of the bins.
         above, below, between: phrases for a region, with places for its ends.
-        bin_edges: from values (K,) to the edges (bins + 1,) of the bins.
         bounded: whether a region may have two ends; else it is open to one side.
         cyclic: whether the last bin is next to the first.
     """
 
     id: str
     unit: str
-    display_factor: float
+    bin_edges: Callable[..., np.ndarray]
     above: str
     below: str
     between: str
-    bin_edges: Callable[[np.ndarray], np.ndarray]
     bounded: bool = False
     cyclic: bool = False
 
+    @property
+    def display_factor(self) -> float:
+        """What a value is multiplied by for people, such as degrees for radians."""
+        return DISPLAYED.get(self.unit, 1.0)
 
-def _quantiles(x: np.ndarray) -> np.ndarray:
-    return np.unique(np.quantile(x, np.linspace(0.0, 1.0, QUANTILE_BINS + 1)))
+
+def _quantiles(x: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+    return np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
 
 
-def _intervals(t: np.ndarray, least: float = MIN_TIME_BIN) -> np.ndarray:
-    bins = int(np.clip((t.max() - t.min()) // least, 1, MAX_TIME_BINS))
+def _intervals(t: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+    """Bins no shorter than a block of the cross-validation, as shorter ones are not independent."""
+    bins = int(np.clip((t.max() - t.min()) // (BLOCK * scale.time), 1, 2 * BINS))
     return np.linspace(t.min(), t.max(), bins + 1)
 
 
-def _sectors(psi: np.ndarray) -> np.ndarray:
-    return np.linspace(-np.pi, np.pi, SECTORS + 1)
+def _sectors(psi: np.ndarray, scale: Scale = REFERENCE) -> np.ndarray:
+    return np.linspace(-np.pi, np.pi, BINS + 1)
 
 
-DEGREES = 180.0 / np.pi
-TIME = Covariate("time", "s", 1.0, "after {0} s", "before {0} s", "from {0} to {1} s", _intervals, True)
-SPEED = Covariate(
-    "speed",
-    "m/s",
-    1.0,
-    "at surge speeds above {0} m/s",
-    "at surge speeds below {0} m/s",
-    "at surge speeds of {0} to {1} m/s",
-    _quantiles,
-)
-YAW_RATE = Covariate(
-    "yaw_rate",
-    "rad/s",
-    DEGREES,
-    "at turn rates above {0}°/s",
-    "at turn rates below {0}°/s",
-    "at turn rates of {0} to {1}°/s",
-    _quantiles,
-)
-THRUST = Covariate(
-    "thrust",
-    "1",
-    100.0,
-    "while its thrust is above {0} % of the most",
-    "while its thrust is below {0} % of the most",
-    "while its thrust is {0} to {1} % of the most",
-    _quantiles,
-)
-HEADING = Covariate(
-    "heading",
-    "rad",
-    DEGREES,
-    "on headings above {0}°",
-    "on headings below {0}°",
-    "on headings from {0}° to {1}°",
-    _sectors,
-    bounded=True,
-    cyclic=True,
-)
+def _phrases(what: str, unit: str) -> tuple[str, str, str]:
+    return f"{what} above {{0}}{unit}", f"{what} below {{0}}{unit}", f"{what} of {{0}} to {{1}}{unit}"
+
+
+TIME = Covariate("time", "s", _intervals, "after {0} s", "before {0} s", "from {0} to {1} s", True)
+SPEED = Covariate("speed", "m/s", _quantiles, *_phrases("at surge speeds", " m/s"))
+YAW_RATE = Covariate("yaw_rate", "rad/s", _quantiles, *_phrases("at turn rates", "°/s"))
+THRUST = Covariate("thrust", "1", _quantiles, *_phrases("at thrusts", " % of the most"))
+HEADING = Covariate("heading", "rad", _sectors, *_phrases("on headings", "°"), True, True)
 NORTH = Covariate(
-    "north", "m", 1.0, "north of {0} m", "south of {0} m", "from {0} to {1} m north", _quantiles, True
+    "north", "m", _quantiles, "north of {0} m", "south of {0} m", "from {0} to {1} m north", True
 )
 EAST = Covariate(
-    "east", "m", 1.0, "east of {0} m", "west of {0} m", "from {0} to {1} m east", _quantiles, True
+    "east", "m", _quantiles, "east of {0} m", "west of {0} m", "from {0} to {1} m east", True
 )
 
 
@@ -111,18 +83,20 @@ class CovariateValues:
         covariate: which.
         rows: (n,), numbers of the windows, counted over all runs one after the other.
         values: (n,), in the covariate's unit.
+        scale: of the ship.
         run: name of the only run that is meant; None: all.
     """
 
     covariate: Covariate
     rows: np.ndarray
     values: np.ndarray
+    scale: Scale
     run: str | None = None
 
     @property
     def edges(self) -> np.ndarray:
         """(bins + 1,), in the covariate's unit."""
-        return self.covariate.bin_edges(self.values)
+        return self.covariate.bin_edges(self.values, self.scale)
 
 
 def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues]]:
@@ -131,27 +105,17 @@ def covariates_by_axis(data: Sequence[WeakWindows]) -> list[list[CovariateValues
     Args:
         data: windows of each run.
     """
-    counts = [w.middle.size for w in data]
+    counts, scale = [w.middle.size for w in data], data[0].scale
     every = np.arange(sum(counts))
-    first = np.cumsum([0, *counts])
     speed, turn, level, heading, place = map(np.concatenate, zip(*map(means_of_run, data), strict=True))
-    shared = [
-        CovariateValues(SPEED, every, speed),
-        CovariateValues(YAW_RATE, every, turn),
-        CovariateValues(HEADING, every, heading),
-        CovariateValues(NORTH, every, place[:, 0]),
-        CovariateValues(EAST, every, place[:, 1]),
-    ]
-    least = MIN_TIME_BIN * data[0].scale.time
-    by_time = (
-        TIME if least == MIN_TIME_BIN else replace(TIME, bin_edges=partial(_intervals, least=least))
-    )
+    common = {SPEED: speed, YAW_RATE: turn, HEADING: heading, NORTH: place[:, 0], EAST: place[:, 1]}
+    shared = [CovariateValues(by, every, values, scale) for by, values in common.items()]
     times = [
-        CovariateValues(by_time, np.arange(a, a + w.middle.size), w.middle, w.run.name)
-        for a, w in zip(first, data, strict=False)
+        CovariateValues(TIME, rows, w.middle, scale, w.run.name)
+        for rows, w in zip(np.split(every, np.cumsum(counts)), data, strict=False)
     ]
-    most = np.maximum(level.max(axis=0), SMALLEST_LEVEL)
-    return [[*shared, CovariateValues(THRUST, every, level[:, k] / most[k]), *times] for k in range(3)]
+    relative = level / np.maximum(level.max(axis=0), np.finfo(float).tiny)
+    return [[*shared, CovariateValues(THRUST, every, each, scale), *times] for each in relative.T]
 
 
 def means_of_run(w: WeakWindows) -> tuple[np.ndarray, ...]:

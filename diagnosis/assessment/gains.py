@@ -15,25 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import pinv
 
 from ..predictors import Model, WeakWindows
 from ..predictors.correlation import correlated_windows
 from ..predictors.weak_form import OVERLAP, commanded_force
 from .readings import inertial, needed
-
-# Of k. Derived: half of the way, in logarithms, between two thrusters where the model counts one and the
-# foot, the smallest of the units: sqrt(2 * 3.28). So much less on all axes at once is a clock or a unit.
-MOST_GAIN = 2.5
-# Of k, on one axis: a thruster that gives a tenth, or none, is a matter of the diagnosis. Derived: half
-# of the way, in logarithms, to the nearest wrong unit of a force or moment, a hundredth.
-LEAST_GAIN = 0.1
-# Share of what is left of a by all else that T explains: with less it is not T that moves the ship.
-EXPLAINED = 0.5
-SURE = 3.0  # standard errors
-SILENT = 1e-6  # of the largest commanded force; less is no command, and varies no more than rounding
-NEGLIGIBLE = 1e-10  # relative size of a singular value
-# Of the variation of an axis' commands: with less of their own, what is due to them is not told.
-OWN = 0.01  # chosen: a thruster aft that only ever pushes sideways and turns at once has none
+from .settings import SETTINGS
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +40,11 @@ class Gains:
 
     @property
     def wrong(self) -> np.ndarray:
-        """(3,), axes whose k no ship has whose model is within a factor of MOST_GAIN."""
-        low, high = self.value - SURE * self.error, self.value + SURE * self.error
-        weak = (self.told & (high < 1.0 / MOST_GAIN))[np.isfinite(self.value)]
-        return self.told & ((low > MOST_GAIN) | (high < LEAST_GAIN) | weak.all())
+        """(3,), axes whose k no ship has; where all are less, it is a clock or a unit."""
+        most, off = SETTINGS.most_gain, SETTINGS.sure * self.error
+        low, high = self.value - off, self.value + off
+        weak = (self.told & (high < 1.0 / most))[np.isfinite(self.value)]
+        return self.told & ((low > most) | (high < SETTINGS.least_gain) | weak.all())
 
     @property
     def mean(self) -> float | None:
@@ -68,39 +57,39 @@ class Gains:
 
     @property
     def close(self) -> bool:
-        """Whether all that are told are within a factor of MOST_GAIN of one."""
-        near = (self.value * MOST_GAIN > 1.0) & (self.value < MOST_GAIN)
+        """Whether all that are told are within a factor of one."""
+        near = (self.value * SETTINGS.most_gain > 1.0) & (self.value < SETTINGS.most_gain)
         return bool(self.told.any() and near[self.told].all())
 
 
 def gains(w: WeakWindows, model: Model) -> Gains:
     """The acceleration that the commands of a run give, as shares of what they give by a model."""
     a, z, T = inertial(w, model), needed(w, model), w.held @ commanded_force(w, model)
-    moves = T.std(axis=0) > SILENT * np.abs(T).max()
+    moves = T.std(axis=0) > SETTINGS.rounding * np.abs(T).max()
     psi = w.smoothed.eta[:, 2]
     u, v, r = nu = np.where(w.known, w.smoothed.nu.T, 0.0)
     north, east = np.nan_to_num(np.cos(psi)), np.nan_to_num(np.sin(psi))
     earth = ([north, east], [-east, north], [])
-    value, error, left = np.full(3, np.nan), np.full(3, np.nan), np.zeros_like(a)
-    told = np.zeros(3, bool)
+    value, error = np.full((2, 3), np.nan)
+    left, told = np.zeros_like(a), np.zeros(3, bool)
     for j in np.flatnonzero(moves):
         others = [T[:, i] for i in np.flatnonzero(moves) if i != j]
         states = [*nu, np.abs(nu[j]) * nu[j], u * r, u * v, *earth[j]]
         x = np.column_stack(
             [T[:, j], *others, (z - a)[:, j], np.ones(len(a)), *(w.smooth @ s for s in states)]
         )
-        if len(a) < OVERLAP * x.shape[1] or not np.isfinite(x).all():
-            continue  # of fewer independent windows than unknowns nothing is told
-        if _own(T[:, j], others) < OWN:
+        few = len(a) < OVERLAP * x.shape[1]  # of fewer independent windows than unknowns nothing is told
+        if few or not np.isfinite(x).all() or _own(T[:, j], others) < SETTINGS.own:
             continue
         size = np.maximum(np.linalg.norm(x, axis=0), np.finfo(float).tiny)
-        inverse = np.linalg.pinv(x / size, rcond=NEGLIGIBLE)
+        inverse = pinv(x / size)
         beta = inverse @ a[:, j]
         left[:, j] = a[:, j] - x / size @ beta
         free = max(len(a) - len(beta), 1)
         variance = left[:, j] @ left[:, j] / free * (inverse[0] @ inverse[0])
         value[j], error[j] = beta[0] / size[0], np.sqrt(variance) / size[0]
-        told[j] = beta[0] ** 2 > EXPLAINED * (beta[0] ** 2 + free * variance)
+        # With less explained of what all else leaves, it is not T that moves the ship.
+        told[j] = beta[0] ** 2 > SETTINGS.explained * (beta[0] ** 2 + free * variance)
     return Gains(value, error * np.sqrt(correlated_windows([w], left)), told)
 
 
@@ -108,6 +97,5 @@ def _own(command: np.ndarray, others: Sequence[np.ndarray]) -> float:
     """Share of the variation of a command (K,) that follows from no other."""
     known = np.column_stack([*others, np.ones(command.size)])
     known = known / np.maximum(np.linalg.norm(known, axis=0), np.finfo(float).tiny)
-    varying = command - command.mean()
-    left = command - known @ (np.linalg.pinv(known, rcond=NEGLIGIBLE) @ command)
-    return float((left @ left) / (varying @ varying))
+    left = command - known @ (pinv(known) @ command)
+    return float(np.mean(left**2) / np.var(command))

@@ -4,15 +4,15 @@ The force that a motion needs, z = M nu_dot + hull forces in weak form, follows 
 For each mistake that a file may have (an axis that points the other way, another unit, ...) the motion
 is put right, and the commands of each axis are explained by it,
 
-    U = min_c sum (T - c z)^2 / sum T^2,    LEAST <= c <= MOST or c = 0,    T, z without their means,
+    U = min_c sum (T - c z)^2 / sum T^2,    0.1 <= c <= 10 or c = 0,    T, z without their means,
 
 the share of the commands of which the motion shows nothing. T is the same whatever the motion, so that
 U of two readings can be compared; c is one for the model's inertia and the right units. A hull,
 thrusters or surroundings that differ from the model raise U in every reading, and an axis on which
 nothing arrives has c = 0 in each; only a mistake lets *another* reading explain the commands.
 
-The likeliest mistake is told if it lowers the product of the three U by FACTOR, and by more than chance
-in so many windows (likelihood ratio), makes no axis worse and leaves none mostly unexplained, and an
+The likeliest mistake is told if it lowers the product of the three U by a factor, by more than chance in
+so many windows (likelihood ratio), makes no axis worse and leaves none mostly unexplained, and an
 offset of the heading does not do as well. A mistake in the pose needs commands on all three axes: one
 alone is explained by another ship's hull as well.
 """
@@ -27,7 +27,7 @@ from scipy.special import chdtri
 from cosim import InputError
 
 from ..predictors import Model, WeakWindows
-from ..predictors.weak_form import commanded_force
+from ..predictors.weak_form import OVERLAP, commanded_force
 from ..runs import Run, line_beside
 from ..runs.columns.columns import POSE, TAU
 from ..runs.columns.side_car import Change
@@ -35,26 +35,11 @@ from ..runs.columns.unit_check import GO_ON
 from .command_check import beyond_thrusters, contradicted_commands
 from .gains import Gains, gains
 from .readings import AS_READ, Reading, directions, needed, other_factors, reread, units
+from .settings import SETTINGS
 
-# Of c: a mass or a thruster that is wrong by ten is still a matter of the diagnosis. Derived: half of
-# the way, in logarithms, to the nearest wrong unit, centimetres.
-LEAST, MOST = 0.1, 10.0
-# Chosen: with a right file, whatever the effect in it, another reading explains as much at the most.
-FACTOR = 4.0
-# Of U: by so much an axis may be worse in the right reading. Chosen; noise alone changes less.
-WORSE = 0.05
-# Of U: a run whose commands show in every axis but for so little needs no other reading. Chosen.
-MISSING = 0.1
-# Of U: so much an axis may lack in the right reading. Chosen: with more missing, no model is a judge.
-EXPLAINED = 0.5
-# Windows of the weak form that count as one. Derived: the correlations of their kernel sum to 3.7.
-OVERLAP = 4
-CHANCE = 0.01  # of a mistake where there is none, divided by the number of readings
 # rad; a heading that is off by any of them is an effect of the library, and no mistake where it explains
 # a run as well. Chosen: 30 degrees apart, so that one is within 15 degrees.
 TURNS = tuple(np.arange(1, 12) * np.pi / 6.0)
-LEAST_SHARE = 1e-4  # of the commands, below which nothing is told apart (chosen)
-SILENT = 1e-6  # of the largest sum of squares; commands of an axis that are less are none
 
 
 def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
@@ -78,13 +63,12 @@ def refuse_implausible(runs: Sequence[WeakWindows], model: Model) -> None:
 
 def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], str | None] | None:
     """What is wrong with a run, how its columns should be read, and the name that one should have."""
-    twice, still = same_columns(w.run), still_column(w.run)
+    twice, wrong_one = same_columns(w.run), still_column(w.run)
+    seen = f"{wrong_one} is the same number in all rows, while the rest of the pose changes"
     if twice:
-        seen = f"{twice[0]} and {twice[1]} are the same numbers"
-        return seen, {twice[1]: Change(twice[1])}, "the name of its column"
-    if still:
-        seen = f"{still} is the same number in all rows, while the rest of the pose changes"
-        return seen, {still: Change(still)}, "the name of its column"
+        wrong_one, seen = twice[1], f"{twice[0]} and {twice[1]} are the same numbers"
+    if wrong_one:
+        return seen, {wrong_one: Change(wrong_one)}, "the name of its column"
     beyond, silent = beyond_thrusters(w.run, model), contradicted_commands(w, model)
     if silent and beyond is None:
         return silent, {}, None
@@ -101,11 +85,9 @@ def _refusal(w: WeakWindows, model: Model) -> tuple[str, Mapping[str, Change], s
     if beyond is None and not wrong:
         return None
     seen = beyond or f"its accelerations follow {', '.join(wrong)}"
-    return (
-        (f"{seen}; it seems that {reading.mistake}", reading.changes, None)
-        if reading
-        else (seen, {}, None)
-    )
+    if reading is None:
+        return seen, {}, None
+    return f"{seen}; it seems that {reading.mistake}", reading.changes, None
 
 
 def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None:
@@ -138,12 +120,9 @@ def likeliest_unit(w: WeakWindows, model: Model, given: Gains) -> Reading | None
 
 def same_columns(run: Run) -> tuple[str, str] | None:
     """Two signals of a run that are the same numbers, if there are any."""
-    signals = {"time": run.time, **dict(zip(POSE, run.pose.T, strict=True))}
-    pairs = list(combinations(signals, 2))
-    if run.commands is None:
-        signals |= dict(zip(TAU, run.tau_cmd.T, strict=True))
-        pairs += combinations(TAU, 2)
-    for a, b in pairs:
+    signals = dict(zip(("time", *POSE, *TAU), (run.time, *run.pose.T, *run.tau_cmd.T), strict=True))
+    commands = combinations(TAU if run.commands is None else (), 2)
+    for a, b in (*combinations(("time", *POSE), 2), *commands):
         if np.array_equal(signals[a], signals[b], equal_nan=True) and np.nanstd(signals[a]) > 0.0:
             return a, b
     return None
@@ -159,12 +138,7 @@ def still_column(run: Run) -> str | None:
 
 
 class Mistake(NamedTuple):
-    """A reading that explains a run far better than its file as it was read.
-
-    Attributes:
-        reading: how it was meant.
-        before, after: 1 - U as it was read and as it was meant, mean of the axes.
-    """
+    """A reading that explains a run better, and 1 - U before and after, mean of the axes."""
 
     reading: Reading
     before: float
@@ -179,33 +153,35 @@ def likeliest_mistake(w: WeakWindows, model: Model) -> Mistake | None:
     commands = w.held @ commanded_force(w, model)
     commands = commands - commands.mean(axis=0)
     size = (commands**2).sum(axis=0)
-    heard = size > SILENT * size.max()
+    heard = size > SETTINGS.rounding * size.max()
     if not heard.any():
         return None
 
     def shares(z: np.ndarray, T: np.ndarray = commands) -> np.ndarray:
-        return np.maximum(_unexplained(T, z)[heard] / (T**2).sum(axis=0)[heard], LEAST_SHARE)
+        missing = _unexplained(T, z)[heard] / (T**2).sum(axis=0)[heard]
+        return np.maximum(missing, SETTINGS.negligible)
 
     as_read = _varying(w, model, AS_READ)
     now = shares(as_read)
-    if now.max() < MISSING:
+    if now.max() <= SETTINGS.negligible:
         return None
     found, readings = [], [*directions(w.run, model)]
-    least = chdtri(1, CHANCE / len(readings)) / (w.middle.size / OVERLAP)
+    by_chance = chdtri(1, SETTINGS.chance / len(readings)) / (w.middle.size / OVERLAP)
     for reading in readings:
         z = as_read if reading.still else _varying(w, model, reading)
         then = shares(z, commands @ reading.commands.T)
         better = float(np.log(now / then).sum())
-        sound = (then <= now + WORSE).all() and then.max() < EXPLAINED
+        worse = (then > now + SETTINGS.negligible).any()
+        sound = not worse and then.max() < SETTINGS.explained
         alone = reading.still and np.array_equal(np.abs(reading.commands), np.eye(3))
-        if better > max(np.log(FACTOR), least) and sound and (alone or heard.all()):
+        if better > max(np.log(SETTINGS.factor), by_chance) and sound and (alone or heard.all()):
             found.append((better, reading, then))
     if not found:
         return None
     better, reading, then = max(found, key=lambda each: each[0])
     turned = (shares(_varying(w, model, Reading("", turn=turn))) for turn in TURNS)
     lawful = max(float(np.log(now / each).sum()) for each in turned)
-    if better < np.log(FACTOR) + max(lawful, 0.0):
+    if better < np.log(SETTINGS.factor) + max(lawful, 0.0):
         return None
     return Mistake(reading, 1.0 - float(now.mean()), 1.0 - float(then.mean()))
 
@@ -220,5 +196,6 @@ def _unexplained(commands: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Sum of squares (3,) of what of commands (K, 3) does not follow from the needed force z (K, 3)."""
     with np.errstate(all="ignore"):
         c = np.nan_to_num((commands * z).sum(axis=0) / (z * z).sum(axis=0))
-        off = ((commands - np.clip(c, LEAST, MOST) * z) ** 2).sum(axis=0)
+        c = np.clip(c, SETTINGS.least_gain, 1.0 / SETTINGS.least_gain)
+        off = ((commands - c * z) ** 2).sum(axis=0)
     return np.fmin(off, (commands**2).sum(axis=0))

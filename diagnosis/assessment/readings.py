@@ -95,19 +95,17 @@ def directions(run: Run, model: Model) -> Iterator[Reading]:
 
 def units(run: Run, model: Model) -> Iterator[Reading]:
     """Readings in which the pose or the commands are in other units, or percent of the full thrust."""
-    for unit, size in UNITS["length"].items():
-        yield of_pose(f"its position is in {unit}", (size, size, 1.0))
-        yield of_pose(f"x is in {unit}", (size, 1.0, 1.0))
-        yield of_pose(f"y is in {unit}", (1.0, size, 1.0))
+    for unit, m in UNITS["length"].items():
+        for name, factors in (("its position", (m, m, 1.0)), ("x", (m, 1.0, 1.0)), ("y", (1.0, m, 1.0))):
+            yield of_pose(f"{name} is in {unit}", factors)
     half = Change("psi", offset=np.pi)
     yield Reading("its heading is off by 180 deg", {"psi": half}, turn=np.pi)
     if run.commands is not None:
         yield from _shares(run, run.commands, model)
         return
     forces, moments = UNITS["force"], UNITS["moment"]
-    yield of_commands(
-        "its commands are in percent of the full thrust", (0.01 * full_thrust(model)).tolist()
-    )
+    percent = (0.01 * full_thrust(model)).tolist()
+    yield of_commands("its commands are in percent of the full thrust", percent)
     yield from (of_commands(f"tau_N is in {u}", (1.0, 1.0, moments[u])) for u in moments if u != "N.m")
     for unit, moment in (("mN", "N.mm"), ("kN", "kN.m")):
         f = forces[unit]

@@ -1,8 +1,8 @@
 """With what a model error repeats: with place, motion, commands or time, or with none of them.
 
-A window's error is predicted by the mean over its NEIGHBOURS in a space (place, motion, commands), of
-windows that are at least APART from it in time or in another run. The squared correlation of prediction
-and error is the share that repeats there. By chance it is as in series that are shifted in time against
+A window's error is predicted by the mean over its neighbours in a space (place, motion, commands), of
+windows that are two blocks from it in time or in another run. The squared correlation of prediction and
+error is the share that repeats there. By chance it is as in series that are shifted in time against
 that space, which keeps how long an error lasts.
 """
 
@@ -14,14 +14,9 @@ from scipy.spatial import KDTree
 
 from ..predictors import WeakWindows
 from ..predictors.correlation import correlated_windows
-
-NEIGHBOURS = 5  # windows of a prediction; chosen
-SEARCHED = 160  # nearest windows among which these are: a pass of APART to both sides holds 120
-APART = 30.0  # s, times the scale of the ship; two blocks, as what counts as independent elsewhere
-SHIFTS = 199  # series shifted at random; a share above all of them is beyond chance by 0.5 %
-REPEATS = 0.25  # share from which on an error is said to repeat; chosen
-CLEARER = 0.1  # share by which commands must give more than a force that comes and goes; chosen
-STRETCH = 15  # windows, of one amplitude: half of a block
+from ..predictors.weak_form import BLOCK, EVERY
+from .clusters import numbered
+from .settings import SETTINGS
 
 
 class Recurrence(NamedTuple):
@@ -41,7 +36,7 @@ class Recurrence(NamedTuple):
     def best(self) -> str | None:
         """The space in which most repeats; None: there is none."""
         name = max(self.shares, key=lambda n: self.shares[n])
-        return name if self.shares[name] >= REPEATS else None
+        return name if self.shares[name] >= SETTINGS.repeats else None
 
 
 def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> list[Recurrence]:
@@ -55,21 +50,23 @@ def recurrence(data: Sequence[WeakWindows], left: np.ndarray, seed: int = 0) -> 
     run = np.repeat(np.arange(len(data)), [w.middle.size for w in data])
     time = np.concatenate([w.middle for w in data])
     place, motion, command = (np.concatenate(x) for x in zip(*map(_of_run, data), strict=True))
-    apart = APART * data[0].scale.time
-    neighbours = {
-        "place": _neighbours(place, run, time, apart),
-        "motion": _neighbours(_scaled(motion), run, time, apart),
-        "command": _neighbours(_scaled(command), run, time, apart),
-        "time": _neighbours(time[:, None], run, time, np.inf),
-    }
+    apart = 2 * BLOCK * data[0].scale.time
+    # A pass of so long to both sides has fewer windows.
+    count = SETTINGS.neighbours + 2 * round(apart / data[0].every) + 1
+    spaces = {"place": place, "motion": _scaled(motion), "command": _scaled(command)}
+    neighbours = {name: _neighbours(x, run, time, apart, count) for name, x in spaces.items()}
+    neighbours["time"] = _neighbours(time[:, None], run, time, np.inf, count)
     rng = np.random.default_rng(seed)
-    offsets = rng.integers(SEARCHED, max(len(left) - SEARCHED, SEARCHED + 1), SHIFTS)
+    shifts = round(1.0 / SETTINGS.chance) - 1
+    offsets = rng.integers(count, max(len(left) - count, count + 1), shifts)
     lasts = data[0].every * correlated_windows(data, left)
+    half_block = round(BLOCK / (2 * EVERY))  # windows of one amplitude of a command
+    stretch = numbered([np.arange(w.middle.size) // half_block for w in data])
     found = []
     for k in range(3):
         error = left[:, k]
         shares = {name: _share(error, near, offsets) for name, near in neighbours.items()}
-        in_part = _in_part(error, command[:, k], run, shares["command"])
+        in_part = _in_part(error, command[:, k], stretch, shares["command"])
         found.append(Recurrence(shares, float(lasts[k]), in_part))
     return found
 
@@ -86,7 +83,7 @@ def _scaled(x: np.ndarray) -> np.ndarray:
 
 
 def _neighbours(
-    x: np.ndarray, run: np.ndarray, time: np.ndarray, least: float
+    x: np.ndarray, run: np.ndarray, time: np.ndarray, least: float, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (K, n) of the nearest windows of another run or time, and which of them there are.
 
@@ -94,11 +91,11 @@ def _neighbours(
         x: (K, k), where windows are.
         run, time: (K,), of each.
         least: apart [s]; infinite: only those of other runs.
+        count: of the nearest windows that are searched.
     """
-    count = min(SEARCHED, len(x))
-    rows = KDTree(x).query(x, count)[1].reshape(len(x), -1)
+    rows = KDTree(x).query(x, min(count, len(x)))[1].reshape(len(x), -1)
     apart = (run[rows] != run[:, None]) | (np.abs(time[rows] - time[:, None]) >= least)
-    order = np.argsort(~apart, axis=1, kind="stable")[:, :NEIGHBOURS]
+    order = np.argsort(~apart, axis=1, kind="stable")[:, : SETTINGS.neighbours]
     return np.take_along_axis(rows, order, axis=1), np.take_along_axis(apart, order, axis=1)
 
 
@@ -112,20 +109,19 @@ def _share(error: np.ndarray, near: tuple[np.ndarray, np.ndarray], offsets: np.n
         return max(float(mean @ x), 0.0) ** 2 / size**2 if size > 0.0 else 0.0
 
     share = foretold(error)
-    if share < REPEATS:
+    if share < SETTINGS.repeats:
         return 0.0
     return share if all(foretold(np.roll(error, int(n))) < share for n in offsets) else 0.0
 
 
-def _in_part(error: np.ndarray, command: np.ndarray, run: np.ndarray, always: float) -> bool:
+def _in_part(error: np.ndarray, command: np.ndarray, stretch: np.ndarray, always: float) -> bool:
     """Whether the command with an amplitude of its own for each stretch gives far more of an error than
     a constant force for each stretch, and than the command gives ``always``.
     """
-    number = np.arange(error.size) // STRETCH + run * error.size
 
     def explained(x: np.ndarray) -> float:
-        at = np.unique(number, return_inverse=True)[1]
-        top, bottom = np.bincount(at, x * error), np.bincount(at, x * x)
-        return float(np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0]) / max(error @ error, 1e-300))
+        top, bottom = np.bincount(stretch, x * error), np.bincount(stretch, x * x)
+        squares = np.sum(top[bottom > 0.0] ** 2 / bottom[bottom > 0.0])
+        return float(squares / max(error @ error, np.finfo(float).tiny))
 
-    return explained(command) > max(explained(np.ones_like(error)), always) + CLEARER
+    return explained(command) > max(explained(np.ones_like(error)), always) + SETTINGS.clearer

@@ -8,28 +8,19 @@ Bonferroni's correction for the number of regions that were tried.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.special import ndtri
 
 from ..predictors import WeakWindows
-from .clusters import ClusterMean, cluster_mean, welch_p_value
+from ..predictors.uncertainty import NOISE_TOLERANCE
+from .clusters import ClusterMean, cluster_mean, numbered, welch_p_value
 from .covariates import AXES, Covariate, CovariateValues, covariates_by_axis
+from .settings import SETTINGS
 
 NAMES = {"X": "Surge", "Y": "Sway", "N": "Yaw"}
 UNITS = {"X": "N", "Y": "N", "N": "N m"}
-SIGNIFICANCE = 0.01  # level of the test after Bonferroni's correction; chosen
-# Calibrated by tests/test_diagnosis_where.py on model error that is correlated over a window and depends
-# on no covariate: with one block three times as many regions were found.
-BLOCKS_PER_CLUSTER = 2
-# Ratio of the model error to its uncertainty, above which there is an error at all. Chosen: that
-# uncertainty is right within 30 % (tests/test_diagnosis_where.py).
-MIN_RATIO_TO_NOISE = 1.4
-SIGMAS_ABOVE_NOISE = 2.0  # cluster-robust standard errors, one-sided 2.3 %; chosen
-MIN_RATIO_TO_REST = 1.4  # of the RMS inside to that outside; smaller differences do not matter; chosen
-MIN_SHARE, MAX_SHARE = 0.05, 0.6  # of the windows that a region may hold; chosen
-MIN_CLUSTERS = 4  # inside and outside, so that each variance has three degrees of freedom; chosen
-CLUSTERS_PER_RUN = 10_000  # a number beyond that of any run's clusters, which keeps runs apart
-SMALLEST_SQUARE = 1e-30  # N2 or (N m)2, keeps a logarithm finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +78,8 @@ class Region:
         low, high = (
             None if x is None else f"{by.display_factor * x:.3g}" for x in (self.low, self.high)
         )
-        if high is None:
-            text = by.above.format(low)
-        elif low is None:
-            text = by.below.format(high)
-        else:
-            text = by.between.format(low, high)
+        text = by.above.format(low) if high is None else by.between.format(low, high)
+        text = by.below.format(high) if low is None else text
         return f"in run {self.run} {text}" if self.run else text
 
     @property
@@ -130,54 +117,40 @@ def find_regions(
         std: of each run its standard deviation by the noise of the measurement (K, 3) [N, N, N m].
     """
     squares, noise = np.concatenate(omega) ** 2, np.concatenate(std) ** 2
-    numbers = [CLUSTERS_PER_RUN * k + w.block // BLOCKS_PER_CLUSTER for k, w in enumerate(data)]
-    cluster = np.unique(np.concatenate(numbers), return_inverse=True)[1]
-    several_runs = len(data) > 1
+    cluster = numbered([w.block // SETTINGS.blocks_per_cluster for w in data])
     sentences: list[str] = []
     regions: list[Region] = []
     profiles: list[Profile] = []
-    for k, covariates in enumerate(covariates_by_axis(data)):
-        axis = AXES[k]
-        designs = [
-            _Design.of(axis, c, squares[:, k], noise[:, k], cluster, several_runs) for c in covariates
-        ]
+    for axis, covariates, s, n in zip(AXES, covariates_by_axis(data), squares.T, noise.T, strict=True):
+        designs = [_Design.of(axis, c, s, n, cluster, len(data) > 1) for c in covariates]
         profiles += [d.profile for d in designs]
-        rms, uncertainty = (np.sqrt(x[:, k].mean()) for x in (squares, noise))
-        measured = f"{rms:.2g} {UNITS[axis]}"
-        if not exceeds_noise(squares[:, k], noise[:, k], cluster):
-            within = f"no error seen, {measured} is within the uncertainty of {uncertainty:.1g}"
-            seldom = f"{measured} (uncertainty {uncertainty:.1g}), too seldom to say where"
-            is_within = rms <= MIN_RATIO_TO_NOISE * uncertainty
-            sentences.append(f"{NAMES[axis]}: {within if is_within else seldom}.")
-            continue
-        found = sorted(filter(None, (d.clearest_region() for d in designs)), key=lambda r: -r.contrast)
+        rms, uncertainty = np.sqrt(s.mean()), np.sqrt(n.mean())
+        measured = f"{rms:.2g} {UNITS[axis]} (uncertainty {uncertainty:.1g})"
+        found: list[Region] = []
+        if _exceeds_noise(s, n, cluster):
+            clearest = filter(None, (d.clearest_region() for d in designs))
+            found = sorted(clearest, key=lambda r: -r.contrast)
+            where = f"{measured}, nowhere clearly worse than elsewhere"
+        elif rms <= NOISE_TOLERANCE * uncertainty:
+            where = f"no error seen, {measured} is within the noise"
+        else:
+            where = f"{measured}, too seldom to say where"
         regions += found
-        everywhere = f"{measured} (uncertainty {uncertainty:.1g}), nowhere clearly worse than elsewhere."
-        sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {everywhere}")
+        sentences.append(found[0].sentence if found else f"{NAMES[axis]}: {where}.")
     return ErrorRegions(sentences, regions, profiles)
 
 
-def exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -> bool:
-    """Whether a model error is more than noise.
-
-    Args:
-        squares: (K,), of the model error [N2 or (N m)2].
-        noise: (K,), variance by the noise of the measurement [N2 or (N m)2].
-        cluster: (K,), number of each window's cluster.
-    """
-    excess = squares - MIN_RATIO_TO_NOISE**2 * noise
+def _exceeds_noise(squares: np.ndarray, noise: np.ndarray, cluster: np.ndarray) -> bool:
+    """Whether a model error (K,) is more than the noise of the measurement."""
+    excess = squares - NOISE_TOLERANCE**2 * noise
     above = cluster_mean(np.bincount(cluster, excess), np.bincount(cluster))
-    return above.mean > SIGMAS_ABOVE_NOISE * np.sqrt(above.variance)
+    return above.mean > ndtri(1.0 - SETTINGS.chance) * np.sqrt(above.variance)
 
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """Block design of an axis and a covariate: bins by clusters.
-
-    Attributes:
-        profile: what is reported of it.
-        total, noise: (bins, clusters), sums of the squares and of the noise's variance.
-        count: (bins, clusters), numbers of windows.
+    """Block design of an axis and a covariate: sums of the squares and of the noise's variance, and
+    numbers of windows, in bins and clusters (bins, clusters).
     """
 
     profile: Profile
@@ -196,15 +169,13 @@ class _Design:
         several_runs: bool,
     ) -> "_Design":
         edges = by.edges
-        bins = max(edges.size - 1, 1)
+        bins, clusters = max(edges.size - 1, 1), cluster.max() + 1
         place = np.clip(np.searchsorted(edges, by.values, side="right") - 1, 0, bins - 1)
-        flat = place * (cluster.max() + 1) + cluster[by.rows]
-        shape = (bins, cluster.max() + 1)
-
-        def cells(weights: np.ndarray | None) -> np.ndarray:
-            return np.bincount(flat, weights, bins * shape[1]).reshape(shape)
-
-        total, variance, count = cells(squares[by.rows]), cells(noise[by.rows]), cells(None)
+        flat = place * clusters + cluster[by.rows]
+        total, variance, count = (
+            np.bincount(flat, weights[by.rows], bins * clusters).reshape(bins, clusters)
+            for weights in (squares, noise, np.ones_like(noise))
+        )
         n = count.sum(axis=1)
         with np.errstate(invalid="ignore"):
             rms, uncertainty = (np.sqrt(x.sum(axis=1) / n) for x in (total, variance))
@@ -215,43 +186,40 @@ class _Design:
     def intervals(self) -> Iterator[tuple[int, int]]:
         """First bin and the one after the last of each interval, which may pass the end if cyclic."""
         by, bins = self.profile.covariate, len(self.total)
-        for first in range(bins):
-            for after in range(first + 1, first + bins if by.cyclic else bins + 1):
-                if (by.bounded or first == 0 or after == bins) and after - first < bins:
-                    yield first, after
+        for first, more in product(range(bins), range(1, bins)):
+            after = first + more
+            if (by.cyclic or after <= bins) and (by.bounded or first == 0 or after == bins):
+                yield first, after
 
     def clearest_region(self) -> Region | None:
         """The significant region of the largest contrast; None: there is none."""
-        bins = len(self.total)
         tried = list(self.intervals())
-        best: Region | None = None
-        for first, after in tried:
-            inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
-            region = self._test(first, after, inside, len(tried))
-            if region is not None and (best is None or region.contrast > best.contrast):
-                best = region
-        return best
+        found = filter(None, (self._test(*ends, len(tried)) for ends in tried))
+        return max(found, key=lambda region: region.contrast, default=None)
 
     def _log_mean_square(self, bins: np.ndarray) -> ClusterMean:
         """Mean logarithm of the clusters' mean squares in some bins; the noise keeps it finite."""
         total, count = ((x[bins].sum(axis=0)) for x in (self.total + self.noise, self.count))
         windows = np.maximum(count, 1)
-        return cluster_mean(count * np.log(np.maximum(total, SMALLEST_SQUARE) / windows), count)
+        return cluster_mean(count * np.log(np.maximum(total, np.finfo(float).tiny) / windows), count)
 
-    def _test(self, first: int, after: int, inside: np.ndarray, tried: int) -> Region | None:
+    def _test(self, first: int, after: int, tried: int) -> Region | None:
         """The region, if it is significantly worse than the rest among so many that were tried."""
+        p, bins = self.profile, len(self.total)
+        inside = np.isin(np.arange(bins), np.arange(first, after) % bins)
         share = float(self.profile.share[inside].sum())
-        if not MIN_SHARE <= share <= MAX_SHARE:
+        if share > SETTINGS.largest_region:
             return None
         parts = (inside, ~inside)
-        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
         a, b = map(self._log_mean_square, parts)
-        if min(a.dof, b.dof) + 1 < MIN_CLUSTERS or inner < MIN_RATIO_TO_REST * outer:
+        if min(a.dof, b.dof) + 1 < SETTINGS.least_clusters:
+            return None
+        inner, outer = (float(np.sqrt(self.total[x].sum() / self.count[x].sum())) for x in parts)
+        if inner < SETTINGS.least_contrast * outer:
             return None
         p_value = min(1.0, tried * welch_p_value(a, b))  # Bonferroni
-        if p_value > SIGNIFICANCE:
+        if p_value > SETTINGS.chance:
             return None
-        p, bins = self.profile, len(self.total)
         cyclic = p.covariate.cyclic
         low = float(p.edges[first]) if first > 0 or cyclic else None
         high = float(p.edges[(after - 1) % bins + 1]) if after < bins or cyclic else None

@@ -4,8 +4,9 @@ Two statistics are tested on each axis, r the model error of a window and s its 
 noise, over K windows of which OVERLAP count as one:
 
 - size: sum of (r / s)^2 / OVERLAP is chi-square with K / OVERLAP degrees of freedom, for noise alone;
-- slow part: the means m over SPAN neighbouring windows. omega is a second derivative of the pose, so
-  noise hardly gives any: var m <= s^2 SLOW_NOISE OVERLAP / SPAN, and sum m^2 / var m is chi-square too.
+- slow part: the means m over spans of n windows, twice a window's width, so that m is slower than a
+  window. omega is a second derivative of the pose, so noise hardly gives any:
+  var m <= s^2 slow_noise OVERLAP / n, and sum m^2 / var m is chi-square too.
 
 The first sees any error that is larger than the noise, the second a smaller one that lasts.
 """
@@ -18,16 +19,10 @@ from scipy.special import chdtrc
 
 from ..predictors import Model, WeakWindows, omega
 from ..predictors.uncertainty import NOISE_TOLERANCE, SHARE_OF_COMMAND, omega_std
-from ..predictors.weak_form import OVERLAP, commanded
+from ..predictors.weak_form import EVERY, OVERLAP, WIDTH, commanded
+from .clusters import numbered
 from .covariates import AXES
-
-CHANCE = 0.01  # level of the test, all axes and both statistics together; contract
-SHARE_OF_FIRST = 0.05  # of an axis' first model error, from which a remainder matters; contract
-SPAN = 12  # windows: twice their width, so that what is left is slower than a window; chosen
-# Variance of a mean of SPAN windows by noise alone, as a share of that of independent windows: measured
-# 0.04 to 0.13 on runs without a hidden cause, and doubled.
-SLOW_NOISE = 0.25
-TESTS = 6  # three axes, two statistics: Bonferroni
+from .settings import SETTINGS
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,7 @@ class AxisRemainder:
     @property
     def beyond_chance(self) -> bool:
         """Whether more is left than noise gives, be it so little that it does not matter."""
-        return self.p_value < CHANCE / TESTS
+        return self.p_value < level()
 
 
 def remaining(runs: Sequence[WeakWindows], start: Model, model: Model) -> dict[str, AxisRemainder]:
@@ -89,39 +84,42 @@ def axis_remainders(
     groups = spans(data)
     found = {}
     for k, axis in enumerate(AXES):
-        size = float(np.mean((left[:, k] / noise[:, k]) ** 2)) / NOISE_TOLERANCE**2
-        dof = len(left) / OVERLAP
-        by_size = float(chdtrc(dof, dof * size))
+        size, dof = _rms(left[:, k] / noise[:, k]) / NOISE_TOLERANCE, len(left) / OVERLAP
+        by_size = float(chdtrc(dof, dof * size**2))
         slow, by_slowness = _slow_part(left[:, k], noise[:, k], groups)
-        rms, start = _rms(left[:, k]), _rms(first[:, k])
-        least = max(SHARE_OF_FIRST * start, SHARE_OF_COMMAND * _rms(command[:, k]))
-        level = CHANCE / TESTS
-        matters = (by_size < level and rms > least) or (by_slowness < level and slow > least)
+        rms, start, uncertainty = (_rms(x[:, k]) for x in (left, first, noise))
+        least = max(SETTINGS.share_of_first * start, SHARE_OF_COMMAND * _rms(command[:, k]))
+        matters = (by_size < level() and rms > least) or (by_slowness < level() and slow > least)
         share = (rms / start) ** 2 if start > 0.0 else 0.0
         p_value = min(by_size, by_slowness)
-        uncertainty = _rms(noise[:, k])
         found[axis] = AxisRemainder(rms, uncertainty, share, slow, p_value, least, matters)
     return found
 
 
 def spans(data: Sequence[WeakWindows]) -> np.ndarray:
     """(K,), number of the span that each window of some runs lies in, over all runs."""
-    numbers, first = [], 0
-    for w in data:
-        number = np.floor((w.middle - w.middle[0]) / (SPAN * w.every) + 1e-9).astype(int)
-        numbers.append(first + number)
-        first += int(number[-1]) + 1
-    return np.unique(np.concatenate(numbers), return_inverse=True)[1]
+    since = [np.rint((w.middle - w.middle[0]) / w.every) for w in data]
+    return numbered([s // span_windows() for s in since])
+
+
+def level() -> float:
+    """Of each of two tests on each axis, by Bonferroni's correction."""
+    return SETTINGS.chance / (2 * len(AXES))
+
+
+def span_windows() -> int:
+    """How many windows a span has."""
+    return round(2 * WIDTH / EVERY)
 
 
 def _slow_part(left: np.ndarray, noise: np.ndarray, groups: np.ndarray) -> tuple[float, float]:
     """RMS of the means over spans, less that of noise, and the p-value that they are noise."""
     count = np.bincount(groups)
-    full = count >= SPAN / 2
+    full = 2 * count >= span_windows()
     if not full.any():
         return 0.0, 1.0
     mean = (np.bincount(groups, left) / count)[full]
-    variance = (np.bincount(groups, noise**2) / count * SLOW_NOISE * OVERLAP / count)[full]
+    variance = (np.bincount(groups, noise**2) / count * SETTINGS.slow_noise * OVERLAP / count)[full]
     weight = count[full] / count[full].sum()
     slow = float(np.sqrt(max(weight @ (mean**2 - variance), 0.0)))
     p_value = float(chdtrc(full.sum(), np.sum(mean**2 / variance) / NOISE_TOLERANCE**2))

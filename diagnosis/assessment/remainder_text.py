@@ -6,6 +6,7 @@ import numpy as np
 
 from fmus.scale import REFERENCE, Scale
 
+from ..predictors.weak_form import WIDTH
 from .recurrence import Recurrence
 from .regions import NAMES, UNITS, Region
 from .remainder import AxisRemainder
@@ -46,7 +47,6 @@ BRIEF = (
     "repeats with neither place, motion, command nor time, and is soon over",
     "waves, a disturbance of the measurement, or commands other than those recorded",
 )
-BRIEFLY = 3.0  # s, times the scale of the ship: a window makes what is brief last for 2 s; chosen
 
 
 def remainder_sentence(
@@ -71,7 +71,7 @@ def remainder_sentence(
     parts: dict[tuple[str, str], list[str]] = {}
     for k, axis in enumerate(axes):
         if axis in left:
-            parts.setdefault(_kind(how[k], BRIEFLY * scale.time), []).append(axis)
+            parts.setdefault(_kind(how[k], WIDTH * scale.time), []).append(axis)
     texts = []
     for (comes, cause), group in parts.items():
         amounts = " and ".join(_amount(axis, axes[axis]) for axis in group)
@@ -86,14 +86,11 @@ def remainder_sentence(
 def _amount(axis: str, r: AxisRemainder) -> str:
     share = 100.0 * np.sqrt(r.share)
     of_first = f", {share:.2g} % of the first error" if share < 99.5 else ""
-    unit = UNITS[axis]
-    return f"{NAMES[axis]}: {r.rms:.2g} {unit} (uncertainty {r.uncertainty:.1g}{of_first})"
+    return f"{NAMES[axis]}: {r.rms:.2g} {UNITS[axis]} (uncertainty {r.uncertainty:.1g}{of_first})"
 
 
 def _kind(r: Recurrence, briefly: float) -> tuple[str, str]:
-    if r.best == "place":
-        return REPEATS["place"]
-    if r.in_part:
+    if r.in_part and r.best != "place":
         return IN_PART
     if r.best is not None:
         return REPEATS[r.best]

@@ -7,7 +7,7 @@ such a criterion as future work (7.4, chapter 8), after a regression model had f
 
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,15 +23,9 @@ from ..execution.parallel import for_each
 from ..execution.progress import Advance, silent
 from ..predictors import Model
 from .closed_loop import REFERENCES, bound_of, largest_distance
+from .settings import SETTINGS
 
 MOTIONS = (("surge", "m/s"), ("sway", "m/s"), ("yaw", "rad/s"))
-# Least difference that counts, share of the dissipation. Chosen: no coefficient is known to 1 %.
-TOLERANCE = 0.01
-DIRECTIONS = 21  # on each edge of a face; chosen, eigenvalues are met within 1 % of their range
-FACES = 6 * DIRECTIONS**2  # motions on the border of a region
-SPEEDS = np.linspace(0.02, 1.0, 25)  # shares of the region's limits; chosen
-COVERAGE = 0.99  # of a measured motion that its operating region holds; chosen
-MIN_REGION = 0.1  # of the default limits; chosen, so that an axis that hardly moves is checked as well
 
 
 class OperatingRegion(NamedTuple):
@@ -41,9 +35,9 @@ class OperatingRegion(NamedTuple):
     thesis' paths stay below half of it.
     """
 
-    u: float = 0.4
-    v: float = 0.2
-    r: float = 0.6
+    u: float = SETTINGS.limits[0]
+    v: float = SETTINGS.limits[1]
+    r: float = SETTINGS.limits[2]
 
     @classmethod
     def at(cls, scale: Scale) -> "OperatingRegion":
@@ -54,17 +48,11 @@ class OperatingRegion(NamedTuple):
     def of(cls, nu: np.ndarray, scale: Scale = REFERENCE) -> "OperatingRegion":
         """The region that holds 99 % of a motion nu (n, 3), and at least a tenth of the default one."""
         known = np.abs(nu[np.isfinite(nu).all(axis=1)])
-        most = np.quantile(known, COVERAGE, axis=0) if len(known) else np.zeros(3)
-        return cls(*map(float, np.maximum(most, MIN_REGION * np.array(cls.at(scale)))))
+        most = np.quantile(known, SETTINGS.coverage, axis=0) if len(known) else np.zeros(3)
+        return cls(*map(float, np.maximum(most, SETTINGS.least_region * np.array(cls.at(scale)))))
 
 
 OPERATING = OperatingRegion()
-
-
-# Chosen: at the size of CyberShip Enterprise 1 all motion has died away by then, and a hull
-# that gains speed by itself has doubled it many times. Speeds at steps of 0.02 s agree to 0.1 %.
-COASTING, COASTING_STEP = 60.0, 0.1  # s
-RUNAWAY = 3.0  # times the speeds of the region
 NOR_NOMINAL = "the nominal model is not held there either"
 
 
@@ -127,20 +115,20 @@ def check_stability(
     everywhere = sampled_motions(region)
     before = dissipation(nominal, everywhere, metric)
     after = dissipation(model, everywhere, metric)
-    notes = (
-        []
-        if mass_definite
-        else ["the mass matrix is not positive definite: some force would push backwards"]
-    )
-    compared = [_compare(k, model, nominal, metric, region) for k in range(3)]
-    worse = [text for text in compared if text]
-    lowest = int(np.argmin(after))
+    indefinite = "the mass matrix is not positive definite: some force would push backwards"
+    notes = [] if mass_definite else [indefinite]
+    worse = [*filter(None, (_compare(k, model, nominal, metric, region) for k in range(3)))]
     if not worse and _less(after.min(), before.min()):
-        worse = [_motion(everywhere[lowest], float(after.min()), float(before.min()))]
+        u, v, r = everywhere[np.argmin(after)]
+        worse = [
+            f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
+            f"{after.min():.3g} 1/s (nominal at least {before.min():.3g})"
+        ]
     if not model.ship.fully_actuated:
         advance("coming to rest without thrust")
-        bounded = mass_definite and comes_to_rest(model, everywhere[-FACES:], region, notes)
-        both = not (bounded or comes_to_rest(nominal, everywhere[-FACES:], region, []))
+        fastest = np.split(everywhere, SETTINGS.directions)[-1]
+        bounded = mass_definite and comes_to_rest(model, fastest, region, notes)
+        both = not (bounded or comes_to_rest(nominal, fastest, region, []))
         notes += [NOR_NOMINAL] if both else []
     else:
         bounded, both = _bounded(model, nominal, advance, notes) if mass_definite else (False, False)
@@ -206,54 +194,47 @@ def least_dissipation(model: Model, region: OperatingRegion = OPERATING) -> floa
 
 def sampled_motions(region: OperatingRegion) -> np.ndarray:
     """Velocities (n, 3) [m/s, m/s, rad/s] in all directions of a region, from slow to its border."""
-    edge = np.linspace(-1.0, 1.0, DIRECTIONS)
-    a, b = (grid.ravel() for grid in np.meshgrid(edge, edge))
-    one = np.ones_like(a)
-    faces = [
-        np.roll(np.column_stack([side * one, a, b]), k, axis=1) for k in range(3) for side in (-1, 1)
-    ]
-    directions = np.concatenate(faces) * np.array(region)
-    return (SPEEDS[:, None, None] * directions).reshape(-1, 3)
+    edge = np.linspace(-1.0, 1.0, SETTINGS.directions)
+    side, a, b = (grid.ravel() for grid in np.meshgrid([-1.0, 1.0], edge, edge))
+    faces = [np.roll(np.column_stack([side, a, b]), k, axis=1) for k in range(3)]
+    speeds = np.linspace(0.0, 1.0, SETTINGS.directions + 1)[1:, None, None]
+    return (speeds * np.concatenate(faces) * np.array(region)).reshape(-1, 3)
+
+
+def alone(k: int, region: OperatingRegion) -> np.ndarray:
+    """Velocities (n, 3) in surge, sway or yaw alone, from one border of a region to the other."""
+    nu = np.zeros((2 * SETTINGS.directions, 3))  # an even number, without rest
+    nu[:, k] = np.linspace(-region[k], region[k], len(nu))
+    return nu
 
 
 def drives_on(model: Model, other: Model, region: OperatingRegion) -> bool:
     """Whether in surge, sway or yaw alone a hull drives the ship on, and another less or not at all."""
     metric = mass(other)
-    for k in range(3):
-        nu = np.zeros((2 * len(SPEEDS), 3))
-        nu[:, k] = np.concatenate([-SPEEDS[::-1], SPEEDS]) * region[k]
-        lowest = float(dissipation(model, nu, metric).min())
-        if lowest < 0.0 and _less(lowest, float(dissipation(other, nu, metric).min())):
+    for nu in (alone(k, region) for k in range(3)):
+        lowest, of_other = (dissipation(m, nu, metric).min() for m in (model, other))
+        if lowest < 0.0 and _less(lowest, of_other):
             return True
     return False
 
 
-def _less(after: float, before: float) -> bool:
-    return after < before - TOLERANCE * abs(before)
+def _less(after: Any, before: Any) -> Any:
+    return after < before - SETTINGS.no_less * np.abs(before)
 
 
 def _compare(k: int, model: Model, nominal: Model, metric: np.ndarray, region: OperatingRegion) -> str:
     """Where and how the learned hull dissipates less in one motion alone; empty: nowhere."""
     name, unit = MOTIONS[k]
-    speeds = np.concatenate([-SPEEDS[::-1], SPEEDS]) * region[k]
-    nu = np.zeros((len(speeds), 3))
-    nu[:, k] = speeds
+    nu = alone(k, region)
     before, after = dissipation(nominal, nu, metric), dissipation(model, nu, metric)
     if not _less(after.min(), before.min()):
         return ""
-    worse = speeds[after < before - TOLERANCE * np.abs(before)]
+    speeds = nu[:, k]
+    worse = speeds[_less(after, before)]
     how = "is driven on" if after.min() < 0.0 else "is braked less"
     return (
         f"{name} from {worse.min():.2g} to {worse.max():.2g} {unit}: the hull {how}, {after.min():.3g} "
         f"1/s at {speeds[np.argmin(after)]:.2g} {unit} (nominal at least {before.min():.3g})"
-    )
-
-
-def _motion(nu: np.ndarray, after: float, before: float) -> str:
-    u, v, r = nu
-    return (
-        f"motions like u = {u:.2g} m/s, v = {v:.2g} m/s, r = {r:.2g} rad/s: "
-        f"{after:.3g} 1/s (nominal at least {before:.3g})"
     )
 
 
@@ -263,25 +244,25 @@ def comes_to_rest(model: Model, motions: np.ndarray, region: OperatingRegion, no
     Args:
         model: its hull, in still water and without what acts from outside.
         motions: (n, 3) that it begins with [m/s, m/s, rad/s].
-        region: speeds of which it may reach no more than ``RUNAWAY`` times.
+        region: speeds that it may exceed by no more than a factor.
         notes: receives what was found.
     """
     scale = model.ship.scale
     still = np.zeros(len(motions))
     s = vessel.State._make([still, still, still, *motions.T, still])
-    most = 0.0
+    most, h = 0.0, SETTINGS.step
     with np.errstate(all="ignore"):
-        for _ in range(round(COASTING / COASTING_STEP)):
-            s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, COASTING_STEP * scale.time)
+        for _ in range(round(SETTINGS.coasting / h)):
+            s = vessel.integrate(s, Force(0.0, 0.0, 0.0), model.hull.hull, h * scale.time)
             speeds = np.abs(np.stack([s.u, s.v, s.r])) / np.array(region)[:, None]
             most = max(most, float(np.nan_to_num(speeds, nan=np.inf).max()))
-            if most > RUNAWAY:
+            if most > SETTINGS.runaway:
                 break
-    kept = most <= RUNAWAY
-    what = "stays below" if kept else "exceeds"
+    kept = most <= SETTINGS.runaway
+    what = f"{'stays below' if kept else 'exceeds'} {SETTINGS.runaway:g} times"
     notes.append(
         "its thrusters give no force on some axis, so that no reference controller holds it: judged is "
-        f"how it moves without thrust, where it {what} {RUNAWAY:g} times the speeds of its region"
+        f"how it moves without thrust, where it {what} the speeds of its region"
     )
     return kept
 
@@ -294,14 +275,14 @@ def _bounded(model: Model, nominal: Model, advance: Advance, notes: list[str]) -
     bounded, both, bound = True, True, bound_of(model)
     advance(f"closed loop on the {' and the '.join(r.name for r in REFERENCES)}")
     distances = for_each(lambda r: largest_distance(r, model), REFERENCES)
+    outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
+    undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
     for reference, distance in zip(REFERENCES, distances, strict=True):
         if distance < bound:
             notes.append(f"{reference.name}: at most {distance:.2g} m from the target")
             continue
         bounded = False
         notes.append(f"{reference.name}: more than {bound:.3g} m from the target")
-        outside = {p.name for e in model.ship.effects.of_kind("environment") for p in e.parameters}
-        undisturbed = replace(model, vessel={k: v for k, v in model.vessel.items() if k not in outside})
         if undisturbed.vessel != model.vessel and largest_distance(reference, undisturbed) < bound:
             notes.append(
                 "it holds without wind, waves and current: they are too strong for the thrusters"

@@ -13,7 +13,6 @@ from fmus.ship import Ship
 from ..predictors.evaluation import Evaluation
 from ..runs import Run, Smoothed
 
-APPROACH = 1.0  # s before the first execute at which a prediction begins, times the scale of the ship
 NUMBERED = re.compile(r"(overshoot(?:_time)?)_\d+")
 
 # Name -> measured, before, after; of what comes several times a list of these.
@@ -34,9 +33,8 @@ def order_under_trial(run: Run, ship: Ship) -> np.ndarray:
     if run.trial == "stop":
         return run.tau_cmd[:, 0]
     angles = [k for k, unit in enumerate(ship.commands.values()) if unit == "rad"]
-    if run.commands is None or not angles:
-        return run.tau_cmd[:, 2]
-    return run.commands[:, angles].mean(axis=1)
+    ordered = run.tau_cmd[:, [2]] if run.commands is None or not angles else run.commands[:, angles]
+    return ordered.mean(axis=1)
 
 
 def measured_passage(smoothed: Smoothed, ship: Ship) -> Passage:
@@ -72,7 +70,7 @@ def trial_errors(e: Evaluation) -> TrialErrors | None:
     if run.trial is None:
         return None
     whole = measured_passage(e.smoothed, ship)
-    begin = executes(whole)[0] - APPROACH * e.smoothed.scale.time
+    begin = executes(whole)[0] - e.smoothed.scale.time  # a second of CyberShip Enterprise 1 before
     time, predicted = e.free_runs(begin)
     rows = (whole.time >= time[0]) & (whole.time <= time[-1])
     seen = Passage(*(column[rows] for column in whole))
@@ -93,9 +91,8 @@ def _together(found: list[Mapping[str, float]]) -> TrialErrors:
     told: TrialErrors = {}
     for name in dict.fromkeys(name for each in found for name in each):
         triple = [each.get(name) for each in found]
-        numbered = NUMBERED.fullmatch(name)
-        if numbered is None:
-            told[name] = triple
-        else:
+        if numbered := NUMBERED.fullmatch(name):
             told.setdefault(numbered[1], []).append(triple)
+        else:
+            told[name] = triple
     return told

@@ -4,7 +4,7 @@ import argparse
 import io
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +14,7 @@ from rich.console import Console, RenderableType
 from cosim import InputError
 from cosim.command import BAD_INPUT, Output, command_parser, complain, folder_name
 from cosim.interrupts import Held
+from cybership.scratch_folder import sweep
 from fmus.ships.naming import DEFAULT
 
 from ..execution.progress import Advance, progress
@@ -26,11 +27,7 @@ RUNS = ("train", "validate", "test", "runs", "run")  # of these, those that are 
 
 
 def prior(text: str) -> Prior:
-    """What ``--prior`` says: one number, or names with numbers.
-
-    Raises:
-        argparse.ArgumentTypeError: neither.
-    """
+    """What ``--prior`` says: one number, or names with numbers."""
     try:
         if "=" not in text:
             return _share(text)
@@ -57,11 +54,7 @@ class Done(NamedTuple):
 
 def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     """A parser with the options that both commands have."""
-    made = command_parser(
-        f"diagnosis.{name}",
-        description,
-        epilog,
-    )
+    made = command_parser(f"diagnosis.{name}", description, epilog)
     made.add_argument(
         "--model",
         type=Path,
@@ -72,10 +65,10 @@ def parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
     made.add_argument(
         "--effects",
         type=Path,
-        metavar="FILE.py",
+        metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own; may be repeated",
+        help="a file of model effects of your own, or one of an installed package; may be repeated",
     )
     ship_option(made)
     anyway_option(made)
@@ -118,67 +111,8 @@ def anyway_option(made: argparse.ArgumentParser) -> None:
     )
 
 
-def analysis_parser(
-    name: str, description: str, epilog: str, estimates: str, fewest: str = "+"
-) -> argparse.ArgumentParser:
-    """A parser with what the analyses of the thesis share: runs, ``--estimates``, ``--out``.
-
-    Args:
-        name: of the command, and of its result folder.
-        description: what it does.
-        epilog: examples and exit codes.
-        estimates: where velocities come from by default.
-        fewest: ``+``: one run at the least; ``*``: none.
-    """
-    made = command_parser(
-        f"diagnosis.{name}",
-        description,
-        epilog,
-    )
-    made.add_argument(
-        "runs", type=Path, nargs=fewest, metavar="RUN", help="measured run, or folder of a log"
-    )
-    made.add_argument(
-        "--estimates",
-        choices=("smoothed", "mdf"),
-        default=estimates,
-        help="velocity and acceleration by the smoother, which leaves spikes out, or by the thesis' "
-        f"derivative filter ({estimates})",
-    )
-    anyway_option(made)
-    out_options(made, Path("results", name))
-    return made
-
-
-def open_loop_parser(name: str, description: str, epilog: str) -> argparse.ArgumentParser:
-    """A parser with what the commands share that play a run to FMUs: run, ``--observer``, ``--out``."""
-    made = command_parser(
-        f"diagnosis.{name}",
-        description,
-        epilog,
-    )
-    made.add_argument("run", type=Path, metavar="RUN", help="measured run, or folder of a log")
-    made.add_argument(
-        "--observer", metavar="NAME", help="an observer of this project (the scenario's, or mdf)"
-    )
-    made.add_argument(
-        "--scenario",
-        type=Path,
-        metavar="FILE",
-        help="observer, guidance and controller's parameters, in place of the run's own scenario",
-    )
-    anyway_option(made)
-    out_options(made, Path("results", name))
-    return made
-
-
 def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
-    """Add ``--out`` and ``--overwrite``.
-
-    Args:
-        made: of the command.
-        usual: result folder without ``--out``, unless the result of other inputs is there.
-    """
+    """Add ``--out`` and ``--overwrite``; without them the folder is ``usual``, or the next one free."""
     made.add_argument(
         "--out",
         type=folder_name,
@@ -189,11 +123,15 @@ def out_options(made: argparse.ArgumentParser, usual: Path) -> None:
     made.set_defaults(usual=usual)
 
 
+def _paths(options: argparse.Namespace, names: Sequence[str]) -> list[Path]:
+    """The files that some arguments name."""
+    given = [getattr(options, name, None) or [] for name in names]
+    return [path for each in given for path in (each if isinstance(each, list) else [each])]
+
+
 def inputs_of(options: argparse.Namespace) -> dict[str, str]:
     """The files that a command reads, as they were named -> SHA-256."""
-    given = [getattr(options, name, None) for name in INPUTS]
-    paths = [p for each in given for p in (each if isinstance(each, list) else [each]) if p is not None]
-    return {str(path): sha256(Path(path)) for path in paths}
+    return {str(path): sha256(Path(path)) for path in _paths(options, INPUTS)}
 
 
 def import_later_parts() -> None:
@@ -207,48 +145,25 @@ def command_of(name: str) -> str:
     return shlex.join(["python", "-m", f"diagnosis.{name}", *sys.argv[1:]])
 
 
-def _ship_of(options: argparse.Namespace) -> str | None:
-    """The ship that the logs among the runs are of, told; None: the usual one, or no log tells.
+def _take_ship_of_logs(options: argparse.Namespace) -> None:
+    """Take the ship that the logs among the runs are of, unless ``--ship`` names one.
 
     Raises:
-        InputError: they are of several ships.
+        InputError: they are of several ships, or of another than the thesis', which is all that a
+            command without ``--ship`` analyses.
     """
+    if getattr(options, "ship", None) is not None:
+        return
     from ..runs import ship_of_logs  # only now: it takes a second to import
 
-    told = ship_of_logs(_runs(options))
+    told = ship_of_logs(_paths(options, RUNS))
     if told is None:
-        return None
+        return
     ship, path = told
+    if "ship" not in options:
+        raise InputError(f"'{path}' is of {ship}; this analysis knows {DEFAULT} alone")
     complain(f"the ship is {ship}, as '{path}' says; --ship means another one", "note: ")
-    return ship
-
-
-def _refuse_other_ships(options: argparse.Namespace) -> None:
-    """Refuse logs of other ships, for analyses of the thesis' model.
-
-    Raises:
-        InputError: there is one.
-    """
-    from ..runs import ship_of_logs  # only now: it takes a second to import
-
-    told = ship_of_logs(_runs(options))
-    if told is not None:
-        raise InputError(f"'{told[1]}' is of {told[0]}; this analysis knows {DEFAULT} alone")
-
-
-def _runs(options: argparse.Namespace) -> list[Path]:
-    """The measured runs among the arguments."""
-    given = [getattr(options, name, None) or [] for name in RUNS]
-    return [path for each in given for path in (each if isinstance(each, list) else [each])]
-
-
-def _place(options: argparse.Namespace) -> Mapping[str, str] | None:
-    """Choose the result folder where there is no ``--out``; returns the inputs in that case."""
-    if options.out is not None:
-        return None
-    inputs = inputs_of(options)
-    options.out = default_folder(options.usual, inputs, options.overwrite)
-    return inputs
+    options.ship = ship
 
 
 def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.Namespace) -> int:
@@ -264,14 +179,15 @@ def run(work: Callable[[argparse.Namespace, Advance], Done], options: argparse.N
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without Greek
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
+    sweep()
     with Held() as interrupts:
         interrupts.allow()
         try:
-            if "ship" not in vars(options):
-                _refuse_other_ships(options)
-            elif options.ship is None:
-                options.ship = _ship_of(options)
-            inputs = _place(options)
+            _take_ship_of_logs(options)
+            inputs = None
+            if options.out is None:
+                inputs = inputs_of(options)
+                options.out = default_folder(options.usual, inputs, options.overwrite)
             with progress(errors) as advance:
                 done = work(options, advance)
         except InputError as error:

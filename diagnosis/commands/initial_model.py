@@ -1,22 +1,13 @@
 """The model that ``--model`` names, and a proposal where the variables of an FMU are not known."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from cosim import InputError
 from fmus.ship import Ship
 
-from ..predictors import (
-    MAP,
-    DescribedShip,
-    Model,
-    ModelSource,
-    UnmatchedError,
-    open_model,
-    refuse_map,
-)
+from ..predictors import MAP, DescribedShip, Model, ModelSource, UnmatchedError, open_model, refuse_map
 
 
 def initial_model(path: Path | None, map: Path | None, craft: Ship) -> ModelSource:  # noqa: A002
@@ -41,18 +32,14 @@ def proposing() -> Iterator[None]:
     try:
         yield
     except UnmatchedError as error:
-        raise InputError(f"{error}{_proposed(error.proposal)}") from None
+        hint = f"'{MAP}' has what is known: complete it, and give it by --map {MAP}"
+        if Path(MAP).exists():
+            hint = f"complete '{MAP}' for --map, or remove it and another one is proposed"
+        else:
+            from ..predictors import write_map  # takes a while to import, and only FMUs have maps
 
-
-def _proposed(content: Mapping[str, Any]) -> str:
-    """Write a proposal, unless there is a map; what a message says of that."""
-    path = Path(MAP)
-    if path.exists():
-        return f"; complete '{MAP}' for --map, or remove it and another one is proposed"
-    from ..predictors import write_map  # takes a while to import, and only FMUs have maps
-
-    try:
-        write_map(path, content)
-    except OSError:
-        return "; --map FILE tells them"
-    return f"; '{MAP}' has what is known: complete it, and give it by --map {MAP}"
+            try:
+                write_map(Path(MAP), error.proposal)
+            except OSError:
+                hint = "--map FILE tells them"
+        raise InputError(f"{error}; {hint}") from None

@@ -7,6 +7,7 @@ whenever it is free, and sends back what it found.
 import os
 import sys
 import threading
+from array import array
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
@@ -23,10 +24,12 @@ from cosim.process import end_with_parent
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
-# Elsewhere a process begins with imports of some seconds, or libraries do not outlive a fork.
-FORKS = sys.platform == "linux" and (os.cpu_count() or 1) > 1
-NUMBER = 2  # bytes of an item's number; all fit into a pipe's 64 kB
-_alone = not FORKS  # whether this process shares no work: it is a second one itself
+_alone = False  # whether this process shares no work: it is a second one itself
+
+
+def forks() -> bool:
+    """Elsewhere a process begins with imports of some seconds, or libraries do not outlive a fork."""
+    return sys.platform == "linux" and os.cpu_count() != 1
 
 
 @cache
@@ -52,20 +55,21 @@ def for_each(
     """
     # Another thread might hold what a fork needs, and a process of a pool may have none of its own.
     main = threading.current_thread() is threading.main_thread()
-    if _alone or not main or current_process().daemon or len(items) < 2:
+    if _alone or not forks() or not main or current_process().daemon or len(items) < 2:
         return [function(item) for item in items]
     context, parent = get_context("fork"), os.getpid()
     receiver, sender = context.Pipe(duplex=False)
     known = {id(x): x for x in common}
-    following, numbers = os.pipe()  # both take the next item's number from it
-    os.write(numbers, b"".join(k.to_bytes(NUMBER, "big") for k in range(len(items))))
-    os.close(numbers)
+    following, filled = os.pipe()  # both take the next item's number from it
+    numbers = array("H", range(len(items)))  # all fit into a pipe's 64 kB
+    os.write(filled, numbers)
+    os.close(filled)
 
     def work() -> dict[int, Found]:
         found: dict[int, Found] = {}
         with suppress(Exception):  # what is missing is computed at last, in order, and meets the same
-            while number := os.read(following, NUMBER):
-                k = int.from_bytes(number, "big")
+            while number := os.read(following, numbers.itemsize):
+                k = int.from_bytes(number, sys.byteorder)
                 found[k] = function(items[k])
         return found
 

@@ -1,24 +1,23 @@
 """Files that appear in a folder together, when all of them are whole, and which folder that is."""
 
-import errno
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
-from tempfile import mkdtemp
 
 from cosim import InputError
+from cosim.command import complain
 from cosim.interrupts import Held
 from cosim.process import STATE
+from cybership.scratch_folder import Scratch, sweep
 
 # In a folder that nobody chose: the hashes of what the result there was made of.
 MADE_OF = ".inputs.json"
 LOGS = ("log.csv", "log.parquet")
-TRIES = 10  # to make a folder that other commands, which end without a result, remove again; chosen
+NEW = ".new-"  # begins the names of scratch folders
 
 
 @contextmanager
@@ -27,7 +26,8 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
 
     If anything goes wrong before, ``out`` is as it was. A file of these names that was there and is not
     made again goes away, for it would be of another result. Interrupts act while the files are made;
-    while folders are made, files move and the scratch folder goes, they wait.
+    while folders are made, files move and the scratch folder goes, they wait. What killed calls have
+    left in ``out`` is removed.
 
     Args:
         out: a folder, made if it is not there.
@@ -41,16 +41,17 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
         scratch = None
         try:
             try:
+                _clean(out)
                 scratch = _scratch(out)
-                STATE.unfinished(*(folder.absolute() for folder in (scratch, *made)))
+                STATE.unfinished(*(folder.absolute() for folder in (scratch.outer, *made)))
             except OSError as error:
                 raise InputError(f"cannot write to '{out}': {error.strerror or error}") from None
             interrupts.allow()
-            yield scratch
+            yield scratch.path
             interrupts.hold()
             interrupts.act()
             for name in names:
-                new = scratch / name
+                new = scratch.path / name
                 if new.exists():
                     os.replace(new, out / name)
                 else:
@@ -59,20 +60,25 @@ def together(out: Path, names: Sequence[str]) -> Iterator[Path]:
         finally:
             interrupts.hold()
             if scratch:
-                shutil.rmtree(scratch, ignore_errors=True)
+                scratch.remove()
             with suppress(OSError):  # not empty: it has the files
                 for folder in made:
                     folder.rmdir()
             STATE.unfinished()
 
 
-def _scratch(out: Path) -> Path:
+def _clean(out: Path) -> None:
+    """Remove from a folder what calls that were killed have left, and say so."""
+    if removed := sweep(out, NEW):
+        complain(f"removed {removed} unfinished result(s) of killed calls from '{out}'", "note: ")
+
+
+def _scratch(out: Path) -> Scratch:
     """A new folder in one that is made if it is not there, though another command may take that away."""
-    for _ in range(TRIES):
+    while True:
         out.mkdir(parents=True, exist_ok=True)
         with suppress(FileNotFoundError):
-            return Path(mkdtemp(prefix=".new-", dir=out))
-    raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+            return Scratch(out, NEW)
 
 
 def sha256(path: Path) -> str:
@@ -97,6 +103,7 @@ def default_folder(usual: Path, inputs: Mapping[str, str], overwrite: bool = Fal
         return usual
     for number in count(1):
         folder = usual if number == 1 else usual.with_name(f"{usual.name}_{number}")
+        _clean(folder)
         if not folder.is_dir() or not any(folder.iterdir()) or _made_of(folder) == [*inputs.values()]:
             return folder
     raise AssertionError

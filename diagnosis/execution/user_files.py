@@ -7,12 +7,7 @@ from cosim import InputError
 
 
 def from_file(path: Path, name: str, what: str) -> object:
-    """A name that a user's Python file defines; None where it does not.
-
-    Args:
-        path: of the file.
-        name: that is looked for.
-        what: the file is meant to be, for messages.
+    """A name that a user's Python file of ``what`` (for messages) defines; None where it does not.
 
     Raises:
         InputError: there is no such file, or it fails when it is run.

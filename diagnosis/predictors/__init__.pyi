@@ -30,7 +30,6 @@ from .thrust import Response as Response
 from .uncertainty import omega_std as omega_std
 from .weak_form import WeakWindows as WeakWindows
 from .weak_form import omega as omega
-from .weak_form import told_apart as told_apart
 from .weak_form import weak_windows as weak_windows
 from .windows import WindowErrors as WindowErrors
 from .windows import Windows as Windows

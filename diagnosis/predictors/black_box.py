@@ -36,17 +36,16 @@ from .described_ship import DescribedShip, windows_of
 from .prediction import Starts, at_rest
 from .predictor import Description, Predictor
 from .ship_model import GivenForce, Model
+from .thrust import FORGOTTEN
 from .weak_form import WeakWindows, acceleration, inflow_along, thrust_along
-from .windows import Windows, free_runs, step_of
+from .windows import Windows, first_row, free_runs, step_of
 
 POSE, VELOCITY = ("x", "y", "psi"), ("u", "v", "r")
 MOTION = (*POSE, *VELOCITY)
 TAU = ("tau_X", "tau_Y", "tau_N")
-# s, times the scale of the ship; after that a surge speed has forgotten most of its start. Chosen.
-RUN_IN = 60.0
-SMALL = 1e-3  # of the ship's speeds; step of the slopes by velocity
-ALIKE = 1e-6  # relative; inertias that differ by less are the same
-LIGHTEST, HEAVIEST = 1e-3, 1e3  # of the ship's inertia, within which that of a black box is used; chosen
+# Of the ship's speeds the step of slopes; of the ship's answer to a force one that is none, and its
+# inverse too much. Chosen, as a black box solves its equations to some digits only.
+SMALL = 1e-3
 
 # Name of a pose, velocity, force or command -> values (n,) [SI].
 Signals = Mapping[str, np.ndarray]
@@ -119,7 +118,7 @@ class BlackBox(ABC):
     def run_in(self, smoothed: Smoothed) -> float:
         if not self.whole or (self.own_run_in is None and at_rest(smoothed)):
             return 0.0
-        return RUN_IN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
+        return FORGOTTEN * smoothed.scale.time if self.own_run_in is None else self.own_run_in
 
     @property
     def model(self) -> Model:
@@ -160,21 +159,17 @@ class BlackBox(ABC):
         """By its own answers; with additions, those of :attr:`model`."""
         if learned is not None:
             return free_runs(smoothed, [self.model, learned], begin)
-        usable = np.flatnonzero(smoothed.used)
-        row = int(usable[max(np.searchsorted(smoothed.time[usable], begin, side="right") - 1, 0)])
+        row, h = first_row(smoothed, begin), step_of(smoothed)
         start = 0 if self.whole else row
-        h = step_of(smoothed)
         steps = int((smoothed.time[-1] - smoothed.time[start]) / h)
-        pose = _pose(self.motion(smoothed, np.array([start]), h, steps), h)
         first = round((smoothed.time[row] - smoothed.time[start]) / h)
-        if self.placed:
-            pose = _laid(pose, first, smoothed.eta[row][:, None])
-        pose = pose[first:, :, 0]
+        motion = self.motion(smoothed, np.array([start]), h, steps)
+        pose = self._placed_at(motion, h, first, smoothed.eta[[row]])[first:, :, 0]
         return smoothed.time[start] + h * np.arange(first, steps + 1), [pose, pose]
 
     def description(self) -> Description:
         waits = {w.run.name: self.run_in(w.smoothed) for w in self.runs}
-        told = [*self._sentences()]
+        told = [*self._sentences(max(waits.values()))]
         return Description(self.kind, self.name, self.sha256, self.given_map, self.whole, waits, told)
 
     def in_windows(self) -> Predictor:
@@ -187,12 +182,11 @@ class BlackBox(ABC):
             [] if learned is None else [f"What was found is not written: {self.name} has no parameters."]
         )
 
-    def _sentences(self) -> Iterator[str]:
+    def _sentences(self, wait: float) -> Iterator[str]:
         if not self.whole:
             yield f"Each window starts from the measured state{self._started_by}."
         else:
-            waits = [self.run_in(w.smoothed) for w in self.runs]
-            began = "from rest" if not any(waits) else f"after a run-in of {max(waits):.3g} s"
+            began = f"after a run-in of {wait:.3g} s" if wait else "from rest"
             yield (
                 f"Its velocity cannot be set ({', '.join(VELOCITY)} of the map's start): runs are "
                 f"predicted as a whole, {began}. The force that it lacks is that along its prediction."
@@ -202,19 +196,20 @@ class BlackBox(ABC):
 
     def _poses(self, starts: Starts) -> np.ndarray:
         """The predicted pose (steps + 1, 3, 1, w) in windows."""
-        found = []
+        found, h = [], starts.h
         for smoothed, rows in starts.runs:
-            pose = _pose(self.motion(smoothed, rows, starts.h, starts.steps), starts.h)
-            if self.placed:
-                first = round(self.run_in(smoothed) / starts.h)
-                time = smoothed.time[rows] + first * starts.h
-                onto = np.searchsorted(smoothed.time, time - 1e-9)
-                pose = _laid(pose, first, smoothed.eta[onto].T)
-            found.append(pose)
+            first = round(self.run_in(smoothed) / h)
+            onto = np.searchsorted(smoothed.time, smoothed.time[rows] + first * h - 1e-9)
+            motion = self.motion(smoothed, rows, h, starts.steps)
+            found.append(self._placed_at(motion, h, first, smoothed.eta[onto]))
         return np.concatenate(found, axis=-1)[:, :, None]
 
-    def _whole_run(self, smoothed: Smoothed) -> tuple[np.ndarray, np.ndarray]:
-        """Pose and velocity, each (n, 3), along a run from its start."""
+    def _placed_at(self, motion: np.ndarray, h: float, first: int, eta: np.ndarray) -> np.ndarray:
+        """Pose (steps + 1, 3, w) of a motion, at a step laid onto others (w, 3) if it cannot be set."""
+        return _laid(_pose(motion, h), first, eta.T) if self.placed else _pose(motion, h)
+
+    def _whole_run(self, smoothed: Smoothed) -> np.ndarray:
+        """Pose and velocity (n, 6) along a run from its start."""
         h = step_of(smoothed)
         steps = int(np.ceil((smoothed.time[-1] - smoothed.time[0]) / h)) + 1
         motion = self.motion(smoothed, np.array([0]), h, steps)
@@ -224,18 +219,16 @@ class BlackBox(ABC):
             rate = np.gradient(np.column_stack([pose[:, :2], np.unwrap(pose[:, 2])]), h, axis=0)
             nu = np.column_stack([*rotate_to_body(pose[:, 2], rate[:, 0], rate[:, 1]), rate[:, 2]])
         time = smoothed.time[0] + h * np.arange(steps + 1)
-        columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu]).T
-        found = np.column_stack([np.interp(smoothed.time, time, x) for x in columns])
-        return found[:, :3], found[:, 3:]
+        columns = np.column_stack([pose[:, :2], np.unwrap(pose[:, 2]), nu])
+        return between(smoothed.time, time, columns)
 
     def _beyond_along(self, w: WeakWindows, body: Model) -> GivenForce:
         """The force of the black box beyond that of a model, along a run."""
         time = w.run.time
         slope = np.zeros((time.size, 3, len(MOTION)))
         if self.whole:
-            eta, nu = self._whole_run(w.smoothed)
-            motion = np.concatenate([eta, nu], axis=1)
-            return GivenForce(_beyond(w, body, motion, np.gradient(nu, time, axis=0)), slope)
+            motion = self._whole_run(w.smoothed)
+            return GivenForce(_beyond(w, body, motion, np.gradient(motion[:, 3:], time, axis=0)), slope)
         known = np.flatnonzero(w.known)
         motion = np.concatenate([w.smoothed.eta, w.smoothed.nu], axis=1)
         motion[~w.known] = 0.0
@@ -245,8 +238,7 @@ class BlackBox(ABC):
             """(n, 3), by accelerations in some rows, and between them by interpolation."""
             at = {**signals, **dict(zip(MOTION, moving.T, strict=True))}
             found = self.accelerations({name: x[rows] for name, x in at.items()})
-            columns = [np.interp(time, time[rows], x) for x in found.T]
-            return _beyond(w, body, moving, np.column_stack(columns))
+            return _beyond(w, body, moving, between(time, time[rows], found))
 
         force = beyond(known, motion)
         places = np.searchsorted(time[known], np.arange(time[known].min(), time[known].max(), w.every))
@@ -259,9 +251,8 @@ class BlackBox(ABC):
             moved = motion.copy()
             moved[:, k] += SMALL * size
             change = (beyond(sparse, moved) - plain)[sparse] / (SMALL * size)
-            slope[:, :, k] = np.column_stack([np.interp(time, time[sparse], x) for x in change.T])
-        gone = ~w.known
-        force[gone], slope[gone] = 0.0, 0.0
+            slope[:, :, k] = between(time, time[sparse], change)
+        force[~w.known], slope[~w.known] = 0.0, 0.0
         return GivenForce(force - np.einsum("nij,nj->ni", slope, motion), slope)
 
     def _inertia(self) -> dict[str, float]:
@@ -274,17 +265,21 @@ class BlackBox(ABC):
         for k in axes:
             push = ship.ship.scale.forces[k]
             pushed = (self.accelerations({**still, TAU[k]: np.array([push])})[0] - at_rest) / push
-            if not LIGHTEST < pushed[k] * ship.mass[k, k] < HEAVIEST:
+            if not SMALL < pushed[k] * ship.mass[k, k] < 1.0 / SMALL:
                 return {}  # something lags between force and motion, or there is none
             by_force[axes, k] = pushed[axes]
         M = np.linalg.inv(by_force)
-        if np.abs(M - ship.mass).max() <= ALIKE * np.abs(ship.mass).max():
+        if np.allclose(M, ship.mass):
             return {}
         i = ship.hull.hull.inertia
-        heavier = {"X_udot": i.m - M[0, 0], "Y_vdot": i.m - M[1, 1], "N_rdot": i.I_z - M[2, 2]}
-        across = i.m * i.x_g
-        coupled = {"Y_rdot": across - M[1, 2], "N_vdot": across - M[2, 1]}
-        return {name: float(value) for name, value in {**heavier, **coupled}.items()}
+        rigid = np.array([[i.m, 0.0, 0.0], [0.0, i.m, i.m * i.x_g], [0.0, i.m * i.x_g, i.I_z]])
+        (X, *_), (_, Y, Y_r), (_, N_v, N) = (rigid - M).tolist()
+        return {"X_udot": X, "Y_vdot": Y, "Y_rdot": Y_r, "N_vdot": N_v, "N_rdot": N}
+
+
+def between(time: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (n, m) at some times (n,) by linear interpolation of those (k, m) at known ones (k,)."""
+    return np.column_stack([np.interp(time, known, x) for x in values.T])
 
 
 def commanded(run: Run) -> dict[str, np.ndarray]:
@@ -313,11 +308,8 @@ def _beyond(w: WeakWindows, body: Model, motion: np.ndarray, nu_dot: np.ndarray)
 
 def _pose(motion: np.ndarray, h: float) -> np.ndarray:
     """Pose of a motion (steps + 1, 6, w); where it has none, by its velocity from the origin on."""
-    return _track(motion, h) if np.isnan(motion[0, :3]).any() else motion[:, :3]
-
-
-def _track(motion: np.ndarray, h: float) -> np.ndarray:
-    """Pose (steps + 1, 3, w) from the origin on, by the velocities (steps + 1, 6, w) of the body."""
+    if not np.isnan(motion[0, :3]).any():
+        return motion[:, :3]
     sums = partial(cumulative_trapezoid, dx=h, axis=0, initial=0.0)
     u, v, r = motion[:, 3:].transpose(1, 0, 2)
     psi = sums(r)

@@ -10,9 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .weak_form import OVERLAP, WeakWindows
-
-LONGEST = 60  # lags: as long as what counts as independent elsewhere (two blocks)
+from .weak_form import BLOCK, EVERY, OVERLAP, WeakWindows
 
 
 def independent(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
@@ -27,7 +25,7 @@ def independent(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
 
 def correlated_windows(data: Sequence[WeakWindows], error: np.ndarray) -> np.ndarray:
     """tau (3,) of a model error; arguments as of :func:`independent`."""
-    mean = autocovariance(data, error, LONGEST)
+    mean = autocovariance(data, error, round(2.0 * BLOCK / EVERY))  # lags up to two blocks
     rho = mean / np.maximum(mean[0], np.finfo(float).tiny)
     positive = np.cumprod(rho[1:] > 0.0, axis=0)
     return 1.0 + 2.0 * np.sum(rho[1:] * positive, axis=0)

@@ -13,8 +13,7 @@ from .ship_model import Model
 from .weak_form import WeakWindows, omega
 from .windows import WindowErrors, Windows
 
-LEVELS = (0.5, 0.9)
-POINTS = 41  # of an ellipse that is drawn; chosen
+LEVELS = (0.5, 0.9)  # probabilities of the bands that are shown; 90 % of the contract, and half
 
 
 def quantile(level: float, dof: int) -> float:
@@ -62,8 +61,8 @@ class Bands:
         return np.column_stack([position, heading])
 
     def ellipses(self, window: int, level: float) -> np.ndarray:
-        """(T, POINTS, 2), closed lines about the predicted positions of a window [m]."""
-        around = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        """(T, points, 2), closed lines about the predicted positions of a window [m]."""
+        around = np.linspace(0.0, 2.0 * np.pi)
         circle = np.sqrt(quantile(level, 2)) * np.column_stack([np.cos(around), np.sin(around)])
         factor = np.linalg.cholesky(self.covariance[window, :, :2, :2])
         return self.predicted[window, :, None, :2] + circle @ np.swapaxes(factor, -1, -2)
@@ -117,28 +116,34 @@ class Evaluation:
     """One run with the errors of the initial and of the learned model on it.
 
     Attributes:
-        model: the initial model, or one that moves as the predictor does.
+        predictor: what predicts the run.
         weak_windows: the run, in windows of the weak form.
         windows: the run, in windows of prediction; None if none has enough samples.
-        held_out: whether nothing was learned from it, and nothing decided by it.
         before, after: errors of the initial and of the learned model; the same object where nothing was
             learned.
         bands: about the predictions of the learned model; None if there are none.
         learned: the learned model; None where nothing was learned.
-        predictor: what predicts the run; None: ``model`` does.
         use: what the data were used for.
     """
 
-    model: Model
+    predictor: Predictor
     weak_windows: WeakWindows
     windows: Windows | None
-    held_out: bool
     before: PredictionError
     after: PredictionError
     bands: Bands | None = None
     learned: Model | None = None
-    predictor: Predictor | None = None
     use: DataUse = "train"
+
+    @property
+    def model(self) -> Model:
+        """The initial model, or one that moves as the predictor does."""
+        return self.predictor.model
+
+    @property
+    def held_out(self) -> bool:
+        """Whether nothing was learned from the run, and nothing decided by it."""
+        return self.use == "test"
 
     @property
     def smoothed(self) -> Smoothed:
@@ -148,21 +153,13 @@ class Evaluation:
     def name(self) -> str:
         return self.weak_windows.run.name
 
-    @property
-    def predicted_by(self) -> Predictor:
-        """The predictor of the run."""
-        return self.predictor or DescribedShip(self.model)
-
     def free_runs(self, begin: float = -np.inf) -> tuple[np.ndarray, list[np.ndarray]]:
         """The run as it is predicted from one state, see :meth:`.predictor.Predictor.free_runs`."""
-        return self.predicted_by.free_runs(self.smoothed, self.learned, begin)
+        return self.predictor.free_runs(self.smoothed, self.learned, begin)
 
 
 def evaluate_run(
-    w: WeakWindows,
-    before: Model | Predictor,
-    after: Model | None = None,
-    held_out: bool = False,
+    w: WeakWindows, before: Model | Predictor, after: Model | None = None, held_out: bool = False
 ) -> Evaluation:
     """Evaluate one model, or two, on a run.
 
@@ -178,22 +175,13 @@ def evaluate_run(
     predictor = DescribedShip(before) if isinstance(before, Model) else before
     windows = predictor.windows([w.smoothed], w.horizon)
     learned = [] if after is None else [after]
-    lacking = [omega(w, model) for model in (predictor.model, *learned)]
-    if windows is None:
-        errors = [PredictionError(force, np.zeros((0, 3)), None) for force in lacking]
-    else:
-        errors = [
-            PredictionError(force, residuals, windows.summary(residuals))
-            for force, residuals in zip(lacking, predictor.residuals(windows, learned), strict=True)
-        ]
-    return Evaluation(
-        predictor.model,
-        w,
-        windows,
-        held_out,
-        errors[0],
-        errors[-1],
-        learned=after,
-        predictor=predictor,
-        use="test" if held_out else "train",
-    )
+    models = [predictor.model, *learned]
+    missed = [np.zeros((0, 3))] * len(models)
+    if windows is not None:
+        missed = predictor.residuals(windows, learned)
+    errors = [
+        PredictionError(omega(w, model), off, windows and windows.summary(off))
+        for model, off in zip(models, missed, strict=True)
+    ]
+    use: DataUse = "test" if held_out else "train"
+    return Evaluation(predictor, w, windows, errors[0], errors[-1], None, after, use)

@@ -11,9 +11,8 @@ import numpy as np
 from fmus.actuators.actuation import actuators, measurable, output
 
 from .ship_model import Model
+from .uncertainty import SHARE_OF_COMMAND
 from .weak_form import WeakWindows, arriving, inflow_along
-
-STEADY = 0.02  # of the mean shaft speed: a spread below which thrust hardly changes by it; chosen
 
 
 def named(w: WeakWindows, model: Model) -> list[str]:
@@ -29,7 +28,7 @@ def residual(w: WeakWindows, model: Model, name: str) -> np.ndarray:
     s, known = w.smoothed, w.known[:, None]
     eta, nu = (np.where(known, x, np.nan) for x in (s.eta, s.nu))
     met = tuple(inflow_along(w, model, eta, nu).T)
-    commands, plant = tuple(arriving(w, model)[0]), model.drive.params.plant
+    commands, plant = tuple(arriving(w, model)), model.drive.params.plant
     return w.run.measured[name] - output(description, name, commands, met, plant)
 
 
@@ -47,7 +46,7 @@ def inseparable(runs: Sequence[WeakWindows], model: Model) -> list[str]:
         if not (a.leads and shafts and given):
             continue
         speed = np.concatenate([commands[:, shafts[0]] for commands in given])
-        if speed.std() > STEADY * abs(speed.mean()) or not speed.any():
+        if speed.std() > SHARE_OF_COMMAND * abs(speed.mean()) or not speed.any():
             continue
         told.append(
             f"The {a.part.title} turns at {speed.mean():.3g} 1/s throughout: its thrust and the "

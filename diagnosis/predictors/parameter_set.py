@@ -21,6 +21,7 @@ from cosim.errors import nearest
 from fmus.base_units import base_exponents
 from fmus.declare import DeclarationError, Variable
 from fmus.effects import STANDARD
+from fmus.installed import plus_files
 from fmus.ship import Ship, ship
 from fmus.ships.naming import described_ship
 
@@ -78,17 +79,14 @@ def ship_with(files: Sequence[Path], name: str | Path | None = None) -> Ship:
     """A ship with the effects of a user's files.
 
     Args:
-        files: of effects.
+        files: of effects, or names of effects of installed packages.
         name: of a shipped ship, or the path of a description; None: the default ship.
 
     Raises:
         InputError: no such ship, or a file has no effects, or fails.
     """
-    effects = STANDARD
     try:
-        for file in files:
-            effects = effects.plus_file(file)
-        return ship(effects, described_ship(name))
+        return ship(plus_files(STANDARD, files), described_ship(name))
     except DeclarationError as error:
         raise InputError(" ".join(str(error).split())) from None
 

@@ -17,18 +17,11 @@ from fmus.signals import Force
 from fmus.vessel import vessel
 
 from ..runs import Smoothed, idle
-from ..runs.files.reading import Run
 from .ship_model import Model
-from .thrust import Integral, Response, commanded_shares, drive_of, inflow
+from .thrust import LONGEST_STEP, Integral, Response, drive_of, inflow
 
-# s, times the scale of the ship; of the integration, where its error is far below the noise of any
-# measurement
-LONGEST_STEP = 0.02
-COARSE = 1.01  # sample periods; in a longer step the mean of the commands acts
 HARDLY = 0.15  # of the usual speeds of a run, all at once; chosen
 UNSURE = 3.0  # standard deviations of a speed within which it may be none
-CLOSE = 1e-12  # m and rad, to which a true pose is found
-INSTANT = 1e-3  # s; for the velocity of what the measurement effects make of a moving pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,35 +42,25 @@ class Starts:
         """(..., w): what an array (n, ...) of each run holds where windows begin."""
         return np.concatenate([values(smoothed)[rows].T for smoothed, rows in self.runs], axis=-1)
 
-    @property
-    def _measured(self) -> list[Run]:
-        return [smoothed.track.run for smoothed, _ in self.runs]
-
-    @property
-    def powered(self) -> bool:
-        """Whether any run tells the power of its thrusters."""
-        return any(run.power is not None for run in self._measured)
-
     def drive(self, model: Model) -> Prepared:
         """The thrusters of a model, in the layout of the runs' commands."""
-        return drive_of(self._measured[0], model)
+        return drive_of(self.runs[0][0].track.run, model)
 
-    def times(self, clock: float) -> list[np.ndarray]:
-        """Middle of each step, (steps, w) for each run, as commands are stamped.
+    def power(self, clock: float) -> np.ndarray | None:
+        """(steps, m, w): settings of the thrusters' power; None: no run has any.
 
         Args:
             clock: seconds by which a pose is older than its stamp.
         """
-        middle = (np.arange(self.steps)[:, None] + 0.5) * self.h - clock
-        return [smoothed.time[rows] + middle for smoothed, rows in self.runs]
-
-    def power(self, clock: float) -> np.ndarray:
-        """(steps, m, w): settings of the thrusters' power, argument as of :meth:`times`."""
-        settings = max(1 if r.power is None else r.power.shape[1] for r in self._measured)
+        given = [s.track.run.power for s, _ in self.runs]
+        settings = [power.shape[1] for power in given if power is not None]
+        if not settings:
+            return None
         found = []
-        for run, time in zip(self._measured, self.times(clock), strict=True):
-            row = np.maximum(np.searchsorted(run.time, time, side="right") - 1, 0)
-            found.append(np.ones((*row.shape, settings)) if run.power is None else run.power[row])
+        for (smoothed, rows), power in zip(self.runs, given, strict=True):
+            middle = smoothed.time[rows] + (np.arange(self.steps)[:, None] + 0.5) * self.h - clock
+            row = np.maximum(np.searchsorted(smoothed.time, middle, side="right") - 1, 0)
+            found.append(np.ones((*row.shape, settings[0])) if power is None else power[row])
         return np.concatenate(found, axis=1).transpose(0, 2, 1)
 
     def given(self, model: Model) -> tuple[np.ndarray, np.ndarray] | None:
@@ -100,15 +83,10 @@ class Starts:
 
     def arriving(self, model: Model) -> tuple[np.ndarray, np.ndarray]:
         """Commands that arrive and shares of full force that act, each (steps, k, 1, w)."""
-        found = []
-        for (smoothed, rows), time in zip(self.runs, self.times(model.clock), strict=True):
+        found, steps = [], np.arange(self.steps + 1)
+        for smoothed, rows in self.runs:
             response = Response(smoothed.track.run, model, not at_rest(smoothed))
-            if response.slow or self.h > COARSE * smoothed.track.period:
-                edges = smoothed.time[rows] + np.arange(self.steps + 1)[:, None] * self.h
-                found.append(response.means(edges))
-            else:
-                commands = held(smoothed, model, time)
-                found.append((commands, commands))
+            found.append(response.means(smoothed.time[rows] + steps[:, None] * self.h))
         given, acting = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
         return given.transpose(0, 2, 1)[:, :, None], acting.transpose(0, 2, 1)[:, :, None]
 
@@ -120,16 +98,6 @@ def at_rest(smoothed: Smoothed) -> bool:
     still = np.maximum(idle(smoothed.scale), UNSURE * smoothed.nu_std[first])
     still = np.maximum(still, HARDLY * usual)
     return bool((np.abs(smoothed.nu[first]) < still).all())
-
-
-def held(smoothed: Smoothed, model: Model, time: np.ndarray) -> np.ndarray:
-    """Commanded shares of full force (steps, w, k) of a run at times (steps, w) [s]."""
-    run = smoothed.track.run
-    row = np.searchsorted(run.time, time, side="right") - 1
-    found = commanded_shares(run, model)[np.maximum(row, 0)]
-    if at_rest(smoothed):
-        found[row < 0] = 0.0
-    return found
 
 
 def predict(starts: Starts, model: Model) -> np.ndarray:
@@ -147,13 +115,10 @@ def predict(starts: Starts, model: Model) -> np.ndarray:
         each = zip(starts.runs, names, strict=True)
         parts = [predict(replace(starts, runs=(run,)), model.during(name)) for run, name in each]
         return np.concatenate(parts, axis=-1)
-    body, thrust = model.hull, arriving(starts, model)
-    shape = np.broadcast_shapes(*sizes(body.params, model.drive.params), thrust[1].shape[-2:])
-    found = np.empty((starts.steps + 1, 3, *shape))
     with np.errstate(all="ignore"):  # a model that runs away gives infinities, which count
-        for k, s in enumerate(propagate(starts, model, thrust)):
-            found[k] = np.stack(np.broadcast_arrays(*vessel.measured(s, body)))
-    return found
+        x, y, psi, *_ = zip(*propagate(starts, model, arriving(starts, model)), strict=True)
+        s = vessel.State(*(np.stack(np.broadcast_arrays(*each)) for each in (x, y, psi)))
+        return np.stack(np.broadcast_arrays(*vessel.measured(s, model.hull)), axis=1)
 
 
 def arriving(starts: Starts, model: Model) -> tuple[np.ndarray, np.ndarray]:
@@ -175,9 +140,11 @@ def propagate(
     """
     body, drive, h = model.hull, starts.drive(model), starts.h
     layout = drive.effects.layout
-    power = starts.power(model.clock) if starts.powered else None
+    power = starts.power(model.clock)
     thrusters, beside = drive, starts.given(model)
-    s = first_state(starts, body)
+    # The smoothed motion, seen through the model's measurement effects.
+    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), body)
+    s = vessel.State._make([*pose, *nu, starts.first(lambda s: s.time) + 0.0 * pose[0]])
     yield s
     for k, (given, shares) in enumerate(zip(*thrust, strict=True)):
         with np.errstate(all="ignore"):
@@ -224,14 +191,9 @@ def stacked(models: Sequence[Model]) -> Model:
 
 def singles(model: Model) -> list[Model]:
     """The models of one whose thrusters' parameters are arrays (p, 1); itself where none is."""
-    many = [np.size(v) for v in model.thrusters.values() if isinstance(v, np.ndarray)]
-    if not many:
-        return [model]
-
-    def one(values: Mapping[str, Any], k: int) -> dict[str, float]:
-        return {n: float(v[k, 0]) if isinstance(v, np.ndarray) else v for n, v in values.items()}
-
-    return [replace(model, thrusters=one(model.thrusters, k)) for k in range(max(many))]
+    many = {n: v[:, 0].tolist() for n, v in model.thrusters.items() if isinstance(v, np.ndarray)}
+    each = [dict(zip(many, values, strict=True)) for values in zip(*many.values(), strict=True)]
+    return [replace(model, thrusters={**model.thrusters, **one}) for one in each] or [model]
 
 
 def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.State:
@@ -243,26 +205,11 @@ def moved(s: vessel.State, tau: Force, b: vessel.Prepared, h: float) -> vessel.S
     )
 
 
-def sizes(*groups: Any) -> list[tuple[int, ...]]:
-    """Shapes (p, 1) of the parameters that are arrays."""
-    found: list[tuple[int, ...]] = []
-    for item in groups:
-        found += sizes(*item) if isinstance(item, tuple) else [np.shape(item)]
-    return found
-
-
-def first_state(starts: Starts, b: vessel.Prepared) -> vessel.State:
-    """Where the smoother says that each window begins, seen through the model's measurement effects."""
-    pose, nu = true_motion(starts.first(lambda s: s.eta), starts.first(lambda s: s.eta_dot), b)
-    time = starts.first(lambda s: s.time) + 0.0 * pose[0]
-    return vessel.State._make([*pose, *nu, time])
-
-
 def true_motion(eta: Any, eta_dot: Any, b: vessel.Prepared) -> tuple[list[Any], list[Any]]:
     """Pose and body-fixed velocity, each three of (p, w), behind a measured motion of three (w,)."""
     x, y, psi = true_pose(eta, b)
-    ahead, astern = true_pose(eta + INSTANT * eta_dot, b), true_pose(eta - INSTANT * eta_dot, b)
-    x_dot, y_dot, r = ((a - b) / (2.0 * INSTANT) for a, b in zip(ahead, astern, strict=True))
+    ahead, astern = (true_pose(eta + h * eta_dot, b) for h in (LONGEST_STEP, -LONGEST_STEP))
+    x_dot, y_dot, r = ((a - b) / (2.0 * LONGEST_STEP) for a, b in zip(ahead, astern, strict=True))
     return [x, y, psi], [*rotate_to_body(psi, x_dot, y_dot), r]
 
 
@@ -272,7 +219,7 @@ def true_pose(measured: Any, b: vessel.Prepared) -> list[Any]:
     for _ in range(8):
         x, y, psi = vessel.measured(vessel.State(*pose), b)
         off = (measured[0] - x, measured[1] - y, wrap(measured[2] - psi))
-        if max(np.abs(o).max(initial=0.0) for o in off) < CLOSE:
-            break
         pose = [a + b for a, b in zip(pose, off, strict=True)]
+        if not any((np.abs(o) > np.sqrt(np.finfo(float).eps)).any() for o in off):
+            break
     return pose

@@ -14,7 +14,6 @@ v_dot [m/s2] and r_dot [rad/s2] of the body, each an array (n,) or a number.
 """
 
 import hashlib
-import runpy
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -26,6 +25,7 @@ from fmus.ship import Ship
 from fmus.vessel import vessel
 
 from ..execution.progress import Advance, silent
+from ..execution.user_files import from_file
 from ..runs import Smoothed
 from .black_box import MOTION, TAU, BlackBox, Signals, commands_at
 from .described_ship import nominal
@@ -121,12 +121,7 @@ def open_function(
         InputError: no such file or function, or the file fails.
     """
     refuse_map(map)
-    if not path.is_file():
-        raise InputError(f"no such Python file of a model: '{path}'")
-    try:
-        function = runpy.run_path(str(path)).get(NAME)
-    except (Exception, SystemExit) as error:
-        raise InputError(f"'{path}' fails when imported: {error!r}") from error
+    function = from_file(path, NAME, "a model")
     if not callable(function):
         raise InputError(f"'{path}' has no function {NAME}(state, commands)")
     return PythonFunction(cast(Acceleration, function), ship, path)

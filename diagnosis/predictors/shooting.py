@@ -6,7 +6,6 @@ parameters' finite differences as further rows, with the functions of vessel and
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -23,9 +22,7 @@ from .windows import usable_windows
 
 INSTANTS = 16  # of a window at which pose and prediction are compared
 PARTS = 4  # steps between two instants: a tenth of the quickest motion's time in the longest windows
-ROOM = 40_000  # windows of models in one integration: in arrays of that size numpy's overhead is small
 UNKNOWN = 1e6  # rad2, and m2 times the scale of the ship; variance of an instant without a sample
-VELOCITY = 1e-4  # m/s, rad/s, times the scale of the ship; step of the derivatives of the acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +67,7 @@ class Shooting:
         length: of the windows [s].
 
     Attributes:
+        runs: as given.
         run, start: (w,), number of each window's run, and when it starts [s].
         since: (T,), time from a window's start to its instants [s].
         measured: (w, T, 3), pose [m, m, rad], the mean of the samples around each instant.
@@ -78,8 +76,8 @@ class Shooting:
     """
 
     def __init__(self, runs: Sequence[Smoothed], length: float) -> None:
-        parts = [usable_windows(smoothed, length) for smoothed in runs]
-        rows = [p.first_rows for p in parts]
+        self.runs = tuple(runs)
+        rows = [usable_windows(smoothed, length).first_rows for smoothed in runs]
         self.every = length / INSTANTS
         groups = tuple(zip(runs, rows, strict=True))
         self.starts = Starts(groups, self.every / PARTS, INSTANTS * PARTS)
@@ -106,10 +104,10 @@ class Shooting:
 
     def _stepped(self, starts: Starts, model: Model, like: Model) -> list[vessel.State]:
         runs = tuple(smoothed.track.run.name for smoothed, _ in starts.runs)
-        key = Response.key(like)
-        if runs not in self._thrust or self._thrust[runs][0] != key:
-            self._thrust[runs] = key, arriving(starts, like)
-        steps = propagate(starts, model, self._thrust[runs][1])
+        key, kept = Response.key(like), self._thrust.get(runs)
+        if kept is None or kept[0] != key:
+            kept = self._thrust[runs] = key, arriving(starts, like)
+        steps = propagate(starts, model, kept[1])
         return [s for k, s in enumerate(steps) if k % PARTS == 0]
 
     def residuals(self, model: Model) -> np.ndarray:
@@ -125,16 +123,11 @@ class Shooting:
         """
         key = Response.key(model)
         changed = {n: model.plus({n: h}) for n, h in steps.items()}
-        same = [n for n, m in changed.items() if Response.key(m) == key]
-        size = max(1, ROOM // max(self.run.size, 1))
-        first = _together(model, {n: steps[n] for n in same[:size]})
-        states = self._states(first, model)
-        poses = _poses(states[1:], first)
-        base, found = poses[0], dict(zip(same, poses[1:], strict=False))
-        for k in range(size, len(same), size):
-            some = {n: steps[n] for n in same[k : k + size]}
-            further = _together(model, some)
-            found |= dict(zip(some, _poses(self._states(further, model)[1:], further)[1:], strict=True))
+        same = {n: steps[n] for n, m in changed.items() if Response.key(m) == key}
+        together = _together(model, same)
+        states = self._states(together, model)
+        base, *others = _poses(states[1:], together)
+        found = dict(zip(same, others, strict=True))
         found |= {n: _poses(self._states(m)[1:], m)[0] for n, m in changed.items() if n not in found}
         slopes = [_off(found[n], base) / h for n, h in steps.items()]
         stacked = np.stack(slopes, axis=-1) if slopes else np.zeros((*base.shape, 0))
@@ -146,10 +139,6 @@ class Shooting:
         i11, i22, i23, i32, i33 = model.hull.hull.inverse
         by_mass = np.array([[i11, 0.0, 0.0], [0.0, i22, i23], [0.0, i32, i33]])
         return Linear(0.5 * (rates[:, 1:] + rates[:, :-1]), by_mass, self.every)
-
-    @cached_property
-    def runs(self) -> tuple[Smoothed, ...]:
-        return tuple(smoothed for smoothed, _ in self.starts.runs)
 
 
 def _seen(s: Smoothed, times: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
@@ -175,7 +164,7 @@ def _beside(states: Sequence[vessel.State]) -> vessel.State:
     """The states (p, w) of some runs in one; a run that no parameter moves has p = 1."""
     models = max(np.broadcast_shapes(*map(np.shape, s))[0] for s in states)
     whole = [[np.broadcast_to(x, (models, s.u.shape[-1])) for x in s] for s in states]
-    return vessel.State._make([np.concatenate(x, axis=-1) for x in zip(*whole, strict=True)])
+    return vessel.State._make(np.concatenate(x, axis=-1) for x in zip(*whole, strict=True))
 
 
 def _poses(states: Sequence[vessel.State], model: Model) -> np.ndarray:
@@ -219,6 +208,7 @@ def _slope(s: vessel.State, model: Model) -> np.ndarray:
     found[:, 2, 5] = 1.0
     base = acceleration(at)
     for k, (name, speed) in enumerate(zip(("u", "v", "r"), model.ship.scale.speeds, strict=True)):
-        ahead = at._replace(**{name: getattr(at, name) + VELOCITY * speed})
-        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / (VELOCITY * speed)
+        step = np.sqrt(np.finfo(float).eps) * speed
+        ahead = at._replace(**{name: getattr(at, name) + step})
+        found[:, 3:, 3 + k] = (acceleration(ahead) - base) / step
     return found

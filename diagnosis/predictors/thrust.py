@@ -20,12 +20,13 @@ from ..runs.files.reading import Run
 from ..runs.linear_filter import filtered
 from .ship_model import Model
 
-# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-# s; longest step of the thrusters, as of the vessel: a force that lags is held over a step as in the
-# FMU, which is half a step earlier than a continuous lag.
-STEP = 0.02
-LONGEST_MEMORY = 30.0  # s; thrusters slower than that are beyond what windows of some seconds show
-PART = 4.0  # s; about as long as a memory, which costs least
+# s, times the scale of the ship; longest step of thrusters and vessel, where the error of the
+# integration is far below the noise of any measurement. A force that lags is held over a step as in
+# the FMU, which is half a step earlier than a continuous lag.
+LONGEST_STEP = 0.02
+# s, times the scale of the ship; after that thrusters have forgotten a command, and a surge speed most
+# of its start. Chosen: slower ones are beyond what windows of some seconds show.
+FORGOTTEN = 60.0
 
 
 def drive_of(run: Run, model: Model) -> Prepared:
@@ -140,7 +141,7 @@ class Response:
         """
         time = self._elapsed(edges)
         both = np.diff(self._integral(time), axis=0) / like(np.diff(time, axis=0), 2)
-        return both[..., 0, :], both[..., 1, :]
+        return both[..., 0, :], both[..., -1, :]
 
     @cached_property
     def _period(self) -> float:
@@ -149,7 +150,7 @@ class Response:
     @cached_property
     def _clock(self) -> np.ndarray:
         """(n,), time [s] at each sample, in which a long gap counts no more than a memory lasts."""
-        gaps = np.minimum(np.diff(self.run.time), LONGEST_MEMORY * self.model.ship.scale.time)
+        gaps = np.minimum(np.diff(self.run.time), FORGOTTEN * self.model.ship.scale.time)
         return np.concatenate([[0.0], np.cumsum(gaps)])
 
     def _elapsed(self, time: np.ndarray) -> np.ndarray:
@@ -168,10 +169,10 @@ class Response:
 
     @cached_property
     def _integral(self) -> "Integral":
-        """Of the commands that arrive and the shares that act, (..., 2, k)."""
+        """Of the commands that arrive and the shares that act, (..., 2, k); (..., 1, k): the same."""
         c = self._commands
         if not self.slow:
-            return Integral(c.edges, np.stack([c.values] * 2, axis=1), np.stack([c.before] * 2))
+            return Integral(c.edges, c.values[:, None], c.before[None])
         edges = self.step * np.arange(self._steps + 1)
         commands = np.diff(c(edges), axis=0) / self.step
         linear = not any(rate > 0.0 for rate in self.drive.params.rate)
@@ -184,7 +185,7 @@ class Response:
     @property
     def step(self) -> float:
         """Step of the grid [s]: a whole part of the period, but no finer than memories keep."""
-        fine = self._period / np.ceil(self._period / (STEP * self.model.ship.scale.time) - 1e-6)
+        fine = self._period / np.ceil(self._period / (LONGEST_STEP * self.model.ship.scale.time) - 1e-6)
         kept = [
             self._lasts(member, memory) / (memory.keeps - 1)
             for member, memory in self._memories
@@ -213,15 +214,15 @@ class Response:
 
     def _stepped(self, commands: np.ndarray) -> np.ndarray:
         """(m, 2, k), what the thrusters make of commands (m, k) in steps of the grid, in parts."""
-        drive, h, scale = self.drive, self.step, self.model.ship.scale
-        part = int(np.ceil(PART * scale.time / h)) + 1
+        drive, h = self.drive, self.step
         memory = np.zeros(commands.shape[1])  # of each command
         for member, of in self._memories:
             memory[of.own] += self._lasts(member, of)
         rates = np.broadcast_to(drive.params.rate, memory.shape)
         largest = np.abs(self._commands.values).max(axis=0, initial=0.0)
         memory += np.divide(2.0 * largest, rates, out=np.zeros_like(memory), where=rates > 0.0)
-        before = int(np.ceil(min(memory.max(), LONGEST_MEMORY * scale.time) / h)) + 1
+        longest = min(memory.max(), FORGOTTEN * self.model.ship.scale.time)
+        before = part = int(np.ceil(longest / h)) + 1  # about as long costs least
         rows = np.arange(-before, part)[:, None] + part * np.arange(-(-len(commands) // part))
         wanted = commands[np.clip(rows, 0, len(commands) - 1)]
         wanted = np.where(like(rows < 0, 1), self._commands.before, wanted)  # (m, parts, k)

@@ -17,41 +17,32 @@ mass M and the slope F of the force by nu make of an error of the pose at the fr
 from functools import cache
 
 import numpy as np
+from scipy.special import hyp0f1
 
 from .ship_model import Model
-from .weak_form import WIDTH, WeakWindows, kernel, modelled_force
+from .weak_form import WIDTH, WeakWindows, modelled_force
 
 # Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
 # N, N, N m. Chosen: below, rounding and the shape of commands between samples matter more than noise.
 # On a noise-free run at 20 Hz with smooth commands the true model leaves 4e-5 N and 1e-5 N m.
 FLOOR = np.array([3e-4, 3e-4, 1e-4])
-FREQUENCIES = np.geomspace(
-    0.02, 60.0, 400
-)  # rad/s, grid of the integral; chosen, far beyond the kernel's width
-CORNERS = np.geomspace(0.1, 200.0, 80)  # rad/s, table of w0, which is held within it; chosen
-KERNEL_POINTS = 1201  # of the kernel's Fourier integral; chosen
+# rad/s, grid of the integral and of w0, which is held within it; chosen, far beyond the kernel's width
+FREQUENCIES = np.geomspace(0.02, 60.0, 400)
 # Factor within which the standard deviation is right (tests/test_diagnosis_where.py).
 NOISE_TOLERANCE = 1.3
 # Of the RMS commanded force of an axis: a force that is less matters in no manoeuvre, and may come from
 # how a simulator integrates. Contract, for what is left; the same for what is found.
 SHARE_OF_COMMAND = 0.02
-SMALLEST_SHARE = 0.05  # of a window's time that samples cover; chosen
-SMALLEST_GAP = 1e-9  # s, keeps a division defined where time stamps coincide
-LEAST_STEP = 1e-4  # m/s, m/s, rad/s: the step of a slope by the velocity, where that is known better
-
-
-ORDERS = (4, 2, 0)  # of the acceleration, the velocity, the pose
 
 
 @cache
-def noise_gain() -> dict[int, np.ndarray]:
-    """Order -> for each corner frequency the integral of w^order |kernel|^2 H [s^-(order + 1)]."""
-    t = np.linspace(-WIDTH / 2, WIDTH / 2, KERNEL_POINTS)
-    w = kernel(t / (WIDTH / 2)) / (WIDTH / 2)
-    transform = np.trapezoid(w * np.cos(FREQUENCIES[:, None] * t), t, axis=1)
-    H = 1.0 / (1.0 + (FREQUENCIES / CORNERS[:, None]) ** 6)
-    densities = {order: FREQUENCIES**order * transform**2 / np.pi for order in ORDERS}
-    return {order: np.asarray(np.trapezoid(d * H, FREQUENCIES)) for order, d in densities.items()}
+def noise_gain() -> list[np.ndarray]:
+    """For order k = 0, 1, 2 and each w0 the integral of w^2k |kernel|^2 H [s^-2k-1]."""
+    half = WIDTH / 2
+    transform = hyp0f1(4.5, -((FREQUENCIES * half / 2) ** 2))  # of (1 - s^2)^3: of its power + 3/2
+    H = 1.0 / (1.0 + (FREQUENCIES / FREQUENCIES[:, None]) ** 6)
+    densities = [(FREQUENCIES**k * transform) ** 2 / np.pi for k in (0, 1, 2)]
+    return [np.trapezoid(d * H, FREQUENCIES) for d in densities]
 
 
 def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
@@ -66,44 +57,35 @@ def omega_std(w: WeakWindows, model: Model | None = None) -> np.ndarray:
     """
     model = model or Model()
     s, mass = w.smoothed, model.reference_mass
-    time = s.scale.time
-    used = s.used.astype(float)
-    gap = np.gradient(s.time)
+    time, period = s.scale.time, s.track.period
     # Share of a window's time that its samples cover, and the variance of the smoothed pose there.
-    share = np.clip(
-        w.smooth @ (used * s.track.period / np.maximum(gap, SMALLEST_GAP)), SMALLEST_SHARE, 1.0
-    )
-    density = s.noise**2 * s.track.period / share[:, None]
+    share = np.clip(w.smooth @ (s.used * period / np.gradient(s.time)), period / w.width, 1.0)
+    density = s.noise**2 * period / share[:, None]
     variance = w.smooth @ np.where(w.known[:, None], s.eta_std, 0.0) ** 2
-    corner = np.clip(3.0 * variance / density * time, CORNERS[0], CORNERS[-1])
+    corner = 3.0 * variance / density * time
     # Weights of samples at uneven distances sum to a little more or less than one.
     c2 = np.clip(w.smooth @ np.where(w.known, np.cos(s.eta[:, 2]) ** 2, 0.0), 0.0, 1.0)
 
     def in_axes(order: int) -> np.ndarray:
-        """(K, 3), variance of that derivative of the pose in the ship's axes, averaged over windows."""
-        gain = np.exp(np.interp(np.log(corner), np.log(CORNERS), np.log(noise_gain()[order])))
-        x, y, psi = (density * gain / time ** (order + 1)).T
+        """(K, 3), variance of a derivative of the pose in the ship's axes, averaged over windows."""
+        gain = np.exp(np.interp(np.log(corner), np.log(FREQUENCIES), np.log(noise_gain()[order])))
+        x, y, psi = (density * gain / time ** (2 * order + 1)).T
         return np.column_stack([c2 * x + (1.0 - c2) * y, (1.0 - c2) * x + c2 * y, psi])
 
-    acceleration, velocity, pose = map(in_axes, ORDERS)
-    nu = np.where(w.known[:, None], s.nu, 0.0)
-    slope, turned = _slope(w, model, nu), np.zeros((w.middle.size, 3, 3))
-    turned[:, :2, 2] = (w.smooth @ nu)[:, [1, 0]] * [1.0, -1.0]
+    pose, velocity, acceleration = map(in_axes, (0, 1, 2))
+    slope, turned = _slope(w, model), np.zeros((w.middle.size, 3, 3))
+    turned[:, :2, 2] = (w.smooth @ w.motion[1])[:, [1, 0]] * [1.0, -1.0]
     variance = acceleration @ (mass**2).T + (FLOOR * s.scale.forces) ** 2
     for by, of in ((slope - mass @ turned, velocity), (slope @ turned, pose)):
         variance += np.einsum("kij,kj->ki", by**2, of)
     return np.sqrt(variance)
 
 
-def _slope(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
-    """Force and moment (K, 3, 3) by u, v, r at the velocity (n, 3), over steps as large as its error."""
+def _slope(w: WeakWindows, model: Model) -> np.ndarray:
+    """Force and moment (K, 3, 3) by u, v, r over steps as large as its error."""
     error = np.median(w.smoothed.nu_std[w.known], axis=0)
-    steps = np.maximum(error, np.multiply(LEAST_STEP, w.smoothed.scale.speeds))
+    steps = np.maximum(error, np.sqrt(np.finfo(float).eps) * np.array(w.scale.speeds))
+    _, nu = w.motion
     first = modelled_force(w, model, nu)
-    return np.stack(
-        [
-            (modelled_force(w, model, nu + step) - first) / h
-            for h, step in zip(steps, np.diag(steps), strict=True)
-        ],
-        axis=2,
-    )
+    changes = [modelled_force(w, model, nu + step) - first for step in np.diag(steps)]
+    return np.stack(changes, axis=2) / steps

@@ -4,9 +4,8 @@ The equation of motion is multiplied with a smooth kernel w over a window and in
 acceleration becomes the velocity times -dw/dt. What is left over is the force that the model lacks.
 """
 
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -34,12 +33,9 @@ HORIZON = 8.0  # s, of predictions. Chosen: motions of the unstable nominal hull
 OVERLAP = 4.0
 BLOCK = 15.0  # s, or more where a run would have more than BLOCKS of them
 BLOCKS = 64
-AT_EDGE = 1e-9  # of the half width of a window
-KEPT = 3  # models of which every part of the model error is remembered: the last, one before, one beside
-ROOM = 4e6  # bytes for each part, in which more are: of four minutes, what 700 models add to the windows
-# Bytes for commands that thrusters with a memory respond to: of 700 s with two sets of thrusters those
-# of 30 such models.
-MEMORIES = 8e7
+# Bytes for each part of the model error of a run that is remembered: commands that thrusters with a
+# memory respond to, of 700 s with two sets of thrusters those of 15 such models.
+ROOM = 4e7
 
 
 def kernel(s: np.ndarray) -> np.ndarray:
@@ -109,7 +105,13 @@ class WeakWindows:
         """(n,), samples at which there is a smoothed state; the others have weight zero."""
         return np.all(np.isfinite(self.smoothed.nu), axis=1, keepdims=False)
 
-    def recall(self, what: str, key: Any, make: Callable[[], Any], room: float = ROOM) -> Any:
+    @cached_property
+    def motion(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smoothed pose and velocity, each (n, 3); zero where they are not known."""
+        eta, nu = (np.where(self.known[:, None], x, 0.0) for x in (self.smoothed.eta, self.smoothed.nu))
+        return eta, nu
+
+    def recall(self, what: str, key: Any, make: Callable[[], np.ndarray]) -> np.ndarray:
         """A part of the model error, from memory if it was computed for the same parameters lately.
 
         Of two models that differ in the hull alone the thrust is the same, and so on.
@@ -118,8 +120,7 @@ class WeakWindows:
         found = kept.pop(key, None)
         if found is None:
             found = make()
-            most = room // found.nbytes if isinstance(found, np.ndarray) else KEPT
-            while len(kept) >= max(most, KEPT):
+            while len(kept) * found.nbytes > ROOM:
                 del kept[next(iter(kept))]
         kept[key] = found  # the last in order is the latest
         return found
@@ -145,13 +146,15 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
     run, scale = smoothed.track.run, smoothed.scale
     t, half = run.time, 0.5 * WIDTH * scale.time
     middles = t[0] + half + EVERY * scale.time * places(t, scale)
-    known = np.isfinite(smoothed.nu).all(axis=1)
-    fresh = np.cumsum(np.concatenate([[0], smoothed.used | smoothed.track.between]))
-    gone = np.cumsum(np.concatenate([[0], ~known]))
-    busy = np.cumsum(np.concatenate([[0], np.abs(run.tau_cmd).max(axis=1) > 1e-6]))
     first = np.searchsorted(t, middles - half, side="left")
     last = np.searchsorted(t, middles + half, side="right")
     count = last - first
+
+    def number(rows: np.ndarray) -> np.ndarray:
+        """(K,), in each window those of some rows (n,)."""
+        sums = np.cumsum(np.concatenate([[0], rows]))
+        return sums[last] - sums[first]
+
     # Stretches know nothing of each other: no window lies in two.
     parts = np.cumsum(np.concatenate([[0], breaks(np.arange(t.size), smoothed.track)]))
     whole = parts[np.maximum(first - 1, 0)] == parts[np.minimum(last, t.size - 1)]
@@ -159,34 +162,24 @@ def weak_windows(smoothed: Smoothed, horizon: float | None = None) -> WeakWindow
         whole
         & (smoothed.track.silences[np.minimum(first, t.size - 1)] % 2 == 0)
         & (count > 3)
-        & (gone[last] == gone[first])
-        & (2 * (fresh[last] - fresh[first]) >= count)
-        & (busy[last] > busy[first])
+        & (number(~np.all(np.isfinite(smoothed.nu), axis=1, keepdims=False)) == 0)
+        & (2 * number(smoothed.used | smoothed.track.between) >= count)
+        & (number(np.abs(run.tau_cmd).max(axis=1) > 1e-6) > 0)
     )
     middles, first, last = middles[kept], first[kept], last[kept]
-    # Where no sample is at its edge, a window begins between two.
-    first = np.where(t[first] > middles - half + AT_EDGE * half, np.maximum(first - 1, 0), first)
-    last = np.where(t[last - 1] < middles + half - AT_EDGE * half, np.minimum(last + 1, t.size), last)
+    # A window may begin and end between two samples.
+    first, last = np.maximum(first - 1, 0), np.minimum(last + 1, t.size)
     rows = np.repeat(np.arange(middles.size), last - first)
     columns = np.concatenate([rows[:0], *map(np.arange, first, last)]).astype(np.int32)
     starts = np.concatenate([[0], np.cumsum(last - first)]).astype(np.int32)  # which the three share
     area, share, step = _span(t, middles[rows], half, columns)
     area_before, share_before, step_before = _span(t, middles[rows], half, columns - 1)
-    shape = (middles.size, t.size)
-    block = max(BLOCK * scale.time, float(t[-1] - t[0]) / BLOCKS)
-
-    def matrix(values: np.ndarray) -> csr_matrix:
-        return csr_matrix((values, columns, starts), shape=shape)
-
-    return WeakWindows(
-        smoothed,
-        middles,
-        np.floor((middles - t[0]) / block).astype(int),
-        matrix(area - share + share_before),
-        matrix(area_before / step_before - area / step),
-        matrix(area),
-        horizon or HORIZON * scale.time,
-    )
+    weights = area - share + share_before, area_before / step_before - area / step, area
+    shape = middles.size, t.size
+    smooth, slope, held = (csr_matrix((values, columns, starts), shape=shape) for values in weights)
+    block = np.floor((middles - t[0]) / max(BLOCK * scale.time, (t[-1] - t[0]) / BLOCKS)).astype(int)
+    horizon = horizon or HORIZON * scale.time
+    return WeakWindows(smoothed, middles, block, smooth, slope, held, horizon)
 
 
 def _span(
@@ -208,19 +201,6 @@ def _span(
     return area, moment / step, step
 
 
-def told_apart(data: Sequence[WeakWindows]) -> list[WeakWindows]:
-    """Runs of which no two have the same name: those that had it are numbered."""
-    found, seen = [], Counter[str]()
-    for w in data:
-        name, s = w.run.name, w.smoothed
-        seen[name] += 1
-        if seen[name] > 1:
-            run = replace(w.run, name=f"{name} ({seen[name]})")
-            w = replace(w, smoothed=replace(s, track=replace(s.track, run=run)))
-        found.append(w)
-    return found
-
-
 def omega(w: WeakWindows, model: Model) -> np.ndarray:
     """omega (K, 3) [N, N, N m]: the force that the model lacks, averaged over each window.
 
@@ -233,14 +213,14 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
     ship = (measured, tuple(sorted(model.vessel.items())))
     water = model.hull.params.water
     drive = (measured, water, tuple(sorted(model.thrusters.items())), model.clock)
-    eta, nu, change = w.recall("motion", measured, lambda: _motion(w, model))
+    eta, nu = w.recall("motion", measured, lambda: _motion(w, model))
+    change = w.recall("change", measured, lambda: w.slope @ nu)
     free = w.recall("free", ship, lambda: w.smooth @ acceleration(model, w.run.time, eta, nu))
 
-    def met() -> np.ndarray:
-        return halfway(w, inflow_along(w, model, eta, nu))
-
     def drives() -> np.ndarray:
-        return w.held @ thrust_along(w, model, w.recall("met", (measured, water), met))
+        key = measured, water
+        met = w.recall("met", key, lambda: halfway(w, inflow_along(w, model, eta, nu)))
+        return w.held @ thrust_along(w, model, met)
 
     driven = _acting(w, model, w.recall("driven", drive, drives), eta, nu)
     return (change - free - by_mass(model, driven)) @ model.reference_mass.T
@@ -248,8 +228,7 @@ def omega(w: WeakWindows, model: Model) -> np.ndarray:
 
 def modelled_force(w: WeakWindows, model: Model, nu: np.ndarray) -> np.ndarray:
     """Force (K, 3) [N, N, N m] of hull and thrusters over the windows, at the velocity nu (n, 3)."""
-    model = model.during(w.run.name)
-    eta = np.where(w.known[:, None], w.smoothed.eta, 0.0)
+    model, (eta, _) = model.during(w.run.name), w.motion
     hull = w.smooth @ acceleration(model, w.run.time, eta, nu) @ model.reference_mass.T
     driven = w.held @ thrust_along(w, model, halfway(w, inflow_along(w, model, eta, nu)))
     return hull + _acting(w, model, driven, eta, nu)
@@ -268,17 +247,12 @@ def commanded(data: Sequence[WeakWindows], model: Model) -> np.ndarray:
     """Force (K, 3) [N, N, N m] by which a ship is moved, averaged over the windows of some runs.
 
     That is the commanded force; on an axis that is never commanded, as of a ship that cannot push
-    sideways, what its inertia asks for the motion that was measured.
-
-    Args:
-        data: windows of each run.
-        model: by whose inertia an acceleration is a force.
+    sideways, what the model's inertia asks for the motion that was measured.
     """
     force = np.concatenate([w.held @ w.run.tau_cmd for w in data])
     idle = ~force.any(axis=0)
     if idle.any():
-        nu = [np.where(w.known[:, None], w.smoothed.nu, 0.0) for w in data]
-        change = np.concatenate([w.slope @ x for w, x in zip(data, nu, strict=True)])
+        change = np.concatenate([w.slope @ w.motion[1] for w in data])
         force[:, idle] = (change @ model.reference_mass.T)[:, idle]
     return force
 
@@ -291,27 +265,18 @@ def inflow_along(w: WeakWindows, model: Model, eta: np.ndarray, nu: np.ndarray) 
 def thrust_along(w: WeakWindows, model: Model, nu: np.ndarray | None = None) -> np.ndarray:
     """tau (n, 3) [N, N, N m] of the model's thrusters from each sample of a run to the next.
 
-    Args:
-        w: windows of the run.
-        model: whose thrusters.
-        nu: (n, 3), of :func:`inflow_along`; by default that of the smoothed motion, halfway.
+    They meet the water with ``nu`` (n, 3); by default with that of the smoothed motion, halfway.
     """
     model = model.during(w.run.name)
     if nu is None:
-        s, known = w.smoothed, w.known[:, None]
-        eta, nu = (np.where(known, x, 0.0) for x in (s.eta, s.nu))
-        nu = halfway(w, inflow_along(w, model, eta, nu))
+        nu = halfway(w, inflow_along(w, model, *w.motion))
     return thrust(w.run, model, _response(w, model), nu)
 
 
 def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
-    """Velocity (n, 3) between each sample of a run and the next, at which a thruster's force is taken.
+    """Velocity (n, 3) halfway from each sample to the next, at which a thruster's force is taken.
 
     A force that goes with speed, as a rudder's, would else come half a sampling period late.
-
-    Args:
-        w: windows of the run.
-        nu: (n, 3), at the samples, zero where it is not known.
     """
     middle = nu.copy()
     half = np.where(w.known[:-1] & w.known[1:], 0.5, 0.0)
@@ -320,7 +285,7 @@ def halfway(w: WeakWindows, nu: np.ndarray) -> np.ndarray:
 
 
 def arriving(w: WeakWindows, model: Model) -> np.ndarray:
-    """Commands (sets, k, n) that reach the model's thrusters, mean from each sample to the next."""
+    """Commands (k, n) that reach the model's thrusters, mean from each sample to the next."""
     return _response(w, model)[0]
 
 
@@ -328,7 +293,7 @@ def _response(w: WeakWindows, model: Model) -> np.ndarray:
     def between() -> np.ndarray:
         return Response(w.run, model, not at_rest(w.smoothed)).between_samples
 
-    return w.recall("response", Response.key(model), between, MEMORIES)
+    return w.recall("response", Response.key(model), between)
 
 
 def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
@@ -339,14 +304,7 @@ def commanded_force(w: WeakWindows, model: Model) -> np.ndarray:
 
 
 def acceleration(model: Model, time: np.ndarray, eta: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust.
-
-    Args:
-        model: of the ship.
-        time: (n,) [s].
-        eta: (n, 3) true pose [m, m, rad].
-        nu: (n, 3) body-fixed velocity over ground.
-    """
+    """nu_dot (n, 3) [m/s2, m/s2, rad/s2] of the hull without thrust, at its pose and velocity (n, 3)."""
     s = vessel.State._make([*eta.T, *nu.T, time])
     nu_dot = vessel.disturbed(s, Force(0.0, 0.0, 0.0), model.hull)
     return np.column_stack(np.broadcast_arrays(*nu_dot))
@@ -358,9 +316,8 @@ def by_mass(model: Model, force: np.ndarray) -> np.ndarray:
     return np.column_stack(accelerated(model.hull.hull.inverse, X, Y, N))
 
 
-def _motion(w: WeakWindows, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """True pose and velocity (n, 3) behind the measured ones, and the change of velocity (K, 3)."""
+def _motion(w: WeakWindows, model: Model) -> np.ndarray:
+    """True pose and velocity (2, n, 3) behind the measured ones."""
     motion = true_motion(w.smoothed.eta.T, w.smoothed.eta_dot.T, model.hull)
     # Columns in one piece each: all that is computed of them goes along time.
-    eta, nu = (np.where(w.known, np.concatenate(part), 0.0).T for part in motion)
-    return eta, nu, w.slope @ nu
+    return np.array([np.where(w.known, np.concatenate(part), 0.0) for part in motion]).swapaxes(1, 2)

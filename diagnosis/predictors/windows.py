@@ -16,14 +16,14 @@ from cosim import InputError
 from fmus.ops import wrap
 
 from ..runs import Smoothed
-from .prediction import LONGEST_STEP, Starts, by_clock, predict
+from .prediction import Starts, by_clock, predict
 from .ship_model import Model
+from .thrust import LONGEST_STEP
 from .weak_form import HORIZON
 
 # Times the scale of the ship.
 FREE_STEP = 0.1  # s; of a run that is predicted as a whole, in which the mean of the commands acts
 LONGEST_FREE = 600.0  # s, of a run that is predicted as a whole; chosen, takes some seconds
-MIN_COVERAGE = 0.5  # of a window's samples; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class WindowErrors:
         """
         chosen = np.ones(self.run.size, bool) if run is None else self.run == run
         n = self.samples[chosen]
-        squares = (np.square(e[..., chosen]) @ n for e in (self.position, self.heading))
         with np.errstate(invalid="ignore"):
-            position, heading = (np.sqrt(s / np.sum(n)) for s in squares)
+            squares = (np.square(e[..., chosen]) @ n / np.sum(n) for e in (self.position, self.heading))
+            position, heading = map(np.sqrt, squares)
         return position, heading
 
 
@@ -91,10 +91,11 @@ class Windows:
         self.measured = np.concatenate([p.smoothed.track.pose[p.rows] for p in parts])
         self.since = np.concatenate([p.time[p.rows] for p in parts]) - self.start[self.sample_window]
         self._groups: list[tuple[Starts, np.ndarray]] = []
-        for h, signals in sorted({p.step_and_commands for p in parts if p.first_rows.size}):
-            members = [k for k, p in enumerate(parts) if p.step_and_commands == (h, signals)]
-            starts = tuple((parts[k].smoothed, parts[k].first_rows) for k in members)
-            group = Starts(starts, h, int(np.ceil(self.length / h - 1e-6)))
+        kinds = [(step_of(s), s.track.run.signals) for s in runs]
+        for kind in sorted({kinds[k] for k in np.unique(self.run)}):
+            members = [k for k, each in enumerate(kinds) if each == kind]
+            starts = tuple((runs[k], parts[k].first_rows) for k in members)
+            group = Starts(starts, kind[0], int(np.ceil(self.length / kind[0] - 1e-6)))
             self._groups.append((group, np.flatnonzero(np.isin(self.run, members))))
 
     def after(self, seconds: float) -> "Windows":
@@ -103,10 +104,7 @@ class Windows:
         Raises:
             InputError: nothing is left of one.
         """
-        kept = copy(self)
-        late = self.since >= seconds
-        kept.sample_window, kept.since = self.sample_window[late], self.since[late]
-        kept.measured = self.measured[late]
+        kept = self._with(self.since >= seconds)
         if np.unique(kept.sample_window).size < self.run.size:
             raise InputError(f"a run-in of {seconds:.3g} s leaves nothing of {self.length:.3g} s")
         return kept
@@ -120,11 +118,9 @@ class Windows:
         chosen = (self.start >= first) & (self.start <= last)
         if not chosen.any():
             raise InputError(f"no window starts from {first:.3g} to {last:.3g} s")
-        kept = copy(self)
-        samples = chosen[self.sample_window]
+        kept = self._with(chosen[self.sample_window])
         kept.run, kept.start = self.run[chosen], self.start[chosen]
-        kept.sample_window = (np.cumsum(chosen) - 1)[self.sample_window[samples]]
-        kept.measured, kept.since = self.measured[samples], self.since[samples]
+        kept.sample_window = (np.cumsum(chosen) - 1)[kept.sample_window]
         kept._groups = []
         for starts, windows in self._groups:
             edges = np.cumsum([rows.size for _, rows in starts.runs])[:-1]
@@ -133,6 +129,13 @@ class Windows:
             if runs:
                 place = (np.cumsum(chosen) - 1)[windows[chosen[windows]]]
                 kept._groups.append((replace(starts, runs=runs), place))
+        return kept
+
+    def _with(self, samples: np.ndarray) -> "Windows":
+        """The same with some of the samples (samples,)."""
+        kept = copy(self)
+        kept.sample_window, kept.since = self.sample_window[samples], self.since[samples]
+        kept.measured = self.measured[samples]
         return kept
 
     def finer(self, parts: int) -> "Windows":
@@ -221,11 +224,6 @@ class RunWindows(NamedTuple):
     def time(self) -> np.ndarray:
         return self.smoothed.time
 
-    @property
-    def step_and_commands(self) -> tuple[float, tuple[str, ...]]:
-        """Step of integration [s]; names of the commands."""
-        return step_of(self.smoothed), self.smoothed.track.run.signals
-
 
 def step_of(smoothed: Smoothed) -> float:
     """Step of predictions [s], which divides the sample period."""
@@ -245,10 +243,17 @@ def usable_windows(smoothed: Smoothed, length: float) -> RunWindows:
     first = measured[at]  # the first sample of each window that has any
     prompt = since[first] - length * number[first] < period
     chosen, samples = np.unique(number[used], return_counts=True)
-    full = chosen[samples >= MIN_COVERAGE * round(length / period)]
+    full = chosen[2 * samples >= round(length / period)]
     first = first[prompt & used[first] & np.isin(number[first], full)]
     rows = np.flatnonzero(used & np.isin(number, number[first]))
     return RunWindows(smoothed, first, rows, np.searchsorted(number[first], number[rows]))
+
+
+def first_row(smoothed: Smoothed, begin: float) -> int:
+    """The row of the last sample that is used up to a time [s], else of the first."""
+    usable = np.flatnonzero(smoothed.used)
+    before = np.searchsorted(smoothed.time[usable], begin, side="right")
+    return int(usable[max(before - 1, 0)])
 
 
 def free_runs(
@@ -265,19 +270,16 @@ def free_runs(
         (n,), times at equal distances [s], and for each model (n, 3), pose [m, m, rad]; not finite where
         the model runs away.
     """
-    usable = np.flatnonzero(smoothed.used)
-    before = usable[smoothed.time[usable] <= begin]
-    first = before[-1:] if before.size else usable[:1]
-    step, _ = RunWindows(smoothed, first, first, first).step_and_commands
-    h = max(step, FREE_STEP * smoothed.scale.time)
-    longest = LONGEST_FREE * smoothed.scale.time
-    seconds = min(float(smoothed.time[-1] - smoothed.time[first[0]]), longest)
-    starts = Starts(((smoothed, first),), h, int(seconds / h))
+    first = first_row(smoothed, begin)
+    h = max(step_of(smoothed), FREE_STEP * smoothed.scale.time)
+    left = float(smoothed.time[-1] - smoothed.time[first])
+    seconds = min(left, LONGEST_FREE * smoothed.scale.time)
+    starts = Starts(((smoothed, np.array([first])),), h, int(seconds / h))
     found: dict[int, np.ndarray] = {}
     for chosen, together in by_clock([m.during(smoothed.track.run.name) for m in models]):
         poses = predict(starts, together)
         found |= {k: poses[:, :, min(n, poses.shape[2] - 1), 0] for n, k in enumerate(chosen)}
-    times = smoothed.time[first[0]] + h * np.arange(starts.steps + 1)
+    times = smoothed.time[first] + h * np.arange(starts.steps + 1)
     return times, [found[k] for k in range(len(models))]
 
 

@@ -15,10 +15,11 @@ from typing_extensions import deprecated
 from ..assessment.regions import ErrorRegions
 from ..predictors.evaluation import Evaluation
 from ..predictors.ship_model import parameter_and_run
+from ..runs.cleaning import Z95
 from ..session import Comparison, Diagnosis
 from .formatting import as_json, finite
 from .headline import headline
-from .report_data import Z95, ReportData, seconds
+from .report_data import ReportData, seconds
 
 LIBRARIES = ("cybership", "numpy", "scipy")
 # Attributes that the files hold; KEY=ATTRIBUTE where a key has another name.
@@ -120,13 +121,8 @@ def file_content(r: ReportData) -> Content:
         "errors": [*_errors(r)],
         "where": _where(r.comparison.before),
     }
-    origin = {
-        "runs": [e.name for e in r.evaluations],
-        "model": r.model,
-        "files": list(r.files),
-        "versions": versions(),
-    }
-    fmu = fmu_result(r.comparison)
+    names, fmu = [e.name for e in r.evaluations], fmu_result(r.comparison)
+    origin = {"runs": names, "model": r.model, "files": list(r.files), "versions": versions()}
     if r.diagnosis is None:
         return Content.of(finite(runs | {"fmu": fmu} | origin))
     d, learned = r.diagnosis, r.diagnosis.learned
@@ -135,33 +131,33 @@ def file_content(r: ReportData) -> Content:
         "sentence": headline(r),
         "remainder": {
             "significant": d.remainder.significant,
-            "axes": {axis: _part(a, "rms uncertainty share") for axis, a in d.remainder.axes.items()},
+            "axes": {axis: part(a, "rms uncertainty share") for axis, a in d.remainder.axes.items()},
             "sentence": d.remainder.sentence,
         },
-        "effects": [_part(e, EFFECT) for e in r.effects],
-        "possibilities": [_part(e, f"{EFFECT} in_model") for e in r.possibilities],
-        "withdrawn": [_part(w, "id reason") for w in d.withdrawn],
+        "effects": [part(e, EFFECT) for e in r.effects],
+        "possibilities": [part(e, f"{EFFECT} in_model") for e in r.possibilities],
+        "withdrawn": [part(w, "id reason") for w in d.withdrawn],
         "calibrated": d.calibrated,
-        "unrecorded": _part(d.unrecorded, UNRECORDED),
-        "correlation": _part(d.posterior, "names matrix=correlation together"),
+        "unrecorded": part(d.unrecorded, UNRECORDED),
+        "correlation": part(d.posterior, "names matrix=correlation together"),
         "inseparable": r.inseparable,
         "suspect_coefficients": [
-            _part(s, "name z value") | {"description": r.suspects[s.name]} for s in learned.suspects
+            part(s, "name z value") | {"description": r.suspects[s.name]} for s in learned.suspects
         ],
         "coefficients": [*coefficients(d)],
-        "ranking": [_part(c, RANKED) for c in learned.ranking],
+        "ranking": [part(c, RANKED) for c in learned.ranking],
     }
     last = {
         "where_after": _where(r.comparison.after),
         "fmu": fmu,
-        "stability": _part(d.stability, STABILITY),
+        "stability": part(d.stability, STABILITY),
         "prior": d.prior,
         "seed": d.seed,
     }
     return Content.of(finite(found | runs | last | origin))
 
 
-def _part(of: Any, keys: str) -> dict[str, Any]:
+def part(of: Any, keys: str) -> dict[str, Any]:
     """Attributes of an object by the keys of the files."""
     pairs = (key.split("=") for key in keys.split())
     return {pair[0]: attrgetter(pair[-1])(of) for pair in pairs}
@@ -223,14 +219,14 @@ def fmu_result(comparison: Comparison) -> Content | None:
 def sensor_results(e: Evaluation) -> Iterator[Content]:
     """Faults of a run's channels."""
     for f in e.smoothed.sensors.findings if e.smoothed.sensors else ():
-        yield Content.of(finite({"run": e.name} | _part(f, SENSOR)))
+        yield Content.of(finite({"run": e.name} | part(f, SENSOR)))
 
 
 def _data(evaluations: Sequence[Evaluation]) -> dict[str, Any]:
     """Numbers of samples of all runs together, and of each, with its duration [s] and notes on it."""
-    counts = [_part(e.smoothed.counts, COUNTS) for e in evaluations]
+    counts = [part(e.smoothed.counts, COUNTS) for e in evaluations]
     runs = [
-        c | _part(e, "run=name held_out") | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
+        c | part(e, "run=name held_out") | {"seconds": seconds(e), "notes": list(e.smoothed.notes)}
         for c, e in zip(counts, evaluations, strict=True)
     ]
     return {name: sum(c[name] for c in counts) for name in COUNTS.split()} | {"runs": runs}
@@ -240,7 +236,7 @@ def _errors(r: ReportData) -> Iterator[dict[str, Any]]:
     """Errors of prediction [m], [rad] and RMS of the model error [N, N, N m] on each run."""
     for e, measured, trial in zip(r.evaluations, r.measured, r.trials, strict=True):
         use = {} if r.diagnosis is None else {"use": e.use}
-        rms = {name: _part(e, f"before=before.{of} after=after.{of}") for name, of in ERRORS.items()}
+        rms = {name: part(e, f"before=before.{of} after=after.{of}") for name, of in ERRORS.items()}
         outputs = {name: {"rms_before": b, "rms_after": a} for name, (b, a) in measured.items()}
         coverage = None if e.bands is None else e.bands.coverage(e.after.residuals)
         rest = {"measured": outputs, "coverage_90": coverage, "trial": trial}
@@ -250,6 +246,6 @@ def _errors(r: ReportData) -> Iterator[dict[str, Any]]:
 def _where(r: ErrorRegions) -> dict[str, Any]:
     return {
         "sentences": r.sentences,
-        "regions": [_part(region, REGION) for region in r.regions],
-        "profiles": [_part(profile, PROFILE) for profile in r.profiles],
+        "regions": [part(region, REGION) for region in r.regions],
+        "profiles": [part(profile, PROFILE) for profile in r.profiles],
     }

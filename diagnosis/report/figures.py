@@ -1,7 +1,6 @@
 """Charts of the model error, of the ranking of candidates and of learned shapes."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -10,16 +9,14 @@ from cosim.results import thin
 from ..assessment.covariates import AXES, HEADING, SPEED, THRUST, YAW_RATE, Covariate
 from ..assessment.regions import Profile
 from ..predictors.evaluation import Evaluation
+from ..runs.cleaning import Z95
 from ..search.findings import Ranked
 from ..search.shortlist import TIE
-from .chart import AFTER, BAND, BEFORE, PT, Axis, Chart, Panel
-from .report_data import Z95
+from .chart import AFTER, BAND, BEFORE, ROW, WIDTH, Axis, Chart, Panel
+from .formatting import percent
 from .shape import Curve
 
 MAX_RANKED = 14  # candidates in the chart; chosen
-LOG_SPREAD = 20.0  # standard errors from which on the axis of scores is logarithmic; chosen
-GAP = 1.5  # times the spacing of windows, from which on a line is interrupted; chosen
-STACK, SINGLE, ROW = 320.0, 230.0, 17.0  # pt, height of three panels, of one, of a candidate
 FORCES = ("ω X [N]", "ω Y [N]", "ω N [N·m]")
 # Covariates that have a chart, with the labels of their axes.
 LABELS = {
@@ -38,22 +35,22 @@ def interrupted(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 def model_error(e: Evaluation, std: np.ndarray | None, learned: bool) -> Chart:
     """Model error over time of X, Y and N, with its uncertainty, and the part that is explained."""
     time = e.weak_windows.middle
-    segment = np.concatenate([[0], np.cumsum(np.diff(time) > GAP * e.weak_windows.every)])
+    segment = np.concatenate([[0], np.cumsum(np.rint(np.diff(time) / e.weak_windows.every) > 1)])
     panels = []
     for axis, label in enumerate(FORCES):
         measured = e.before.omega[:, axis]
         rows = thin(np.arange(time.size), measured)[0]
         t, y = interrupted(np.column_stack([time, measured])[rows], segment[rows]).T
-        panel = Panel(Axis("time [s]", margin=0.01, shown=axis == 2), Axis(label), zero=True)
+        panel = Panel(Axis("time [s]", shown=axis == 2), Axis(label), zero=True)
         if std is not None:
             half = Z95 * interrupted(std[rows, axis], segment[rows])
-            panel.fill(t, y - half, y + half, BAND, "uncertainty, 95 %", opacity=0.45)
-        panel.draw(t, y, BEFORE, "measured", width=1.8)
+            panel.fill(t, y - half, y + half, BAND, "uncertainty, 95 %")
+        panel.draw(t, y, BEFORE, "measured")
         if learned:
             explained = interrupted((measured - e.after.omega[:, axis])[rows], segment[rows])
-            panel.draw(t, explained, AFTER, "explained", width=1.0)
+            panel.draw(t, explained, AFTER, "explained")
         panels.append(panel)
-    return Chart(STACK, panels)
+    return Chart(WIDTH, panels)
 
 
 def profile(
@@ -74,18 +71,16 @@ def profile(
         )
         # What never changes has one edge, and one bin.
         edges = covariate.display_factor * np.resize(first.edges, first.rms.size + 1)
-        last_one, own = axis == AXES[-1], covariate is THRUST  # the thrust is that of the axis
-        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=own or last_one)
+        shown = axis == AXES[-1] or covariate is THRUST  # the thrust is that of the axis
+        x = Axis(LABELS[covariate], (edges[0], edges[-1]), shown=shown)
         panel = Panel(x, Axis(force), zero=True)
         steps = np.repeat(edges, 2)[1:-1]
-        panel.fill(steps, 0.0, np.repeat(first.uncertainty, 2), BAND, "noise", opacity=0.45)
-        panel.draw(
-            steps, np.repeat(first.rms, 2), BEFORE, "before" if last else "model error", width=1.8
-        )
+        panel.fill(steps, 0.0, np.repeat(first.uncertainty, 2), BAND, "noise")
+        panel.draw(steps, np.repeat(first.rms, 2), BEFORE, "before" if last else "model error")
         for p in last:
-            panel.draw(steps, np.repeat(p.rms, 2), AFTER, "after", width=1.0)
+            panel.draw(steps, np.repeat(p.rms, 2), AFTER, "after")
         panels.append(panel)
-    return Chart(STACK + (2.0 * PT.below if covariate is THRUST else 0.0), panels)
+    return Chart(WIDTH, panels)
 
 
 def ranking(ranked: Sequence[Ranked]) -> Chart:
@@ -96,28 +91,19 @@ def ranking(ranked: Sequence[Ranked]) -> Chart:
     """
     shown = ranked[:MAX_RANKED]
     behind = np.array([_behind(r, shown[0]) for r in shown])
-    linear = float(behind[:, 1].max())
-    far = behind[-1, 0] > LOG_SPREAD * linear > 0.0
-    scale = partial(_from_linear, linear=TIE * linear) if far else None
-    label = (
-        "score behind the first, with its standard error [1]\n"
-        "right: explained beyond other values of the coefficients"
-    )
-    names = Axis(limits=(len(shown) - 0.5, -0.5), names=[r.id for r in shown])
+    linear = TIE * float(np.median(behind[:, 1]))
+    # Linear below what may be a tie, logarithmic far above.
+    scale = (lambda x: np.arcsinh(x / linear)) if linear else None
+    label = "score behind the first, with its standard error [1]"
+    label += "\nright: explained beyond other values of the coefficients"
+    names = Axis(limits=(len(shown), -1), names=[r.id for r in shown])
     panel = Panel(Axis(label, scale=scale), names)
     for k, (r, (x, std)) in enumerate(zip(shown, behind, strict=True)):
-        tied = x <= TIE * std
-        colour = AFTER if tied else BAND
+        colour = AFTER if (tied := x <= TIE * std) else BAND
         panel.draw([x - std, x + std], [k, k], colour)
-        panel.draw(x, k, colour, radius=3.2 if tied else 2.6, hollow=tied and k > 0)
+        panel.draw(x, k, colour, dots=True, hollow=tied and k > 0)
         panel.notes[k] = _explained(r.beyond if np.isfinite(r.beyond) else r.q2)
-    height = PT.above + PT.below + PT.letter + ROW * len(shown)
-    return Chart(height, [panel], right=PT.below)
-
-
-def _from_linear(x: np.ndarray, linear: float) -> np.ndarray:
-    """A scale that is linear below a value and logarithmic far above."""
-    return np.arcsinh(x / linear)
+    return Chart(WIDTH / 2 + ROW * len(shown), [panel])
 
 
 def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
@@ -129,9 +115,7 @@ def _behind(r: Ranked, first: Ranked) -> tuple[float, float]:
 
 def _explained(share: float) -> str:
     """The share beside a candidate; a negative one without its size, which means nothing."""
-    if not np.isfinite(share):
-        return ""
-    return f"{100.0 * share:.0f} %" if share >= 0.0 else "< 0 %"
+    return "" if not np.isfinite(share) else percent(share) if share >= 0.0 else "< 0 %"
 
 
 def curve(c: Curve) -> Chart:
@@ -140,9 +124,9 @@ def curve(c: Curve) -> Chart:
     if c.sure is not None:
         panel.fill(c.x, *c.sure, AFTER)
     panel.draw(c.x, c.nominal, BEFORE, "before", dashed=True)
-    panel.draw(c.x, c.learned, AFTER, "learned", width=1.8)
+    panel.draw(c.x, c.learned, AFTER, "learned")
     panel.y.limits = panel.ends()[1]
     for begin, end in ((c.x[0], c.covered[0]), (c.covered[1], c.x[-1])):
         if end > begin:
-            panel.fill([begin, end], *panel.y.limits, BAND, opacity=0.25)
-    return Chart(SINGLE, [panel])
+            panel.fill([begin, end], *panel.y.limits, BAND)
+    return Chart(WIDTH / 2, [panel])

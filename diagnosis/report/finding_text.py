@@ -9,8 +9,7 @@ from fmus.effects.text import Found
 
 from ..predictors.ship_model import parameter_and_run
 
-CURVE = 8  # more coefficients than that are shown as a curve
-MOST_SHOWN = 4  # of the effects that data cannot tell apart, the most likely first; chosen
+SHOWN = 4  # names in a sentence, rows of a summary; of values twice as many, more are a curve; chosen
 
 
 def sentence(found: Found) -> str:
@@ -32,7 +31,7 @@ def equation(
     """The effect's formula, and its coefficients with units and intervals."""
     formula = effect.formula or effect.id
     shown = [name for name in values if values[name] or name in ci95]
-    if len(shown) > CURVE:
+    if len(shown) > 2 * SHOWN:
         nodes = ", ".join(f"{values[name]:.2g}" for name in shown)
         return f"{formula}; {shown[0]} ... {shown[-1]} = {nodes} {unit(effect, shown[0])}"
     symbols = [s.strip() for s in effect.symbol.split(",")]
@@ -67,14 +66,14 @@ def tell_apart(one: Effect, other: Effect) -> str:
     Either effect may know, or else the family of either; else both are excited.
     """
     a, b = one.wording, other.wording
-    known = (
-        a.apart.get(other.id),
-        b.apart.get(one.id),
-        a.family.apart.get(b.family.name),
-        b.family.apart.get(a.family.name),
-    )
     excite = "run " + "; and ".join(dict.fromkeys((a.family.excite, b.family.excite)))
-    return next((text for text in known if text), excite)
+    return (
+        a.apart.get(other.id)
+        or b.apart.get(one.id)
+        or a.family.apart.get(b.family.name)
+        or b.family.apart.get(a.family.name)
+        or excite
+    )
 
 
 def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
@@ -86,22 +85,21 @@ def advice(name: str, alike: Sequence[str], effects: EffectSet) -> str:
         effects: of the ship.
     """
     texts: dict[str, list[str]] = {}
-    for other in alike[:MOST_SHOWN]:
+    for other in alike[:SHOWN]:
         texts.setdefault(tell_apart(effects[name], effects[other]), []).append(other)
     parts = [f"To tell {name} from {listed(ids)}: {text}." for text, ids in texts.items()]
-    if len(alike) > MOST_SHOWN:
+    if len(alike) > SHOWN:
         parts.append(
             "So many causes fit that the data hold too little: vary speed, turn and drift more."
         )
     return " ".join(parts)
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], joined: str = "or") -> str:
     """Names in a row: a, b or c; of many the first few, and how many more."""
-    shown = [*names[:MOST_SHOWN]]
-    more = len(names) - len(shown)
-    *most, last = [*shown, f"{more} others"] if more else shown
-    return f"{', '.join(most)} or {last}" if most else last
+    more = [f"{len(names) - SHOWN} others"] if len(names) > SHOWN else []
+    *most, last = [*names[:SHOWN], *more]
+    return f"{', '.join(most)} {joined} {last}" if most else last
 
 
 def separation_note(name: str, alike: Sequence[str]) -> str:

@@ -1,37 +1,14 @@
-"""Numbers and units as the page and JSON show them, and the glossary of the page."""
+"""Numbers and units as the page and JSON show them."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-# What the page says and means; numbers are those of the contract of the files, docs/diagnosis.md.
-GLOSSARY = (
-    (
-        "surge, sway, yaw",
-        "motion ahead, to starboard, and turning with the bow to starboard; X, Y and N",
-    ),
-    ("ω, model error", "the force that the model would need to move as the ship did [N, N, N·m]"),
-    (
-        "window",
-        "{prediction} s of a run, predicted from where the ship was at first; "
-        "of ω: {model_error} s, weighted",
-    ),
-    ("learned from", "a run to which parameters were fitted"),
-    ("decided by", "a validation run: it decided which effects and values the model keeps"),
-    ("seen only now", "a test run: neither a fit nor a decision has used it"),
-    ("candidate, effect", "a physical cause that the model lacks, with its own parameters"),
-    ("nominal", "what the model has before anything is learned"),
-    ("confidence", "probability that this effect, and not another one, is a true cause"),
-    ("95 % interval", "holds the value in 95 of 100 repetitions, if the effect is the true cause"),
-    ("cross-validated", "judged on a part of the data that the fit has not seen, for each part in turn"),
-    ("noise, uncertainty", "what measurement and smoothing alone would show as a model error"),
-)
 NO_VALUE = "–"
 _UNIT = str.maketrans({".": "·", "2": "²", "3": "³"})
-POSITIONAL = (1e-4, 1e6)  # magnitudes that are written without an exponent; chosen
-WHOLE_RATIO = 9.95  # from which on a ratio has no decimal, as it would round to 10.0
+WRITTEN_OUT = 1e6  # magnitude below which no digit is left out in favour of an exponent; chosen
 
 
 def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
@@ -40,16 +17,9 @@ def number(value: float | None, digits: int = 3, factor: float = 1.0) -> str:
         return NO_VALUE
     scaled = factor * value
     text = f"{scaled:.{digits}g}"
-    if "e" in text and POSITIONAL[0] <= abs(scaled) < POSITIONAL[1]:
-        text = f"{scaled:.0f}" if abs(scaled) >= 1.0 else f"{scaled:.6f}".rstrip("0")
+    if "e" in text and 1.0 <= abs(scaled) < WRITTEN_OUT:
+        text = f"{scaled:.0f}"
     return text.replace("-", "−")
-
-
-def glossary(prediction: float | None, model_error: float | None) -> Iterator[tuple[str, str]]:
-    """Words of the page and what they mean, for windows of two lengths [s]."""
-    lengths = {"prediction": number(prediction), "model_error": number(model_error)}
-    for word, meaning in GLOSSARY:
-        yield word, meaning.format(**lengths)
 
 
 def unit(text: str) -> str:
@@ -66,17 +36,14 @@ def times(before: float | None, after: float | None) -> str:
     """Ratio by which an error fell; a dash where there is none."""
     if before is None or after is None or not after or not np.isfinite(before / after):
         return NO_VALUE
-    ratio = before / after
-    return f"{ratio:.0f}×" if ratio >= WHOLE_RATIO else f"{ratio:.1f}×"
+    return f"{number(before / after, 2)}×"
 
 
 def plain(value: object) -> str:
     """Any value that JSON can hold, on one line."""
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {plain(each)}" for key, each in value.items())
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Sequence):
+    if isinstance(value, (list, tuple)):
         return ", ".join(plain(each) for each in value)
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -1,6 +1,6 @@
 """The result in a few sentences: what is sure first, what is only possible below it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -29,16 +29,6 @@ VERDICTS = {
 }
 # Headings where one cause fits and is not sure, and where effects are possible and none is believed.
 UNSURE = "Something is missing, and what it is, is not sure"
-
-MOST_NAMED = 4  # of the coefficients; chosen
-
-
-def _names(suspects: Mapping[str, str]) -> str:
-    """Coefficients with their descriptions in a row."""
-    names = [f"{name} ({text})" if text else name for name, text in suspects.items()]
-    more = [f"{len(names) - MOST_NAMED} others"] if len(names) > MOST_NAMED else []
-    *most, last = [*names[:MOST_NAMED], *more]
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def is_sure(e: ReportedEffect) -> bool:
@@ -80,9 +70,10 @@ def headline(r: ReportData) -> str:
     if r.effects:
         return " ".join(map(told, surest_first(r.effects)))
     if d.verdict == "coefficients":
-        names = f", above all {_names(r.suspects)}" if r.suspects else ""
+        names = [f"{name} ({text})" if text else name for name, text in r.suspects.items()]
+        above = f", above all {listed(names, 'and')}" if names else ""
         return (
-            f"Other values of the nominal coefficients explain these data{names}; no effect is missing."
+            f"Other values of the nominal coefficients explain these data{above}; no effect is missing."
         )
     if d.verdict == "unexplained":
         return (NOT_BELIEVED if r.possibilities else UNEXPLAINED) + CALIBRATED * d.calibrated
@@ -91,7 +82,7 @@ def headline(r: ReportData) -> str:
 
 def boundedness(s: Stability) -> str:
     """Whether the learned model stays bounded in a simulation."""
-    where, paths = (
-        ("In closed loop", " on the reference paths") if s.closed_loop else ("Without thrust", "")
+    model = f"the learned model {'stays' if s.bounded else 'does NOT stay'} bounded"
+    return (
+        f"In closed loop {model} on the reference paths" if s.closed_loop else f"Without thrust {model}"
     )
-    return f"{where} the learned model {'stays' if s.bounded else 'does NOT stay'} bounded{paths}"

@@ -1,16 +1,12 @@
 """A diagnosis in a notebook: the finding, a table, pictures."""
 
-from collections.abc import Sequence
-from html import escape
-from math import degrees
-
 from cosim import InputError
 from cosim.results import Drawn
 
-from ..predictors.evaluation import Evaluation
-from . import figures, formatting, tracks
+from . import figures, tracks
 from .chart import Chart
 from .headline import headline, verdict_title
+from .page import rendered
 from .report_data import ReportData
 
 
@@ -71,28 +67,12 @@ class Plots:
 
 def as_html(r: ReportData) -> str:
     """The finding, the errors of all runs, and where the model fails, as a part of a page."""
-    assert r.diagnosis is not None
-    plots, over = Plots(r), f"over {formatting.number(r.lengths[0])} s"
-    lines = [f"<p><b>{escape(verdict_title(r))}</b></p>"]
-    lines += [f"<p>{escape(text)}</p>" for text in (headline(r), r.diagnosis.remainder.sentence)]
-    lines += _table([(e.id, e.equation) for e in r.accepted])
-    head = f"<tr><th>run</th><th>position {over} [mm]</th><th>heading {over} [°]</th></tr>"
-    lines += _table([(r.called(e), *_changes(e)) for e in r.evaluations], head)
-    shown = (plots.where(), plots.omega())
-    lines += [f'<div style="max-width: 36rem">{p._repr_svg_()}</div>' for p in shown]
-    return f"<div>{''.join(lines)}</div>"
-
-
-def _changes(e: Evaluation) -> list[str]:
-    """Errors of position [mm] and heading [°], before and after."""
-    pairs = (
-        (e.before.position, e.after.position, 1e3),
-        (e.before.heading, e.after.heading, degrees(1.0)),
+    plots = Plots(r)
+    return rendered(
+        "notebook.html",
+        r=r,
+        diagnosis=r.diagnosis,
+        verdict=verdict_title(r),
+        sentence=headline(r),
+        pictures=[p._repr_svg_() for p in (plots.where(), plots.omega())],
     )
-    return [" → ".join(formatting.number(x, factor=f) for x in pair) for *pair, f in pairs]
-
-
-def _table(rows: Sequence[Sequence[str]], head: str = "") -> list[str]:
-    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
-    body = "".join(f"<tr>{row}</tr>" for row in cells)
-    return [f"<table>{head}{body}</table>"] if rows else []

@@ -92,13 +92,19 @@ def write_report(
         trials=[*trial_rows(data)],
         coefficients=[] if data.diagnosis is None else [*coefficients(data.diagnosis)],
         provenance=[(label, value) for label, value in made_with if value is not None],
-        glossary=[*formatting.glossary(*data.lengths)],
     )
     return path
 
 
 def write_page(path: Path, template: str, **values: object) -> None:
     """Write a page by a template of this folder; an older file is replaced when it is complete."""
+    text = rendered(template, **values)
+    with cosim.atomic_write(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+
+
+def rendered(template: str, **values: object) -> str:
+    """A page, or a part of one, by a template of this folder."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
@@ -110,10 +116,8 @@ def write_page(path: Path, template: str, **values: object) -> None:
     )
     f = formatting
     made.filters |= {x.__name__: x for x in (f.number, f.unit, f.percent, f.plain, told, boundedness)}
-    made.globals["times"] = f.times
-    text = made.get_template(template).render(values)
-    with cosim.atomic_write(path) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    made.globals |= {"times": f.times, "degrees": degrees(1.0)}
+    return made.get_template(template).render(values)
 
 
 def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:
@@ -130,19 +134,18 @@ def _provenance(r: ReportData) -> Iterator[tuple[str, object]]:
 
 def _tracks(r: ReportData) -> Iterator[Drawing]:
     for k, e in enumerate(r.evaluations):
-        name, worst, heading = r.called(e), tracks.worst_window(e, r.learned), tracks.heading_bands(e)
+        name = r.called(e)
         yield drawing(tracks.track(e, r.learned), f"track-{k}", f"{name}.", f"Track of {e.name}")
-        if worst is not None:
+        if worst := tracks.worst_window(e, r.learned):
             yield drawing(worst, f"worst-{k}", f"{name}: the worst window.")
-        if heading is not None:
+        if heading := tracks.heading_bands(e):
             caption = f"{name}: heading in the worst window, with bands of 50 and 90 %."
             yield drawing(heading, f"heading-{k}", caption)
 
 
 def _growth(r: ReportData) -> Iterator[Drawing]:
     for use, runs in _by_use(r):
-        known = [e for e in runs if e.windows is not None]
-        if known:
+        if known := [e for e in runs if e.windows is not None]:
             caption = f"Error of prediction over time, {use}: median, and half of all samples."
             yield drawing(tracks.error_growth(known, r.learned), f"growth-{known[0].use}", caption)
 
@@ -150,8 +153,7 @@ def _growth(r: ReportData) -> Iterator[Drawing]:
 def _by_use(r: ReportData) -> Iterator[tuple[str, list[Evaluation]]]:
     """The runs by what their data were used for."""
     for use in USES:
-        runs = [e for e in r.evaluations if e.use == use]
-        if runs:
+        if runs := [e for e in r.evaluations if e.use == use]:
             words = r.use(runs[0])
             yield f"runs {words}" if words else "all runs", runs
 
@@ -172,8 +174,10 @@ def _places(r: ReportData) -> Iterator[Drawing]:
         for s in r.diagnosis.unrecorded.stretches:
             if s.axis != "N":
                 pushes.setdefault(s.run, []).append((s.start, s.end))
-    for k, e in _with_model_error(r):
+    for k, e in enumerate(r.evaluations):
         name = r.called(e)
+        if not e.weak_windows.middle.size:
+            continue
         if placed:
             caption = f"{name}: the missing force along the track."
             yield drawing(tracks.place(e, r.learned), f"place-{k}", caption)
@@ -182,15 +186,11 @@ def _places(r: ReportData) -> Iterator[Drawing]:
             yield drawing(tracks.place(e, r.learned, pushes[e.name]), f"push-{k}", caption)
 
 
-def _with_model_error(r: ReportData) -> Iterator[tuple[int, Evaluation]]:
-    """Runs, and their numbers, with windows of the weak form."""
-    return ((k, e) for k, e in enumerate(r.evaluations) if e.weak_windows.middle.size)
-
-
 def _omega(r: ReportData) -> Iterator[Drawing]:
-    for k, e in _with_model_error(r):
-        figure = figures.model_error(e, r.comparison.omega_std[k], r.learned)
-        yield drawing(figure, f"omega-{k}", f"{r.called(e)}.", f"Model error over time, {e.name}")
+    for k, e in enumerate(r.evaluations):
+        if e.weak_windows.middle.size:
+            figure = figures.model_error(e, r.comparison.omega_std[k], r.learned)
+            yield drawing(figure, f"omega-{k}", f"{r.called(e)}.", f"Model error over time, {e.name}")
 
 
 def _profiles(r: ReportData) -> Iterator[Drawing]:
@@ -217,11 +217,11 @@ def _shapes(r: ReportData) -> Iterator[Drawing]:
 def _tiles(r: ReportData) -> Iterator[tuple[str, str, str]]:
     """Label, number and remark of the main numbers: over the runs of which least was used."""
     use, runs = [*_by_use(r)][-1]
-    length = formatting.number(r.lengths[0])
+    of = f"error of {formatting.number(r.lengths[0])} s predictions"
     position = [(e.before.position, e.after.position) for e in runs]
     heading = [(e.before.heading, e.after.heading) for e in runs]
-    yield from _tile(f"position error of {length} s predictions", position, 1e3, "mm", use)
-    yield from _tile(f"heading error of {length} s predictions", heading, degrees(1.0), "°", use)
+    yield from _tile(f"position {of}", position, 1e3, "mm", use)
+    yield from _tile(f"heading {of}", heading, degrees(1.0), "°", use)
 
 
 def _tile(

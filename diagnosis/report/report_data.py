@@ -16,7 +16,6 @@ from ..search.findings import Ranked
 from ..session import Comparison, Diagnosis
 from .reported_effect import ReportedEffect, reported_effects
 
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 UNITS = {m.name.removesuffix("_1"): m.unit for m in MEASURES}
 # What the data of a run were used for.
 USES = {"train": "learned from", "validate": "decided by", "test": "seen only now"}
@@ -86,15 +85,12 @@ class ReportData:
     @cached_property
     def measured(self) -> list[dict[str, tuple[float, float]]]:
         """Of each run: output of an actuator that is measured -> RMS of the error before and after."""
-
-        def errors(e: Evaluation, name: str) -> tuple[float, float]:
-            return rms(e.weak_windows, e.model, name), rms(e.weak_windows, e.learned or e.model, name)
-
-        every = [
-            (e, named(e.weak_windows, e.model) if e.predicted_by.parametric else ())
-            for e in self.evaluations
-        ]
-        return [{name: errors(e, name) for name in names} for e, names in every]
+        found = []
+        for e in self.evaluations:
+            w, last = e.weak_windows, e.learned or e.model
+            names = named(w, e.model) if e.predictor.parametric else ()
+            found.append({name: (rms(w, e.model, name), rms(w, last, name)) for name in names})
+        return found
 
     @cached_property
     def inseparable(self) -> list[str]:
@@ -105,12 +101,9 @@ class ReportData:
     @cached_property
     def suspects(self) -> dict[str, str]:
         """Nominal coefficient that is likely wrong -> its description."""
-        d = self.diagnosis
-        return (
-            {}
-            if d is None
-            else {s.name: d.start.declared(s.name).description for s in d.learned.suspects}
-        )
+        if (d := self.diagnosis) is None:
+            return {}
+        return {s.name: d.start.declared(s.name).description for s in d.learned.suspects}
 
     @cached_property
     def _reported(self) -> tuple[list[ReportedEffect], list[ReportedEffect]]:
@@ -129,11 +122,8 @@ class ReportData:
     @property
     def ranking(self) -> list[Ranked]:
         """The candidates that have a score, the best first."""
-        return (
-            []
-            if self.diagnosis is None
-            else [r for r in self.diagnosis.learned.ranking if isfinite(r.score)]
-        )
+        every = [] if self.diagnosis is None else self.diagnosis.learned.ranking
+        return [r for r in every if isfinite(r.score)]
 
     @property
     def accepted(self) -> list[ReportedEffect]:

@@ -12,15 +12,13 @@ from fmus.effects.devices import with_one
 from fmus.effects.effect import Picture
 from fmus.hull import damping_force
 
+from ..assessment.settings import SETTINGS
 from ..predictors import Model
 from ..predictors.evaluation import Evaluation
 from ..predictors.thrust import commanded_shares
 from .reported_effect import Coefficient, ReportedEffect
 
-COMMON = (0.01, 0.99)  # quantiles between which the data are said to lie
-POINTS = 401
-# m/s, times the scale of the ship; beyond the 0.4 m/s that CyberShip Enterprise 1 reaches.
-FASTEST = 0.6
+POINTS = 401  # of a curve; chosen, so that its corners are seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +44,16 @@ class Curve:
 
 
 class Sweep(NamedTuple):
-    """How a shape is drawn: labels, ends of the axis, its values over x, and where a run's data lie."""
+    """How a shape is drawn: labels, its values over x, where a run's data lie, and ends of the axis.
+
+    Where the ends are None, they are those of the data.
+    """
 
     over: str
     what: str
-    reach: tuple[float, float]
     force: Callable[[np.ndarray, Model], Any]
     data: Callable[[Evaluation], np.ndarray]
+    reach: tuple[float, float] | None = None
 
 
 def surge_speed(e: Evaluation) -> np.ndarray:
@@ -89,7 +90,7 @@ def _commands(p: Picture, m: Model, e: Evaluation) -> np.ndarray:
 def _over_command(p: Picture, e: Effect, m: Model) -> Sweep:
     way = {"X": "surge", "Y": "sway"}[p.axis]
     over, what = f"{p.whose}: command in {way}", f"{p.whose}: {way} force [N]"
-    return Sweep(over, what, _limits(p, m), lambda c, m: given(p, m, c), lambda e: _commands(p, m, e))
+    return Sweep(over, what, lambda c, m: given(p, m, c), lambda e: _commands(p, m, e), _limits(p, m))
 
 
 def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
@@ -103,7 +104,7 @@ def _force_given(p: Picture, e: Effect, m: Model) -> Sweep:
 
     over, what = f"{p.whose}: force commanded [N]", f"{p.whose}: force given [N]"
     reach = float(nominal.min()), float(nominal[-1])
-    return Sweep(over, what, reach, force, lambda e: given(p, m, _commands(p, m, e)))
+    return Sweep(over, what, force, lambda e: given(p, m, _commands(p, m, e)), reach)
 
 
 def _effectiveness(p: Picture, e: Effect, m: Model) -> Sweep:
@@ -115,8 +116,7 @@ def _effectiveness(p: Picture, e: Effect, m: Model) -> Sweep:
         return np.divide(left, nominal, out=np.ones_like(u), where=nominal != 0.0)
 
     over, what = "surge speed |u| [m/s]", f"{p.whose}: effectiveness [1]"
-    fastest = FASTEST * m.ship.scale.speed
-    return Sweep(over, what, (0.0, fastest), share, lambda e: np.abs(surge_speed(e)))
+    return Sweep(over, what, share, lambda e: np.abs(surge_speed(e)))
 
 
 def _damping(p: Picture, e: Effect, m: Model) -> Sweep:
@@ -124,9 +124,7 @@ def _damping(p: Picture, e: Effect, m: Model) -> Sweep:
         nominal = damping_force(u, 0.0, 0.0, m.hull.params.damping)[0]
         return nominal + e(Motion(u=u), *[learned.value(v.name) for v in e.parameters])[0]
 
-    fastest = FASTEST * m.ship.scale.speed
-    over, what = "surge speed u [m/s]", "damping in surge [N]"
-    return Sweep(over, what, (-fastest, fastest), force, surge_speed)
+    return Sweep("surge speed u [m/s]", "damping in surge [N]", force, surge_speed)
 
 
 SWEEPS: dict[str, Callable[[Picture, Effect, Model], Sweep]] = {
@@ -158,7 +156,8 @@ def _curve(
     found: ReportedEffect, effect: Effect, s: Sweep, evaluations: Sequence[Evaluation], model: Model
 ) -> Curve:
     of_effect = {v.name for v in effect.parameters}
-    x = np.linspace(*s.reach, POINTS)
+    data = np.concatenate([s.data(e) for e in evaluations])
+    x = np.linspace(*(s.reach or (data.min(), data.max())), POINTS)
 
     def by(value: Callable[[Coefficient], float]) -> np.ndarray:
         wanted = {name: value(c) for name, c in found.coefficients.items() if name in of_effect}
@@ -168,6 +167,6 @@ def _curve(
     sure = None
     if effect.linear:  # in weights that are never negative
         sure = by(lambda c: (c.ci95 or (c.value,))[0]), by(lambda c: (c.ci95 or (c.value,))[-1])
-    low, high = np.quantile(np.concatenate([s.data(e) for e in evaluations]), COMMON)
+    low, high = np.quantile(data, [1.0 - SETTINGS.coverage, SETTINGS.coverage])
     nominal, learned = by(lambda _: 0.0), by(lambda c: c.value)
     return Curve(effect.id, s.over, s.what, x, nominal, learned, sure, (float(low), float(high)))

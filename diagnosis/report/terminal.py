@@ -1,7 +1,7 @@
 """Output of the commands on a terminal of 80 columns, or in a pipe."""
 
 from collections.abc import Iterable, Iterator
-from math import degrees, isfinite
+from math import degrees
 
 from rich.console import RenderableType
 from rich.padding import Padding
@@ -9,14 +9,14 @@ from rich.table import Table
 from rich.text import Text
 
 from ..assessment.stability import Stability
-from ..predictors.evaluation import Evaluation
 from ..runs import sensor_lines
+from .finding_text import SHOWN
+from .formatting import number, percent
 from .headline import boundedness, headline, surest_first, told, verdict_title
 from .report_data import ReportData, seconds, trial_rows
 from .reported_effect import ReportedEffect
 
-MAX_CANDIDATES = 5  # of the ranking; chosen
-MAX_SUMMARY = 3  # effects and runs in the summary: ten lines in all
+ASCII = str.maketrans("−–", "--")  # for any terminal
 
 
 def show_comparison(r: ReportData, out: str) -> Iterator[RenderableType]:
@@ -51,7 +51,7 @@ def show_diagnosis(r: ReportData, out: str) -> Iterator[RenderableType]:
     sure = [d.unrecorded.sentence, *together, *(f"Warning: {x}" for x in r.inseparable)]
     yield from _lines("How sure the values are", sure)
     if r.accepted:
-        first, *others = d.learned.ranking[:MAX_CANDIDATES]
+        first, *others = d.learned.ranking[: SHOWN + 1]
         behind = [f"{c.id} +{_number(c.behind)} (± {_number(c.behind_std, 2)})" for c in others]
         yield from _lines(
             "Best candidates, by how much worse than the first", [", ".join([first.id, *behind])]
@@ -65,15 +65,16 @@ def summary(r: ReportData) -> str:
     """The result of a diagnosis in at most ten lines."""
     d = r.diagnosis
     assert d is not None
-    first = [*surest_first(r.effects), *r.possibilities][:MAX_SUMMARY]
+    first = [*surest_first(r.effects), *r.possibilities][:SHOWN]
+    runs = r.evaluations if len(r.evaluations) <= SHOWN else r.evaluations[: SHOWN - 1]
     lines = [f"{d.verdict}: {verdict_title(r)}"]
     lines += [f"  {told(e)} [{_percent(e.confidence)}]" for e in first] or [f"  {headline(r)}"]
     lines += [f"  {d.remainder.sentence}"]
     over = f"predictions over {_number(r.lengths[0])} s miss by"
-    for e in r.evaluations[:MAX_SUMMARY]:
+    for e in runs:
         pair = " -> ".join(_number(1e3 * x, 2) for x in (e.before.position, e.after.position))
         lines.append(f"  {r.called(e)}: {over} {pair} mm")
-    more = len(r.evaluations) - MAX_SUMMARY
+    more = len(r.evaluations) - len(runs)
     lines += [f"  and {more} more runs"] if more > 0 else []
     return "\n".join(lines)
 
@@ -102,7 +103,7 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     """The data, what channels of each run say of each other, and where the model fails."""
     table = _table("run", "time", "samples", "frozen", "dropped", "spikes", "used")
     for e in r.evaluations:
-        table.add_row(_name(r, e), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
+        table.add_row(Text(r.called(e)), f"{_number(seconds(e), 4)} s", *map(str, e.smoothed.counts))
     yield from _titled("Data", table)
     notes = [f"{e.name}: {note}" for e in r.evaluations for note in e.smoothed.notes]
     if notes:
@@ -115,10 +116,6 @@ def _runs(r: ReportData) -> Iterator[RenderableType]:
     if kind:
         yield from _lines(f"How the {kind} predicts", sentences)
     yield from _lines("Where the model fails", r.comparison.before.sentences)
-
-
-def _name(r: ReportData, e: Evaluation) -> Text:
-    return Text(r.called(e))
 
 
 def _effect(e: ReportedEffect) -> Iterator[str]:
@@ -142,7 +139,7 @@ def _errors(r: ReportData) -> Iterator[RenderableType]:
         return " -> ".join(_number(None if x is None else scale * x, 2) for x in parts)
 
     for e, outputs in zip(r.evaluations, r.measured, strict=True):
-        run, b, a = _name(r, e), e.before, e.after
+        run, b, a = Text(r.called(e)), e.before, e.after
         heading = cell(b.heading, a.heading, degrees(1.0))
         predictions.add_row(run, cell(b.position, a.position, 1e3), heading)
         forces.add_row(run, *(cell(*axis) for axis in zip(b.omega_rms, a.omega_rms, strict=True)))
@@ -176,11 +173,8 @@ def _stability(s: Stability) -> Iterator[str]:
 
 
 def _number(x: float | None, digits: int = 3) -> str:
-    """A number for people."""
-    if x is None or not isfinite(x):
-        return "-"
-    return f"{x:.0f}" if abs(x) >= 10.0**digits else f"{x:.{digits}g}"
+    return number(x, digits).translate(ASCII)
 
 
 def _percent(x: float | None) -> str:
-    return "-" if x is None or not isfinite(x) else f"{100.0 * x:.0f} %"
+    return percent(x).translate(ASCII)

@@ -10,39 +10,26 @@ from fmus.ship import Ship
 
 from ..assessment.covariates import means_of_run
 from ..predictors.evaluation import LEVELS, Evaluation, PredictionError
-from .chart import AFTER, BEFORE, INK, PT, THIRD, Axis, Chart, Panel
-from .figures import SINGLE, STACK, interrupted
+from .chart import AFTER, BEFORE, INK, LINE, MARGIN, ROW, THIRD, WIDTH, Axis, Chart, Panel
+from .figures import interrupted
 
-MAX_POINTS = 1500  # of a track; chosen, keeps a page near a megabyte
-MARGIN = 0.06  # of the reach, around a track; chosen
-MIN_ASPECT = 0.4  # shorter side of a map by its longer one; chosen
-MAX_REACH = 2.0  # times the measured extent, beyond which a prediction leaves the chart; chosen
-HIGHEST = 375.0  # pt, of a map; chosen
-QUARTILES = (0.25, 0.5, 0.75)
-ARROWS, ARROW = 80, 0.15  # of a force: how many, and the longest as a share of the reach; chosen
-# Corners of an arrow, along and across, as shares of its length: its end, tip, sides of the tip.
-ARROW_SHAPE = np.array(
-    [(0.0, 0.0), (1.0, 0.0), (0.75, 0.12), (1.0, 0.0), (0.75, -0.12), (np.nan, np.nan)]
-)
-SHIP = 0.5  # longest ship, as a share of a map; chosen
-BINS = 32  # parts of a window over which errors are summarised; chosen
-MEASURED = {"colour": INK, "label": "measured", "width": 3.4, "opacity": 0.3}
+QUARTILES = (0.25, 0.5, 0.75)  # 1
+# Of a window over which errors are summarised; of forces along a track twice as many; chosen.
+PARTS = 32
 
 
 def track(e: Evaluation, learned: bool) -> Chart:
     """The measured track of a run, and the predictions of the models from the start of each window."""
     eta = e.smoothed.eta
     panel = _map(eta[:, :2])
-    panel.draw(*_east_north(_thinned(eta)), **MEASURED)
+    _broad(panel, *_east_north(eta))
     if e.windows is not None:
         window, measured = e.windows.sample_window, e.windows.measured
-        step = max(1, len(window) // MAX_POINTS)
         for prediction, colour, label in _models(e, learned):
-            predicted = _finite(measured - prediction.residuals)[::step, :2]
-            parts = interrupted(predicted, window[::step])
-            panel.draw(*_east_north(parts), colour, label, width=1.0, opacity=0.85)
+            parts = interrupted(_finite(measured - prediction.residuals), window)
+            panel.draw(*_east_north(parts), colour, label)
         starts = measured[np.r_[0, np.flatnonzero(np.diff(window)) + 1]]
-        panel.draw(*_east_north(starts), INK, radius=1.0)
+        panel.draw(*_east_north(starts), INK, dots=True)
         _ships(panel, starts, e.model.ship)
     return _chart(panel)
 
@@ -52,16 +39,15 @@ def free(e: Evaluation) -> Chart:
     measured = e.smoothed.eta[:, :2]
     paths = [p[:, :2] for p in e.free_runs()[1]][: 2 if e.learned else 1]
     panel = _map(_around(measured, paths))
-    panel.draw(*_east_north(_thinned(measured)), **MEASURED)
-    names = ("before", "after") if e.learned else ("predicted",)
-    for path, colour, label in zip(paths, (BEFORE, AFTER), names, strict=False):
-        panel.draw(*_east_north(_thinned(_finite(path))), colour, label)
-    panel.draw(*_east_north(measured[:1]), INK, radius=PT.dot)
+    _broad(panel, *_east_north(measured))
+    for path, (_, colour, label) in zip(paths, _models(e, bool(e.learned)), strict=True):
+        panel.draw(*_east_north(_finite(path)), colour, label)
+    panel.draw(*_east_north(measured[:1]), INK, dots=True)
     return _chart(panel)
 
 
 def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]] = ()) -> Chart:
-    """The force that the model lacks as arrows along the track, over north and east.
+    """The force that the model lacks as lines from places of the track, over north and east.
 
     Args:
         e: the run.
@@ -69,27 +55,25 @@ def place(e: Evaluation, learned: bool, stretches: Sequence[tuple[float, float]]
         stretches: begin and end [s] of parts that are marked; then only what is left is drawn.
     """
     eta, time = e.smoothed.eta, e.smoothed.time
-    shown = np.linspace(0, e.weak_windows.middle.size - 1, ARROWS).astype(int)
+    shown = np.linspace(0, e.weak_windows.middle.size - 1, 2 * PARTS).astype(int)
     *_, headings, places = means_of_run(e.weak_windows)
     at, psi = places[shown], headings[shown]
     c, s = np.cos(psi), np.sin(psi)
     models = _models(e, learned)[-1 if stretches else 0 :]
     forces = [p.omega[shown, :2].T for p, _, _ in models]
     most = max(float(np.hypot(*f).max()) for f in forces) or 1.0
-    reach = ARROW * np.ptp(eta[np.isfinite(eta[:, 0]), :2], axis=0).max() / most
-    arrows = [reach * np.column_stack([c * X - s * Y, s * X + c * Y]) for X, Y in forces]
-    panel = _map(np.concatenate([eta[:, :2], *(at + arrow for arrow in arrows)]))
-    panel.draw(*_east_north(_thinned(eta)), INK, "track", width=1.0, opacity=0.3)
+    reach = 2 * MARGIN * np.ptp(eta[np.isfinite(eta[:, 0]), :2], axis=0).max() / most
+    tips = [at + reach * np.column_stack([c * X - s * Y, s * X + c * Y]) for X, Y in forces]
+    panel = _map(np.concatenate([eta[:, :2], *tips]))
+    _broad(panel, *_east_north(eta), "track")
     for k, (begin, end) in enumerate(stretches):
         part = eta[(time >= begin) & (time <= end)]
-        panel.draw(*_east_north(part), THIRD, "" if k else "pushed", width=4.0, opacity=0.6)
-    for arrow, (_, colour, label) in zip(arrows, models, strict=True):
-        across = np.column_stack([-arrow[:, 1], arrow[:, 0]])
-        corners = (
-            at[:, None] + ARROW_SHAPE[:, :1] * arrow[:, None] + ARROW_SHAPE[:, 1:] * across[:, None]
-        )
-        panel.draw(*_east_north(corners.reshape(-1, 2)), colour, label)
-    return _chart(panel, f"longest arrow {most:.2g} N")
+        panel.draw(*_east_north(part), THIRD, "" if k else "pushed", width=2 * LINE)
+    for tip, (_, colour, label) in zip(tips, models, strict=True):
+        sticks = np.stack([at, tip, np.full_like(at, np.nan)], axis=1)
+        panel.draw(*_east_north(sticks.reshape(-1, 2)), colour, label)
+    panel.x.label += f"\nlongest line from the track: {most:.2g} N"
+    return _chart(panel)
 
 
 def worst_of(e: Evaluation) -> int | None:
@@ -102,39 +86,37 @@ def worst_of(e: Evaluation) -> int | None:
 
 def heading_bands(e: Evaluation) -> Chart | None:
     """Heading over the worst window, with the bands of the learned model; None where there are none."""
-    worst = worst_of(e)
-    if worst is None or e.windows is None or e.bands is None:
+    if (worst := worst_of(e)) is None or e.windows is None or e.bands is None:
         return None
     inside = e.windows.sample_window == worst
     since, predicted = e.windows.since[inside], e.bands.predicted[worst, :, 2]
     centre = np.interp(since, e.bands.since, predicted)
     panel = Panel(Axis("time since the window began [s]"), Axis("heading [°]"))
-    panel.draw(since, np.degrees(centre + wrap(e.windows.measured[inside, 2] - centre)), **MEASURED)
+    _broad(panel, since, np.degrees(centre + wrap(e.windows.measured[inside, 2] - centre)))
     panel.draw(e.bands.since, np.degrees(predicted), AFTER, "after")
     for level in LEVELS:
         low, high = np.degrees(e.bands.headings(worst, level))
-        panel.fill(e.bands.since, low, high, AFTER, opacity=0.15)
-    return Chart(0.75 * SINGLE, [panel])
+        panel.fill(e.bands.since, low, high, AFTER)
+    return Chart(WIDTH / 2, [panel])
 
 
 def worst_window(e: Evaluation, learned: bool) -> Chart | None:
     """The worst window, with the bands of the learned model; None where there is no window."""
-    worst = worst_of(e)
-    if worst is None or e.windows is None:
+    if (worst := worst_of(e)) is None or e.windows is None:
         return None
     inside = e.windows.sample_window == worst
     measured = e.windows.measured[inside]
     paths = [(_finite(measured - p.residuals[inside]), c, label) for p, c, label in _models(e, learned)]
     panel = _map(_around(measured[:, :2], [p[:, :2] for p, _, _ in paths]))
-    panel.draw(*_east_north(measured), **MEASURED)
+    _broad(panel, *_east_north(measured))
     for around in [] if e.bands is None else [e.bands.ellipses(worst, level) for level in LEVELS]:
         closed = np.insert(around, around.shape[1], np.nan, axis=1).reshape(-1, 2)
-        panel.draw(*_east_north(closed), AFTER, width=0.0, opacity=0.12)
+        panel.draw(*_east_north(closed), AFTER, area=True, faint=True)
     for predicted, colour, label in paths:
         panel.draw(*_east_north(predicted), colour, label)
-        panel.draw(*_east_north(predicted[-1:]), colour, radius=PT.dot)
-    panel.draw(*_east_north(measured[:1]), INK, radius=PT.dot)
-    panel.draw(*_east_north(measured[-1:]), INK, radius=PT.dot, hollow=True)
+        panel.draw(*_east_north(predicted[-1:]), colour, dots=True)
+    panel.draw(*_east_north(measured[:1]), INK, dots=True)
+    panel.draw(*_east_north(measured[-1:]), INK, dots=True, hollow=True)
     _ships(panel, measured[[0, -1]], e.model.ship)
     return _chart(panel)
 
@@ -144,9 +126,9 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
     known = [e for e in evaluations if e.windows is not None]
     windows = [e.windows for e in known if e.windows is not None]
     since = np.concatenate([w.since for w in windows])
-    edges = np.linspace(0.0, windows[0].length, BINS + 1)
-    middle = 0.5 * (edges[:-1] + edges[1:])
-    part = np.clip(np.digitize(since, edges) - 1, 0, BINS - 1)
+    edges = np.linspace(0.0, windows[0].length, PARTS + 1)
+    middle = (edges[:-1] + edges[1:]) / 2
+    part = np.clip(np.digitize(since, edges) - 1, 0, PARTS - 1)
     time = Axis("time since the window began [s]", (0.0, edges[-1]))
     position = Panel(Axis(limits=time.limits, shown=False), Axis("position [mm]", scale=np.log10))
     panels = (position, Panel(time, Axis("heading [°]", scale=np.log10)))
@@ -155,38 +137,37 @@ def error_growth(evaluations: Sequence[Evaluation], learned: bool) -> Chart:
         _, colour, label = models[0]
         errors = (1e3 * np.hypot(residuals[:, 0], residuals[:, 1]), np.degrees(np.abs(residuals[:, 2])))
         for panel, error in zip(panels, errors, strict=True):
-            bands = np.full((3, BINS), np.nan)
+            bands = np.full((3, PARTS), np.nan)
             for k in np.unique(part):
                 bands[:, k] = np.quantile(error[part == k], QUARTILES, method="nearest")
             panel.fill(middle, bands[0], bands[2], colour)
             panel.draw(middle, bands[1], colour, label if learned else "")
-    return Chart(0.8 * STACK, panels)
+    return Chart(WIDTH, panels)
 
 
 def _models(e: Evaluation, learned: bool) -> list[tuple[PredictionError, str, str]]:
     """Prediction error, colour and label of each model of a run."""
-    if not learned:
-        return [(e.before, BEFORE, "predicted")]
-    return [(e.before, BEFORE, "before"), (e.after, AFTER, "after")]
+    before = (e.before, BEFORE, "before" if learned else "predicted")
+    return [before, (e.after, AFTER, "after")] if learned else [before]
 
 
 def _ships(panel: Panel, poses: np.ndarray, of: Ship) -> None:
     """The ship in its own length at some poses, if that leaves something of the track to see."""
     room = max(high - low for low, high in panel.ends())
     outline = of.vessel.outline
-    drawn = [] if outline is None else hulls(poses, outline.corners)
-    for corners in drawn:
-        if np.ptp(corners, axis=0).max() < SHIP * room:
+    for corners in [] if outline is None else hulls(poses, outline.corners):
+        if 2 * np.ptp(corners, axis=0).max() < room:
             east, north = np.vstack([corners, corners[:1]]).T
-            panel.draw(east, north, INK, width=PT.thin, opacity=0.4)
+            panel.draw(east, north, INK, width=LINE / 2)
+
+
+def _broad(panel: Panel, x: np.ndarray, y: np.ndarray, label: str = "measured") -> None:
+    """What was measured, below what is predicted."""
+    panel.draw(x, y, INK, label, width=2 * LINE, faint=True)
 
 
 def _finite(pose: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(pose), pose, np.nan)
-
-
-def _thinned(pose: np.ndarray) -> np.ndarray:
-    return pose[:: max(1, len(pose) // MAX_POINTS)]
 
 
 def _east_north(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -197,21 +178,22 @@ def _east_north(pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _around(measured: np.ndarray, paths: Sequence[np.ndarray]) -> np.ndarray:
     """Places (n, 2) that a map holds: all measured ones, and predicted ones that are not too far."""
     low, high = np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)
-    far = MAX_REACH * (high - low).max()
+    far = (high - low).max()
     return np.concatenate([measured, *(np.clip(_finite(p), low - far, high + far) for p in paths)])
 
 
 def _map(places: np.ndarray) -> Panel:
     """A panel with north up that holds all places (n, 2) [m], in the same scale both ways."""
     low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
-    middle, reach = 0.5 * (low + high), 0.5 * (high - low)
-    half = np.maximum(reach + MARGIN * reach.max(), MIN_ASPECT * reach.max()) + 1e-3
+    middle, reach = (low + high) / 2, (high - low) / 2
+    most = reach.max() or 1.0
+    half = np.maximum(reach + MARGIN * most, most / 2)  # no narrower than half of its height
     north, east = zip((middle - half).tolist(), (middle + half).tolist(), strict=True)
     return Panel(Axis("east [m]", east), Axis("north [m]", north), equal=True)
 
 
-def _chart(panel: Panel, title: str = "") -> Chart:
+def _chart(panel: Panel) -> Chart:
     """A map, as high as it is wide, within bounds."""
     (west, east), (south, north) = panel.ends()
-    height = PT.below + PT.above + PT.width * (north - south) / (east - west)
-    return Chart(float(np.clip(height, 0.75 * SINGLE, HIGHEST)), [panel], title)
+    height = WIDTH * (north - south) / (east - west)
+    return Chart(float(np.clip(height, WIDTH / 2, WIDTH)) + 2 * ROW, [panel])

@@ -16,12 +16,12 @@ from .files.reading import Run as Run
 from .files.reading import layout_beside as layout_beside
 from .files.reading import read as read
 from .files.reading import read_frame as read_frame
+from .files.reading import ship_of_logs as ship_of_logs
 from .files.reading import table_of as table_of
-from .files.ship_of_logs import ship_of_logs as ship_of_logs
 from .prepared_run import PreparedRun as PreparedRun
+from .prepared_run import examine as examine
 from .prepared_run import prepare as prepare
 from .prepared_run import read_each as read_each
-from .sensors.examination import examine as examine
 from .sensors.path_closure import Closure as Closure
 from .sensors.path_closure import closure as closure
 from .sensors.sensor_finding import Examined as Examined

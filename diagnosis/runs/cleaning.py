@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
 from cosim import InputError
 from fmus.ops import wrap
@@ -17,16 +18,18 @@ from .files.telegrams import filled
 
 # Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
 SHORTEST = 8.0  # s, of a run: one prediction window
-# Of what regular sampling would give, gaps of up to GAP seconds filled. Chosen: what is rarer comes in
-# bursts, of which nothing can be differentiated.
-SPARSE, GAP = 0.05, 30.0
-MOST_OUT = 0.1  # largest share of rows whose time may be out of order (chosen)
-LONG = 5.0  # sampling periods; over a longer gap the heading is unwrapped by the rate around it (chosen)
-# s, or LONG periods if that is longer: gaps are told, and over one between commands none is known.
-# Chosen: a sixth of a window of the weak form, so that a command that is wrong there hardly counts.
-HELD = 0.5
-EMPTY = 2.5  # sampling periods between two measurements, of which the rows between may be empty (chosen)
-NEAR = 1.0  # s, before and after a gap of the heading, by whose yaw rate it is unwrapped (chosen)
+WIDTH = 3.0  # s, of a window of the weak form: over a longer gap nothing is known of the motion
+BRIEF = 0.1  # s; a delay or an interval that is shorter makes no difference to a motion (chosen)
+# Of what regular sampling would give, gaps of a window filled. Chosen: what is rarer comes in bursts, of
+# which nothing can be differentiated.
+SPARSE = 0.05
+MOST_WRONG = 0.1  # of the rows; chosen: of a run of the real ship 7 % are spikes, and it can be used
+# s, or LONG sampling periods if that is longer, of a gap. Chosen: a sixth of a window of the weak form,
+# so that a command that is wrong there hardly counts.
+HELD, LONG = 0.5, 5.0
+DIGITS = float(np.finfo(float).eps) ** 0.5  # relative size of what rounding may have left
+# Standard deviations of a normal distribution in its median deviation, and within which 95 % lie.
+NORMAL_MAD, Z95 = 1.0 / float(ndtri(0.75)), 1.96
 
 
 class Counts(NamedTuple):
@@ -83,7 +86,7 @@ class Track:
         """
         time, held = self.run.time, self.run.held
         given = time if held is None or 2 * int(held.sum()) > time.size else time[~held]
-        silent = np.diff(given) > max(HELD * self.scale.time, LONG * float(np.median(np.diff(time))))
+        silent = np.diff(given) > long_gap(float(np.median(np.diff(time))), self.scale)
         last, next_one = given[:-1][silent], given[1:][silent]
         return np.searchsorted(last, time, "left") + np.searchsorted(next_one, time, "right")
 
@@ -108,7 +111,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
     where = f"run '{run.name}'"
     kept = in_order(run.time)
     out = run.time.size - kept.size
-    if out > MOST_OUT * run.time.size:
+    if out > MOST_WRONG * run.time.size:
         raise InputError(f"{where}: time does not grow in {out} of {run.time.size} rows")
     notes = list(run.notes)
     if out:
@@ -127,7 +130,7 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         notes.append("rows between two measurements were filled by straight lines: they do not count")
     period = float(np.median(np.diff(run.time[fresh])))
     refuse_time(row, seconds, where, run.called or {}, scale)
-    steps = np.minimum(np.diff(run.time), GAP * scale.time)
+    steps = np.minimum(np.diff(run.time), SHORTEST * scale.time)
     if SPARSE * steps.sum() > row * run.time.size:
         raise InputError(
             f"{where}: its samples come in bursts, {row:.3g} s apart and {steps.mean():.3g} s on average"
@@ -137,16 +140,29 @@ def clean(run: Run, anyway: bool = False, scale: Scale = REFERENCE) -> Track:
         last = run.time[fresh][np.maximum(after - 1, 0)]
         between |= repeats & (run.time - last < period - 0.5 * row)
         until = run.time[fresh][np.minimum(after, fresh.size - 1)] - last
-        between |= np.isnan(run.pose).all(axis=1) & (until < EMPTY * period)
+        # Rows are empty between two measurements if no other one was due meanwhile.
+        between |= np.isnan(run.pose).all(axis=1) & (until < 2.0 * period)
         dropped &= ~between
         notes.append(f"a measurement every {period:.4g} s, a row every {row:.4g} s")
     frozen = repeats & ~between
     pose = np.where((dropped | repeats | between)[:, None], np.nan, run.pose)
     refuse_units(run.time[fresh], pose[fresh], where, anyway, run.called or {})
-    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], period, NEAR * scale.time)
-    _moves(pose[fresh], where)
-    notes += _gaps(run.time[fresh] - run.time[0], max(HELD * scale.time, LONG * period))
+    gap = long_gap(period, scale)
+    pose[fresh, 2] = unwrap(run.time[fresh], pose[fresh, 2], gap)
+    reach = np.diff(np.quantile(pose[fresh], (0.1, 0.9), axis=0), axis=0)[0]
+    if not (reach > 6.0 * noise(pose[fresh])).any():
+        raise InputError(f"{where} does not move: its pose is noise around a place")
+    steps = np.diff(run.time[fresh])
+    if many := int((steps > gap).sum()):
+        begin = run.time[fresh][steps.argmax()] - run.time[0]
+        longest = f"{steps.max():.4g} s, {begin:.4g} s from the start"
+        notes.append(f"a gap of {longest}" if many == 1 else f"{many} gaps, the longest {longest}")
     return Track(run, pose, frozen, dropped, between, period, out, tuple(notes), scale)
+
+
+def long_gap(period: float, scale: Scale) -> float:
+    """Time [s] from which on a gap between samples some period [s] apart is one."""
+    return max(HELD * scale.time, LONG * period)
 
 
 def refuse_short(run: Run, scale: Scale) -> tuple[float, float]:
@@ -185,6 +201,11 @@ def in_order(time: np.ndarray) -> np.ndarray:
     return np.array(found[::-1])
 
 
+def impulse(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Integral (n, k) over times (n,) [s], from the first one, of values (n, k) that are held."""
+    return np.vstack([0.0 * values[:1], np.cumsum(values[:-1] * np.diff(time)[:, None], axis=0)])
+
+
 def lost(pose: np.ndarray) -> np.ndarray:
     """(n,): where a pose (n, 3) is no measurement: NaN, infinite, or all zero."""
     return ~np.isfinite(pose).all(axis=1) | (pose == 0.0).all(axis=1)
@@ -198,45 +219,26 @@ def repeated(pose: np.ndarray, there: np.ndarray) -> np.ndarray:
     return repeats
 
 
-def unwrap(time: np.ndarray, psi: np.ndarray, period: float, reach: float = NEAR) -> np.ndarray:
+def unwrap(time: np.ndarray, psi: np.ndarray, gap: float) -> np.ndarray:
     """The heading [rad] continuous over turns.
 
-    Over a long gap it may have turned by more than half a turn: then that step is taken which comes
-    nearest to what the yaw rate just before and just after, within some reach [s], would have turned it.
+    Over a longer gap [s] it may have turned by more than half a turn: then that step is taken which
+    comes nearest to what the yaw rate as long before and after would have turned it.
     """
     step, dt = wrap(np.diff(psi)), np.diff(time)
     rate = step / dt
-    for k in np.flatnonzero(dt > LONG * period):
-        near = (np.abs(time[1:] - time[k]) < reach) | (np.abs(time[:-1] - time[k + 1]) < reach)
-        near &= dt <= LONG * period
+    for k in np.flatnonzero(dt > gap):
+        near = (np.abs(time[1:] - time[k]) < gap) | (np.abs(time[:-1] - time[k + 1]) < gap)
+        near &= dt <= gap
         turn = dt[k] * float(np.median(rate[near])) if near.any() else 0.0
         step[k] = turn + wrap(step[k] - turn)
     return np.concatenate([psi[:1], psi[0] + np.cumsum(step)])
 
 
-def _moves(pose: np.ndarray, where: str) -> None:
-    """Refuse a run in which there is nothing but noise."""
-    reach = np.diff(np.quantile(pose, (0.1, 0.9), axis=0), axis=0)[0]
-    if not (reach > 6.0 * noise(pose)).any():
-        raise InputError(f"{where} does not move: its pose is noise around a place")
-
-
 def noise(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of the noise of each channel, from third differences.
+    """Standard deviation of the noise of each channel of values (n, channels), from third differences.
 
-    Args:
-        values: (n, channels) in a row; that some steps are longer than others does little harm, as
-            the median is taken.
+    That some steps are longer than others does little harm, as the median is taken.
     """
     third = np.abs(np.diff(values, 3, axis=0))
-    return 1.4826 * np.median(third, axis=0) / np.sqrt(20.0)
-
-
-def _gaps(time: np.ndarray, least: float) -> list[str]:
-    """A line for the gaps above some time [s] between times since the start, if there are any."""
-    dt = np.diff(time)
-    long = dt > least
-    if not long.any():
-        return []
-    longest = f"{dt.max():.4g} s, {time[dt.argmax()]:.4g} s from the start"
-    return [f"a gap of {longest}" if long.sum() == 1 else f"{long.sum()} gaps, the longest {longest}"]
+    return NORMAL_MAD * np.median(third, axis=0) / np.linalg.norm(np.diff(np.eye(4), 3, axis=0))

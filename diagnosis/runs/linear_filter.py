@@ -14,9 +14,6 @@ def filtered(numerator: Sequence[float], denominator: Sequence[float], x: np.nda
     Args:
         numerator, denominator: polynomials in 1/z; the latter begins with one.
         x: (n, k), the signal.
-
-    Returns:
-        (n, k).
     """
     y = np.zeros_like(x)
     for late, gain in enumerate(numerator[: len(x)]):

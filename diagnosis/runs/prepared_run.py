@@ -12,17 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from cosim import InputError
+from fmus.scale import Scale
 from fmus.ship import Ship, ship
 
-from .cleaning import Track, clean, refuse_short
+from .cleaning import MOST_WRONG, Track, clean, refuse_short
 from .columns.unit_check import GO_ON
 from .files.reading import Run, read
-from .sensors.examination import examine
+from .sensors.further_channels import accelerations, receivers, through_water
+from .sensors.motion import motion
 from .sensors.sensor_finding import Examined
+from .sensors.unit_faults import sway, units
+from .sensors.wraps import wraps
 from .smoothing.smoother import Smoothed, smooth
 from .thinning import thinned
 
-MOST_SPIKES = 0.1  # of the samples; chosen: of a run of the real ship 7 % are spikes, and it can be used
 # A part of a log contains less information on its clock than the whole.
 WHOLE_FIRST = "repair the whole log by its other channels (cybership repair) and take the part of that"
 
@@ -51,8 +54,14 @@ class PreparedRun:
             InputError: the samples do not determine a motion, or too many of them are spikes.
         """
         found = smooth(self.track, agreeing=self.sensors.agreeing)
-        if not self.anyway:
-            self._refuse_spikes(found)
+        fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
+        if spikes > MOST_WRONG * fresh and not self.anyway:
+            raise InputError(
+                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
+                "than five standard deviations from where all others say the ship is: something is "
+                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
+                f"of a log, {WHOLE_FIRST}; {GO_ON}"
+            )
         return replace(found, sensors=self.sensors)
 
     @property
@@ -69,16 +78,6 @@ class PreparedRun:
         part = self.track.rows(rows)
         refuse_short(part.run, self.track.scale)
         return replace(self, track=part)
-
-    def _refuse_spikes(self, found: Smoothed) -> None:
-        fresh, spikes = int(self.track.valid.sum()), int(found.spikes.sum())
-        if spikes > MOST_SPIKES * fresh:
-            raise InputError(
-                f"run '{self.raw.name}': {spikes} of {fresh} samples ({spikes / fresh:.0%}) are more "
-                "than five standard deviations from where all others say the ship is: something is "
-                "wrong with the pose or its time; leave the cells of false samples empty, or, of a part "
-                f"of a log, {WHOLE_FIRST}; {GO_ON}"
-            )
 
 
 def prepare(
@@ -107,6 +106,23 @@ def prepare(
         )
     repaired = replace(sensors.run, notes=(*sensors.run.notes, *sensors.notes))
     return PreparedRun(raw, sensors, thinned(clean(repaired, anyway, of.scale)), anyway)
+
+
+def examine(run: Run, scale: Scale) -> Examined:
+    """Cross-check channels that are redundant.
+
+    Args:
+        run: as it was read.
+        scale: of the ship.
+
+    Returns:
+        The run as far as its own channels repair it, and what they say of each other.
+    """
+    found = Examined(run)
+    # In the order in which one needs what others repair.
+    for check in (wraps, units, sway, receivers, motion, accelerations, through_water):
+        found = found.plus(check(found.run, scale))
+    return found
 
 
 def read_each(sources: Sequence[str | Path | Run], of: Ship | None = None) -> list[Run]:

@@ -6,13 +6,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .cleaning import Track
+from .cleaning import BRIEF, DIGITS, Track, impulse
 
 # Rows that are analysed as they are; chosen: of more, learning would take minutes and more than 2 GB.
 MOST_ROWS = 100_000
-# s, times the ship's scale; longest time between two rows of what is thinned; chosen: a thirtieth of the
-# weak form's kernel.
-LONGEST = 0.1
 
 
 def thinned(track: Track) -> Track:
@@ -27,15 +24,14 @@ def thinned(track: Track) -> Track:
     """
     run = track.run
     row = float(np.median(np.diff(run.time)))
-    factor = min(-(-run.time.size // MOST_ROWS), int(LONGEST * track.scale.time / row + 1e-9))
+    factor = min(-(-run.time.size // MOST_ROWS), int(BRIEF * track.scale.time / row + DIGITS))
     if factor < 2:
         return track
     width = factor * row
-    _, part = np.unique(np.floor((run.time - run.time[0]) / width + 1e-6), return_inverse=True)
-    valid = track.valid
-    of_valid = _by(part, np.where(valid, run.time, np.nan)).mean()
+    _, part = np.unique(np.floor((run.time - run.time[0]) / width + DIGITS), return_inverse=True)
+    of_valid = _by(part, np.where(track.valid, run.time, np.nan)).mean()
     time = of_valid.fillna(_by(part, run.time).mean()).to_numpy()[:, 0]
-    seen = np.where(valid[:, None], track.pose, np.nan)
+    seen = track.pose  # NaN where it is not valid
     pose = _by(part, seen).median().to_numpy()
     moved = np.nan_to_num(np.gradient(pose, time, axis=0))[part] * (run.time - time[part])[:, None]
     pose = _by(part, seen - moved).median().to_numpy()
@@ -75,7 +71,5 @@ def _by(part: np.ndarray, values: np.ndarray) -> Any:
 
 def _mean(time: np.ndarray, values: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Means from each edge (m,) to the next of values (n, k) that are held; the last as it is."""
-    steps = np.diff(time)[:, None] * values[:-1]
-    integral = np.vstack([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
-    at = np.column_stack([np.interp(edges, time, column) for column in integral.T])
+    at = np.column_stack([np.interp(edges, time, column) for column in impulse(time, values).T])
     return np.vstack([np.diff(at, axis=0) / np.diff(edges)[:, None], values[-1:]])

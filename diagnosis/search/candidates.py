@@ -15,21 +15,18 @@ from fmus.scale import Scale
 
 from ..execution.parallel import for_each
 from ..predictors import Model, WeakWindows, omega
-from .nonlinear.multistart import Landscape, best_values
+from .nonlinear.multistart import Landscape, best_values, limits
 from .nonlinear.segmentation import FLOOR, intervals, problem
 
 # Here forces and coefficients are in their units at the size of the ship, see :meth:`.model.Model.unit`.
 # Step of a finite difference where the model error is not linear.
 SMALL = 1e-3
 # A nonlinear effect without values of its own is tried at these multiples of the value at which its
-# force is as large as the model error, found between the smallest and the largest in steps of ten.
+# force is as large as the model error, found in steps of ten from 1 / LARGEST units to LARGEST.
 MULTIPLES = (0.1, 0.3, 1.0, 3.0, 10.0)
-SMALLEST, LARGEST = 1e-6, 1e6
-MOST = 0.5  # share of its largest force from which on it counts as saturated; chosen
-# Share of a curve's weight that a node must have: half a second of four minutes.
-INSIDE = 2e-3
-FEWEST = 3  # nodes of a curve: of fewer there is no bend
-SLIGHT = 1e-12  # sum of squares of a force, in the units above, below which it is none: rounding
+LARGEST = 1e6
+LEAST_SHARE = 0.003  # of a sum of squares: what is less changes no prediction; chosen
+SLIGHT = np.finfo(float).eps  # sum of squares of a force, in the units above, that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,16 +83,12 @@ def shape(
 
 
 def covered(columns: np.ndarray) -> np.ndarray:
-    """(p,), which nodes of a curve the data reach, and those between them.
+    """(p,), which nodes of a curve have LEAST_SHARE of what all give together, and those between them.
 
-    A node counts from a share of INSIDE of what all nodes together give. What lies outside stays zero:
-    there the curve is the model's, and nothing is told of it.
-
-    Args:
-        columns: (K, 3, p), force for one unit of each node.
+    What lies outside stays zero: there the curve is the model's. Columns (K, 3, p) are by node.
     """
     weight = np.square(columns).sum(axis=(0, 1))
-    reached = np.flatnonzero(weight > INSIDE * max(float(weight.sum()), SLIGHT))
+    reached = np.flatnonzero(weight > LEAST_SHARE * weight.sum())
     inside = np.zeros(weight.size, bool)
     if reached.size:
         inside[reached[0] : reached[-1] + 1] = True
@@ -123,7 +116,7 @@ def curve(base: np.ndarray, plain: Shape, scale: Scale) -> list[Shape]:
     """A free curve where the data reach it: a smooth one; none where they reach too few nodes."""
     force = plain.columns * plain.unit / np.array(scale.forces)[:, None]
     inside = covered(force)
-    if inside.sum() < FEWEST:
+    if inside.sum() <= 2:  # without a bend
         return []
     unit = plain.unit[inside]
     precision = smoothness(base / scale.forces, force[:, :, inside]) / np.outer(unit, unit)
@@ -160,13 +153,15 @@ def by_starts(
     """The shapes of an effect at the best values of what it is not linear in."""
     sigma = np.sqrt(np.mean(base**2, axis=0)) + FLOOR * model.ship.scale.forces
 
+    def with_values(values: Mapping[str, float]) -> Model:
+        return model.plus({n: x - model.value(n) for n, x in values.items()})
+
     def force(values: Mapping[str, float]) -> np.ndarray:
-        changed = model.plus({n: x - model.value(n) for n, x in values.items()})
-        return ((base - model_error(data, changed)) / sigma).ravel()
+        return ((base - model_error(data, with_values(values))) / sigma).ravel()
 
     def tried(shape: Mapping[str, float]) -> list[dict[str, float]]:
-        at = model.plus({n: x - model.value(n) for n, x in shape.items()})
-        return [{**v} for name in e.coefficients for v in scaled(data, at, base, e, name)]
+        at = with_values(shape)
+        return [v for name in e.coefficients for v in scaled(data, at, base, e, name)]
 
     poses = np.concatenate([w.smoothed.eta[w.known, :2] for w in data])
     extent = float(np.linalg.norm(np.ptp(poses, axis=0)))
@@ -203,26 +198,25 @@ def scaled(
 ) -> Iterator[dict[str, float]]:
     """Multiples of a coefficient's value at which its force is as large as the model error.
 
-    Where the force never is, because it saturates, of the value at which it has most of its largest.
+    Where the force never is, because it saturates, of the value at which it has half of its largest.
     The effect's other parameters are refined as well, from where they are.
     """
-    allowed = next(p.range for p in e.parameters if p.name == name)
     unit, forces_of = model.unit(name), model.ship.scale.forces
-    low = -LARGEST * unit if allowed.min is None else allowed.min
-    high = LARGEST * unit if allowed.max is None else allowed.max
+    allowed = limits(next(p for p in e.parameters if p.name == name))
+    low, high = np.clip(allowed, -LARGEST * unit, LARGEST * unit).tolist()
     wanted = float(np.square(base / forces_of).sum())
     others = {n: model.value(n) for n in e.shape_parameters}
     others |= {n: 0.0 for n in e.coefficients if n != name}
     for sign in (1.0, -1.0):
         forces: dict[float, float] = {}
-        size = SMALLEST * unit
+        size = unit / LARGEST
         while max(forces.values(), default=0.0) < wanted and low <= sign * size <= high:
             change = base - model_error(data, model.plus({name: sign * size}))
             forces[size] = float(np.square(change / forces_of).sum())
             size *= 10.0
         largest = max(forces.values(), default=0.0)
         if largest > SLIGHT:
-            size = next(s for s, force in forces.items() if force >= MOST * largest)
+            size = next(s for s, force in forces.items() if force >= largest / 2.0)
             values = [sign * k * size for k in MULTIPLES]
             yield from ({**others, name: value} for value in values if low <= value <= high)
 

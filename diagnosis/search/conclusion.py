@@ -13,11 +13,9 @@ from .effect_evidence import Evidence, credible, evidence
 from .findings import Finding, Findings, Ranked, Suspect
 from .gram import Nuisance, block_folds, gram_table
 from .map_regression import Scored, regression, score
-from .most_likely import NORMAL_95, ridge
+from .most_likely import beyond, ridge, rise
 from .prior import NominalPrior
 from .refinement import Estimate, TrainingSet, nuisance_of, refit, weighted_rows
-
-SUSPECT = 4.0  # posterior standard deviations; among thirty coefficients chance gives it in 0.2 %
 
 
 @dataclass(frozen=True)
@@ -80,35 +78,22 @@ class Selection:
             own = {n: interval(values[n], s) for n, s in zip(names, std, strict=False) if n in values}
             seen, alike = self._evidence(p), credible(p.id, p.weights)
             together = seen._replace(bagged=p.weights[p.id] + sum(p.weights[i] for i in alike))
-            effects.append(
-                Finding(
-                    p.id,
-                    values,
-                    own | dict(p.intervals),
-                    np.nan,
-                    alike,
-                    sum(shares[: k + 1]),
-                    shares[k],
-                    nested[k],
-                    seen,
-                    set_evidence=together,
-                )
-            )
-        t = self.t
-        prior, believed = t.prior, any(self.t.prior.std.values())
-        moved = dict(zip(prior.mean, self.at.offset.tolist(), strict=True)) if believed else {}
-        return Findings(
-            effects,
-            self.ranked,
-            self.model if effects else self.at.start,
-            suspected(prior, self.at.offset, std[len(names) :]) if believed else [],
-            np.asarray(t.sigma),
-            self.at.without(self.at.values).model(prior) if believed and not effects else None,
-            moved,
-            self._fold_models(),
-            self.findings,
-            self.at,
-            prior,
+            q2, ci95 = sum(shares[: k + 1]), own | dict(p.intervals)
+            found = Finding(p.id, values, ci95, np.nan, alike, q2, shares[k], nested[k], seen)
+            effects.append(replace(found, set_evidence=together))
+        prior, sigma = self.t.prior, np.asarray(self.t.sigma)
+        model = self.model if effects else self.at.start
+        folds = self._fold_models()
+        found = Findings(
+            effects, self.ranked, model, [], sigma, None, {}, folds, self.findings, self.at, prior
+        )
+        if not any(prior.std.values()):
+            return found
+        return replace(
+            found,
+            suspects=suspected(prior, self.at.offset, std[len(names) :]),
+            refitted=None if effects else self.at.without(self.at.values).model(prior),
+            moved=dict(zip(prior.mean, self.at.offset.tolist(), strict=True)),
         )
 
     def _fold_models(self) -> list[Model]:
@@ -133,8 +118,7 @@ class Selection:
     def _nested(self) -> tuple[list[Model], list[float]]:
         """The models with each effect and those before it, and its share of the first model error.
 
-        That is the fall of the cross-validated sum of squares; before the first effect stands the model
-        that the search started from.
+        That is the fall of the cross-validated sum of squares, from the first model.
         """
         t, models, shares = self.t, [], []
         total = before = float(np.sum((self.lacking * t.weight) ** 2))
@@ -177,7 +161,8 @@ def laplace_std(t: TrainingSet, nuisance: Nuisance) -> np.ndarray:
 
 def interval(value: float, std: float) -> tuple[float, float]:
     """95 % interval."""
-    return value - NORMAL_95 * std, value + NORMAL_95 * std
+    half = std * float(np.sqrt(rise()))
+    return value - half, value + half
 
 
 def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray) -> list[Suspect]:
@@ -190,6 +175,6 @@ def suspected(prior: NominalPrior, offset: np.ndarray, std: np.ndarray) -> list[
     found = [
         Suspect(name, float(k), prior.mean[name] + believed * float(k))
         for (name, believed), k, s in zip(prior.std.items(), offset, std, strict=True)
-        if abs(k) > SUSPECT * s
+        if abs(k) > beyond(offset.size) * s
     ]
     return sorted(found, key=lambda s: -abs(s.z))

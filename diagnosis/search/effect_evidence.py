@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..predictors.uncertainty import NOISE_TOLERANCE
-
-CREDIBLE = 0.95  # probability of the set of ids that are told together, of the candidates'
+from .most_likely import LEVEL
 
 
 class Evidence(NamedTuple):
@@ -36,7 +35,7 @@ class Evidence(NamedTuple):
 
 
 def credible(own: str, weights: Mapping[str, float]) -> list[str]:
-    """The other ids of the smallest set that holds one and has the probability CREDIBLE.
+    """The other ids of the smallest set that holds one and has the probability LEVEL.
 
     Args:
         own: the id.
@@ -47,7 +46,7 @@ def credible(own: str, weights: Mapping[str, float]) -> list[str]:
     """
     others = sorted((i for i in weights if i != own), key=lambda i: -weights[i])
     before = weights[own] + np.cumsum([0.0, *(weights[i] for i in others)])
-    return [i for i, sum_so_far in zip(others, before, strict=False) if sum_so_far < CREDIBLE]
+    return [i for i, sum_so_far in zip(others, before, strict=False) if sum_so_far < LEVEL]
 
 
 def evidence(
@@ -60,7 +59,7 @@ def evidence(
         force: (K, 3), of the effect [N, N, N m].
         left: (K, 3), the model error with all that was found.
         std: (K, 3), its standard deviation by the noise of the measurement.
-        blocks: (K,), number of the block of each window.
+        blocks: (K, ...), which block each window is in.
     """
     std = NOISE_TOLERANCE * std
     own = np.sum(force**2, axis=0)
@@ -81,9 +80,9 @@ def variation(force: np.ndarray, left: np.ndarray, blocks: np.ndarray) -> float:
     Args:
         force: (K, 3), of the effect, in units of the noise.
         left: (K, 3), the model error with it, in the same units.
-        blocks: (K,), number of the block of each window.
+        blocks: (K, ...), which block each window is in.
     """
-    number = np.unique(blocks, return_inverse=True)[1]
+    number = np.unique(blocks, axis=0, return_inverse=True)[1].ravel()
     weight = np.bincount(number, np.sum(force**2, axis=1))
     product = np.bincount(number, np.sum(force * left, axis=1))
     used = weight > 0.0

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 # Prior standard deviations beyond which a coefficient alone is no explanation; contract.
 MOST_MOVED = 3.0
+MOST_REPORTED = 6  # effects, or disturbances, the clearest: with more, no one acts on the last; chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,28 +9,24 @@ One of two causes, alone, may well do harm where the other acts most: an effect 
 harms is kept on trial for one step, and stays if it and the next do no harm together.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from fmus.effects import Effect
-
+from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
 from ..predictors.weak_form import commanded
 from .conclusion import AcceptedEffect, Selection
-from .findings import Finding, Findings, Ranked
-from .gram import RUN
+from .findings import MOST_REPORTED, Finding, Findings, Ranked
 from .map_regression import Scored, first_share
+from .most_likely import STEPS
 from .nonlinear.profile import profiled
-from .nonlinear.waves import Waves, find_waves
+from .nonlinear.waves import find_waves
 from .prior import MEASURED, NominalPrior, Prior
 from .refinement import Estimate, TrainingSet, nuisance_of, refit
 from .shortlist import Ranking, Shortlist, rank, reweighted, scored_alone
 from .significance import better, beyond_chance, harmful, matters
-
-MOST_EFFECTS = 6  # chosen: with more, no one acts on the last
-ROUNDS = 2  # of searching all effects again, at the most; chosen
 
 
 class ForwardSelection:
@@ -39,67 +35,48 @@ class ForwardSelection:
     name = "selection"
 
     def fit(
-        self,
-        runs: Sequence[WeakWindows],
-        model: Model,
-        prior: Prior,
-        advance: Callable[[str], None],
-        seed: int,
+        self, runs: Sequence[WeakWindows], model: Model, prior: Prior, advance: Advance, seed: int
     ) -> Findings:
         """The effects that a model lacks, see :class:`.methods.Method`."""
         rng = np.random.default_rng(seed)
         done = search(runs, prior, model, advance, rng)
-        found = done.findings()
-        spectral = [e for e in model.ship.effects.values() if e.search.by == "spectrum"]
-        if not spectral:
-            return found
+        spectral = next((e for e in model.ship.effects.values() if e.search.by == "spectrum"), None)
+        if spectral is None:
+            return done.findings()
         advance("waves")
         for w in runs:  # the windows of a long run need room
             w.memory.clear()
         peak = find_waves([w.smoothed for w in runs], done.model, rng)
         if peak is None:
-            return found
-        waves, ranked = of_waves(spectral[0], peak, model), Ranked(spectral[0].id, 0.0, peak.share)
+            return done.findings()
+        # The model stays as it is.
+        values = {"wave_peak": peak.peak - model.value("wave_peak"), "wave_force": peak.force}
+        waves = Finding(spectral.id, values, {}, peak.confidence, [], peak.share, peak.share, model)
+        ranked = Ranked(waves.id, 0.0, peak.share)
 
-        def with_waves(with_them: Findings) -> Findings:
-            return replace(
-                with_them,
-                effects=[waves, *with_them.effects],
-                ranking=[ranked, *with_them.ranking],
-                refit=lambda ids: (
-                    with_waves(done.findings(ids)) if waves.id in ids else done.findings(ids)
-                ),
-            )
+        def with_waves(ids: Sequence[str] | None = None) -> Findings:
+            found = done.findings(ids)
+            if ids is not None and waves.id not in ids:
+                return found
+            effects, ranking = [waves, *found.effects], [ranked, *found.ranking]
+            return replace(found, effects=effects, ranking=ranking, refit=with_waves)
 
-        return with_waves(found)
+        return with_waves()
 
 
 def search(
-    data: Sequence[WeakWindows],
-    prior: Prior,
-    start: Model,
-    advance: Callable[[str], None],
-    rng: np.random.Generator,
+    data: Sequence[WeakWindows], prior: Prior, start: Model, advance: Advance, rng: np.random.Generator
 ) -> Selection:
-    """All effects that a regression finds.
-
-    Args:
-        data: windows of every training run.
-        prior: of the nominal coefficients, see :mod:`.prior`.
-        start: model to start from.
-        advance: receives the name of each step.
-        rng: for the bootstrap.
-    """
-    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(data)])
+    """All effects that a regression finds; arguments as of :class:`.methods.Method`."""
     belief = NominalPrior.of(start, prior, MEASURED)
-    t, at = TrainingSet(data, blocks, None, belief), Estimate.at(start, belief)
+    t, at = TrainingSet(data, None, belief), Estimate.at(start, belief)
     advance("every effect as a candidate")
     ranking = rank(t, at, set())
     lacking, command = ranking.base, commanded(data, start)
     ranked: list[Ranked] = []
     accepted: list[AcceptedEffect] = []
     before: tuple[TrainingSet, Estimate] | None = None  # an effect that is on trial
-    while len(accepted) < MOST_EFFECTS:
+    while len(accepted) < MOST_REPORTED:
         advance(f"effect {len(accepted) + 1}: the best candidates refined")
         weighed = reweighted(t, at, ranking)
         if weighed is None:
@@ -142,7 +119,7 @@ def searched_again(
     t: TrainingSet,
     at: Estimate,
     accepted: Sequence[AcceptedEffect],
-    advance: Callable[[str], None],
+    advance: Advance,
     rng: np.random.Generator,
 ) -> tuple[Estimate, list[AcceptedEffect]]:
     """Each effect but the last found is taken out, and its place searched again beside the others.
@@ -153,7 +130,7 @@ def searched_again(
     found = list(accepted)
     count = len(found) - 1
     due = [*range(count)]  # effects of which something beside them has changed
-    for _ in range(ROUNDS * count):
+    for _ in range(STEPS * count):
         if not due:
             break
         k = due.pop(0)
@@ -173,13 +150,7 @@ def searched_again(
 
 
 def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) -> AcceptedEffect:
-    """A candidate of a shortlist as an effect that was found.
-
-    Args:
-        best: the shortlist.
-        rng: for the bootstrap.
-        chosen: number of the candidate in its order.
-    """
+    """A candidate of a shortlist, by its place in the order, as an effect that was found."""
     first = best.scored[chosen].candidate
     shares = first_share(best.scored, rng).tolist()
     return AcceptedEffect(
@@ -191,13 +162,7 @@ def accepted_effect(best: Shortlist, rng: np.random.Generator, chosen: int = 0) 
 
 
 def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ranked]:
-    """Every candidate in order, those of the shortlist as refined.
-
-    Args:
-        ranking: all candidates.
-        best: the shortlist.
-        nothing: the score of the nominal coefficients alone.
-    """
+    """Every candidate in order, those of the shortlist as refined; ``nothing``: coefficients alone."""
     refined = [(best.ids[s.candidate], s) for s in best.scored]
     rest = [(ranking.candidates[s.candidate].effect.id, s) for s in ranking.order[len(refined) :]]
     in_order = sorted(refined + rest, key=lambda named: named[1].score)
@@ -205,15 +170,7 @@ def in_one_order(ranking: Ranking, best: Shortlist, nothing: Scored) -> list[Ran
 
     def ranked(name: str, s: Scored) -> Ranked:
         d, left = s.blocks - first.blocks, float(s.blocks.sum())
-        std = float(np.sqrt(d.size) * d.std())
-        return Ranked(
-            name, s.score, 1.0 - left / ranking.size, 1.0 - left / alone, s.score - first.score, std
-        )
+        q2, beyond, std = 1.0 - left / ranking.size, 1.0 - left / alone, np.sqrt(d.size) * d.std()
+        return Ranked(name, s.score, q2, beyond, s.score - first.score, float(std))
 
     return [ranked(name, s) for name, s in in_order]
-
-
-def of_waves(e: Effect, found: Waves, start: Model) -> Finding:
-    """Waves as a finding: the model stays as it is."""
-    values = {"wave_peak": found.peak - start.value("wave_peak"), "wave_force": found.force}
-    return Finding(e.id, values, {}, found.confidence, [], found.share, found.share, start)

@@ -14,17 +14,14 @@ import numpy as np
 
 from ..predictors import WeakWindows
 from ..predictors.weak_form import OVERLAP
-from .candidates import SLIGHT, Candidate
+from .candidates import SLIGHT, Candidate, Shape
 from .most_likely import ridge
 
-RUN = 10_000  # blocks of a run are numbered from this times its number on
 FOLDS = 8  # of cross-validation over blocks
 WHOLE_RUNS = 3  # runs, from which on whole ones are left out in turn; contract
-# Stretches of fewer runs that are left out in turn; of a single run each is as long as the shortest run
-# that can be learned from; chosen.
-STRETCHES = 4
-
-Key = tuple[int, int]
+# Parts that are left out in turn, at the least: stretches of fewer runs, of which each of a single run
+# is as long as the shortest that can be learned from; runs of a calibration; chosen.
+PARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +71,6 @@ class Entry(NamedTuple):
     nonlinear: int
 
 
-NOTHING: Key = (-1, 0)  # the key of no candidate at all
-
-
 @dataclass(frozen=True, eq=False)
 class GramTable:
     """All columns of one problem as Gram matrices, block by block.
@@ -85,7 +79,7 @@ class GramTable:
         grams: (blocks, p, p), in units of the noise; column 0 is the model error.
         rows: windows in each block.
         runs: number of each block's run.
-        entries: (candidate, shape) -> its columns.
+        entries: columns of each shape of each candidate, and last of no candidate at all.
         nuisance: indices of the nuisance parameters' columns.
         precision: (q, q), their prior precision.
         unit: (p,), what one unit of each column's parameter is at the size of the ship.
@@ -95,7 +89,7 @@ class GramTable:
     grams: np.ndarray
     rows: np.ndarray
     runs: np.ndarray
-    entries: dict[Key, Entry]
+    entries: list[list[Entry]]
     nuisance: list[int]
     precision: np.ndarray
     unit: np.ndarray
@@ -155,46 +149,44 @@ def gram_table(
 
     Args:
         y: (K, 3), model error [N, N, N m].
-        blocks: (K,), number of the block of each window.
+        blocks: (K, 2), run and block of each window, see :func:`block_numbers`.
         candidates: with their shapes.
         nuisance: parameters that are fitted along.
         sigma: (3,), standard deviation of the noise of each axis.
     """
-    columns, units = [y[:, :, None]], [np.ones(1)]
-    count = 1
-    entries = {NOTHING: Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)}
-    for i, c in enumerate(candidates):
-        for j, s in enumerate(c.shapes):
-            given = -1
-            if s.offset is not None:
-                columns.append(s.offset[:, :, None])
-                units.append(np.ones(1))
-                given = count
-                count += 1
-            columns.append(s.columns)
-            units.append(s.unit)
-            size = len(s.fitted)
-            entries[i, j] = Entry(
-                given,
-                list(range(count, count + size)),
-                np.array([s.given.get(n, 0.0) for n in s.fitted]),
-                np.zeros((size, size)) if s.precision is None else s.precision,
-                nuisance.offset if s.nuisance_offset is None else s.nuisance_offset,
-                len(set(s.given) - set(s.fitted)),
-            )
-            count += size
-    columns.append(nuisance.columns)
-    units.append(nuisance.unit)
-    indices = list(range(count, count + nuisance.columns.shape[2]))
+    columns, units, count = [], [], 0
+
+    def added(force: np.ndarray, unit: np.ndarray) -> list[int]:
+        """Indices of further columns."""
+        nonlocal count
+        columns.append(force)
+        units.append(unit)
+        count += unit.size
+        return list(range(count - unit.size, count))
+
+    def entry(s: Shape) -> Entry:
+        given = -1 if s.offset is None else added(s.offset[:, :, None], np.ones(1))[0]
+        start = np.array([s.given.get(n, 0.0) for n in s.fitted])
+        precision = np.zeros((start.size, start.size)) if s.precision is None else s.precision
+        offset = nuisance.offset if s.nuisance_offset is None else s.nuisance_offset
+        nonlinear = len(set(s.given) - set(s.fitted))
+        return Entry(given, added(s.columns, s.unit), start, precision, offset, nonlinear)
+
+    added(y[:, :, None], np.ones(1))
+    entries = [[entry(s) for s in c.shapes] for c in candidates]
+    entries.append([Entry(-1, [], np.zeros(0), np.zeros((0, 0)), nuisance.offset, 0)])
+    indices = added(nuisance.columns, nuisance.unit)
     A = np.concatenate(columns, axis=2) / sigma[:, None] / np.sqrt(OVERLAP)
-    names = np.unique(blocks)
-    grams = np.empty((names.size, A.shape[2], A.shape[2]))
-    for k, name in enumerate(names):
-        part = A[blocks == name].reshape(-1, A.shape[2])
-        grams[k] = part.T @ part
-    rows = np.array([(blocks == name).sum() for name in names])
-    runs, unit = names // RUN, np.concatenate(units)
-    return GramTable(grams, rows, runs, entries, indices, nuisance.precision, unit, sigma)
+    names, number, rows = np.unique(blocks, axis=0, return_inverse=True, return_counts=True)
+    parts = [A[number.ravel() == k].reshape(-1, A.shape[2]) for k in range(rows.size)]
+    grams, unit = np.stack([part.T @ part for part in parts]), np.concatenate(units)
+    return GramTable(grams, rows, names[:, 0], entries, indices, nuisance.precision, unit, sigma)
+
+
+def block_numbers(data: Sequence[WeakWindows]) -> np.ndarray:
+    """(K, 2), number of the run, and of the block in it, of each window of some runs."""
+    runs = np.repeat(np.arange(len(data)), [w.block.size for w in data])
+    return np.column_stack([runs, np.concatenate([w.block for w in data])])
 
 
 def run_folds(data: Sequence[WeakWindows]) -> list[tuple[int, np.ndarray]]:
@@ -207,7 +199,7 @@ def run_folds(data: Sequence[WeakWindows]) -> list[tuple[int, np.ndarray]]:
         For each fold the number of a run and the numbers of its blocks: all of them where there are
         WHOLE_RUNS or more runs, else those of a stretch of time.
     """
-    stretches = 1 if len(data) >= WHOLE_RUNS else -(-STRETCHES // len(data))
+    stretches = 1 if len(data) >= WHOLE_RUNS else -(-PARTS // len(data))
     counts = [np.unique(w.block).size for w in data]
     return [
         (run, blocks)

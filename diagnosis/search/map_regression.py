@@ -20,7 +20,7 @@ from scipy.linalg import block_diag
 
 from .candidates import SLIGHT
 from .gram import Folds, GramTable
-from .most_likely import RIDGE, ridge
+from .most_likely import ROUNDING, ridge
 
 REPLICATES = 200  # of the block bootstrap: the standard error of a share is 3.5 % at the most
 
@@ -74,7 +74,7 @@ class Regression(NamedTuple):
         """The maximum a posteriori fits to data with Gram matrices (..., p, p)."""
         H = gram[..., self.use[:, None], self.use] + self.precision
         diagonal = np.einsum("...ii->...i", H)
-        diagonal += RIDGE * (diagonal + self.unit**-2.0)
+        diagonal += ROUNDING * (diagonal + self.unit**-2.0)
         given = np.flatnonzero(self.target)
         right = gram[..., self.use[:, None], given] @ self.target[given] - self.precision @ self.offset
         beta = np.linalg.solve(H, right[..., None])[..., 0]
@@ -97,7 +97,7 @@ class Regression(NamedTuple):
 
 def regression(t: GramTable, candidate: int, shape: int) -> Regression:
     """A candidate's shape as a regression; candidate -1 is none at all."""
-    entry = t.entries[candidate, shape]
+    entry = t.entries[candidate][shape]
     target = np.zeros(t.grams.shape[1])
     target[0] = 1.0
     if entry.given >= 0:

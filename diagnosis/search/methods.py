@@ -1,6 +1,6 @@
 """Methods of identification behind one interface, and the table of those that there are."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from cosim import InputError
 from cosim.errors import nearest
 
+from ..execution.progress import Advance
 from ..execution.user_files import from_file
 
 if TYPE_CHECKING:
@@ -37,12 +38,7 @@ class Method(Protocol):
     name: str
 
     def fit(
-        self,
-        runs: "Sequence[WeakWindows]",
-        model: "Model",
-        prior: "Prior",
-        advance: Callable[[str], None],
-        seed: int,
+        self, runs: "Sequence[WeakWindows]", model: "Model", prior: "Prior", advance: Advance, seed: int
     ) -> "Findings":
         """The effects that a model lacks.
 
@@ -88,7 +84,7 @@ def method(name: str = DEFAULT) -> Method:
         return getattr(import_module(f".{module}", __package__), made)()
     except ModuleNotFoundError as error:
         library = (error.name or "a library").partition(".")[0]
-        raise InputError(f"method '{name}' needs {library}: pip install 'cybership[hidden]'") from None
+        raise InputError(f"method '{name}' needs {library}: pip install 'cybership[analysis]'") from None
 
 
 def _from_file(path: Path) -> Method:

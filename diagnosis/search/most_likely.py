@@ -13,11 +13,13 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-STEPS = 6  # of whatever is iterated, at the most; two or three are usual
+from ..predictors.evaluation import quantile
+
+STEPS = 6  # of whatever is iterated, and halvings of a step, at the most; two or three are usual
 ENOUGH = 0.02  # of cost: where a step promises less, parameters are within a seventh of their deviation
-NORMAL_95 = 1.96  # standard deviations, of a normal distribution within which 95 % lie
-HALVINGS = (1.0, 0.5, 0.25)  # of a step
-RIDGE = 1e-9  # relative, far above rounding: collinear parameters share what they explain
+LEVEL = 0.95  # probability of the intervals of values, and of the sets of ids; contract
+CHANCE = 0.01  # of a report where there is nothing, in all places that are looked at; as of a remainder
+ROUNDING = np.sqrt(np.finfo(float).eps)  # relative, far above that of a sum: collinear parameters share
 
 At = TypeVar("At")
 
@@ -40,9 +42,19 @@ class Quadratic(Generic[At]):
 About = TypeVar("About", bound=Quadratic[Any])
 
 
+def rise() -> float:
+    """How far the cost of one value rises from its least to the ends of its interval (chi-square)."""
+    return quantile(LEVEL, 1)
+
+
+def beyond(places: int) -> float:
+    """Standard deviations beyond which one of some normal values is by CHANCE (Bonferroni)."""
+    return float(np.sqrt(quantile(1.0 - CHANCE / max(places, 1), 1)))
+
+
 def ridge(H: np.ndarray, unit: np.ndarray | float = 1.0) -> np.ndarray:
     """(p, p), what makes an information matrix regular, for parameters with units (p,)."""
-    return RIDGE * np.diag(np.diag(H) + np.power(unit, -2.0))
+    return ROUNDING * np.diag(np.diag(H) + np.power(unit, -2.0))
 
 
 def most_likely(
@@ -61,7 +73,7 @@ def most_likely(
         if here.right @ step < ENOUGH:
             break
         least = here.cost(at)
-        tried = (moved(at, share * step) for share in HALVINGS)
+        tried = (moved(at, step / 2**k) for k in range(STEPS))
         further = next((t for t in tried if here.cost(t) < least), None)
         if further is None:
             break

@@ -9,7 +9,7 @@ effects alone. Neither method has a prior on the nominal coefficients or a confi
 
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,29 +18,27 @@ from sklearn.model_selection import GroupKFold
 
 from cosim import InputError
 
+from ..execution.progress import Advance
 from ..predictors import Model, WeakWindows
-from .candidates import SLIGHT, Candidate, Shape, candidates, model_error
+from .candidates import Candidate, Shape, candidates, model_error
 from .findings import Finding, Findings, Ranked
-from .gram import FOLDS, RUN
-from .nonlinear.multistart import NOTHING
+from .gram import FOLDS, block_numbers
+from .most_likely import ROUNDING
 from .prior import Prior
 
 THRESHOLDS = (0.03, 0.1, 0.3)  # of standardised coefficients, from nearly all to only the largest
 COMPONENTS = (1, 2, 3, 5, 8)  # latent variables to try; chosen
-RIDGE = 1e-3  # of STLSQ; columns of n rows have a sum of squares of n, so it only breaks ties
 
 
 class Features(NamedTuple):
     """Standardised regressors of all candidates.
 
     Attributes:
-        columns: (3 K, p).
-        scale: (p,), what they were divided by.
+        columns, scale: (3 K, p) and (p,), regressors, and what they were divided by.
         owner: (p,), number of the candidate of each.
         parameters: (p,), name of the parameter of each; empty for what a shape gives.
         chosen: candidate -> the shape that stands for it.
-        target: (3 K,), standardised model error, and what it was divided by.
-        target_scale: what that was divided by.
+        target, target_scale: (3 K,), standardised model error, and what it was divided by.
         blocks: (3 K,), number of the block of each row.
         sigma: (3,), weights' inverse [N, N, N m].
     """
@@ -63,22 +61,24 @@ def features(data: Sequence[WeakWindows], model: Model) -> Features:
     sigma = np.diag(model.reference_mass) * np.mean([w.smoothed.noise for w in data], axis=0)
     sigma = sigma / sigma[0]
     target = (base / sigma).reshape(-1)
-    chosen = []
-    columns, units = [], []
+    chosen, columns, units = [], [], []
     names: list[str] = []
     for c in candidates(data, model, base):
         stacked = [_stacked(s, sigma) for s in c.shapes]
-        best = int(np.argmax([_alone(x[:, 0], target) for x in stacked]))
-        chosen.append((c, c.shapes[best]))
+        norms = [max(float(np.linalg.norm(x[:, 0])), np.finfo(float).tiny) for x in stacked]
+        explained = [abs(x[:, 0] @ target) / norm for x, norm in zip(stacked, norms, strict=True)]
+        best = int(np.argmax(explained))
+        shape = c.shapes[best]
+        chosen.append((c, shape))
         columns.append(stacked[best])
-        given = [""] if c.shapes[best].offset is not None else []
-        names += [*given, *c.shapes[best].fitted]
-        units.append(np.concatenate([np.ones(len(given)), c.shapes[best].unit]))
+        given = [] if shape.offset is None else [""]
+        names += [*given, *shape.fitted]
+        units.append(np.concatenate([np.ones(len(given)), shape.unit]))
     owner = np.repeat(np.arange(len(columns)), [x.shape[1] for x in columns])
     A = np.concatenate(columns, axis=1)
     scale, size = A.std(axis=0), float(target.std())
-    live = scale * np.concatenate(units) > NOTHING * size
-    blocks = np.repeat(np.concatenate([RUN * k + w.block for k, w in enumerate(data)]), 3)
+    live = scale * np.concatenate(units) > ROUNDING * size
+    blocks = np.repeat(np.unique(block_numbers(data), axis=0, return_inverse=True)[1].ravel(), 3)
     used = [n for n, keep in zip(names, live, strict=True) if keep]
     standard = A[:, live] / scale[live]
     return Features(standard, scale[live], owner[live], used, chosen, target / size, size, blocks, sigma)
@@ -89,11 +89,6 @@ def _stacked(shape: Shape, sigma: np.ndarray) -> np.ndarray:
     given = [] if shape.offset is None else [shape.offset[:, :, None]]
     stacked = np.concatenate([*given, shape.columns], axis=2) / sigma[:, None]
     return stacked.reshape(-1, stacked.shape[2])
-
-
-def _alone(column: np.ndarray, target: np.ndarray) -> float:
-    """How much of the target a column explains by itself."""
-    return abs(float(column @ target)) / max(float(np.linalg.norm(column)), SLIGHT)
 
 
 class Peer(ABC):
@@ -114,12 +109,7 @@ class Peer(ABC):
         """Coefficients (p,) of standardised regressors (n, p) for a target (n,)."""
 
     def fit(
-        self,
-        runs: Sequence[WeakWindows],
-        model: Model,
-        prior: Prior,
-        advance: Callable[[str], None],
-        seed: int,
+        self, runs: Sequence[WeakWindows], model: Model, prior: Prior, advance: Advance, seed: int
     ) -> Findings:
         """The effects that a model lacks, see :class:`.methods.Method`; prior and seed are not used."""
         advance("every effect as a candidate")
@@ -133,19 +123,17 @@ class Peer(ABC):
         np.maximum.at(size, f.owner, np.abs(beta))
         order = [int(k) for k in np.argsort(-size, kind="stable")]
         everything = np.ones(f.owner.size, bool)
-        ranking = [
-            Ranked(f.chosen[k][0].effect.id, -float(size[k]), q2(f, [k], everything)) for k in order
-        ]
+        ids = [c.effect.id for c, _ in f.chosen]
+        ranking = [Ranked(ids[k], -float(size[k]), q2(f, [k], everything)) for k in order]
         accepted = [k for k in order if size[k] > 0.0][: 1 if self.only_first else None]
         used = everything if self.only_first else beta != 0.0
         values = parameters(f, accepted, used)
         found: list[Finding] = []
         before = 0.0
         for n, k in enumerate(accepted, 1):
-            model, explained = model.plus(values[k]), q2(f, accepted[:n], used)
-            effect, share = f.chosen[k][0].effect, explained - before
-            found.append(Finding(effect.id, values[k], {}, np.nan, [], explained, share, model))
-            before = explained
+            model, q = model.plus(values[k]), q2(f, accepted[:n], used)
+            found.append(Finding(ids[k], values[k], {}, np.nan, [], q, q - before, model))
+            before = q
         return Findings(found, ranking, model, [], f.sigma)
 
     def _cross_validated(self, f: Features) -> np.ndarray:
@@ -166,16 +154,9 @@ def folds(f: Features) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def problem(f: Features, effects: Sequence[int], used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least-squares problem of some candidates.
+    """Columns to fit of some candidates, among those that are used (p,), and what they are to explain.
 
-    Args:
-        f: all regressors.
-        effects: numbers of the candidates.
-        used: (p,), columns that may be fitted.
-
-    Returns:
-        Indices of the fitted columns, and what they are to explain (3 K,): the target less the force
-        that the shapes give.
+    That is the target (3 K,) less the force that the shapes give.
     """
     of_these = np.isin(f.owner, effects)
     is_fitted = np.array([bool(name) for name in f.parameters])
@@ -235,5 +216,4 @@ class SparseRegression(Peer):
     def coefficients(self, A: np.ndarray, y: np.ndarray, setting: float) -> np.ndarray:
         """See :class:`Peer`."""
         q, r = np.linalg.qr(A)  # the same least squares with fewer rows
-        optimizer = self.optimizer(threshold=setting, alpha=RIDGE)
-        return np.ravel(optimizer.fit(r, (q.T @ y)[:, None]).coef_)
+        return np.ravel(self.optimizer(threshold=setting).fit(r, (q.T @ y)[:, None]).coef_)

@@ -86,8 +86,5 @@ class NominalPrior:
 
     def changes(self, offset: np.ndarray) -> dict[str, float]:
         """Additions to the coefficients, SI, for offsets (size,) in standard deviations."""
-        return {
-            name: std * float(k)
-            for (name, std), k in zip(self.std.items(), offset, strict=True)
-            if k != 0.0
-        }
+        pairs = zip(self.std.items(), offset.tolist(), strict=True)
+        return {name: std * k for (name, std), k in pairs if k != 0.0}

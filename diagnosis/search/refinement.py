@@ -19,13 +19,12 @@ from ..predictors import Model, WeakWindows
 from ..predictors.ship_model import parameter_and_run
 from ..predictors.weak_form import OVERLAP
 from .candidates import SMALL, Shape, model_error
-from .gram import Nuisance
+from .gram import Nuisance, block_numbers
 from .most_likely import ENOUGH, STEPS, Quadratic, most_likely, ridge
+from .nonlinear.multistart import limits
 from .nonlinear.segmentation import likely, problem, segmented
 from .prior import NominalPrior
 
-# Of a parameter, in its unit at the size of the ship: the step of its finite difference is scaled by it.
-SMALLEST_SCALE = 1e-2
 NEAR_LIMIT = 0.05  # of a limit of a parameter's range, within which a value is at it; contract
 
 
@@ -35,15 +34,18 @@ class TrainingSet:
 
     Attributes:
         data: windows of every run.
-        blocks: (K,), number of the block of each window.
         sigma: (3,), noise of each axis [N, N, N m]; None as long as it is not known.
         prior: of the nominal coefficients.
     """
 
     data: Sequence[WeakWindows]
-    blocks: np.ndarray
     sigma: np.ndarray | None
     prior: NominalPrior
+
+    @cached_property
+    def blocks(self) -> np.ndarray:
+        """(K, 2), run and block of each window."""
+        return block_numbers(self.data)
 
     @property
     def weight(self) -> np.ndarray:
@@ -119,9 +121,7 @@ def timed(ship: Ship, name: str) -> Effect | None:
 
 def bounded(start: Model, name: str, addition: float) -> float:
     """An addition to a parameter of a model, with which it stays within its range."""
-    limits, present = start.declared(name).range, start.value(name)
-    low = -np.inf if limits.min is None else limits.min
-    high = np.inf if limits.max is None else limits.max
+    (low, high), present = limits(start.declared(name)), start.value(name)
     return min(max(addition, low - present), high - present)
 
 
@@ -134,25 +134,22 @@ def at_limit(start: Model, effect: str, additions: Mapping[str, float]) -> list[
         return []
 
     def at(name: str) -> bool:
-        limits, value = start.declared(name).range, start.value(name) + additions[name]
-        return any(end and abs(value - end) <= NEAR_LIMIT * abs(end) for end in (limits.min, limits.max))
+        ends, value = limits(start.declared(name)), start.value(name) + additions[name]
+        return any(0.0 < abs(x) < np.inf and abs(value - x) <= NEAR_LIMIT * abs(x) for x in ends)
 
     return [name for name in additions if at(name)]
 
 
 def slope(t: TrainingSet, model: Model, left: np.ndarray, name: str, scale: float) -> np.ndarray:
     """Force (K, 3) that the model gains by one unit of a parameter."""
-    small = SMALL * max(abs(scale), SMALLEST_SCALE * model.unit(name))
+    small = SMALL * max(abs(scale), SMALL * model.unit(name))
     return (left - model_error(t.data, model.plus({name: small}))) / small
 
 
 def nuisance_of(t: TrainingSet, at: Estimate, base: np.ndarray) -> Nuisance:
-    """What is fitted nuisance with every candidate: effects found before, and nominal coefficients.
+    """What is fitted along with every candidate: effects found before, and nominal coefficients.
 
-    Args:
-        t: what is fitted to.
-        at: the model so far.
-        base: its model error (K, 3).
+    ``base`` is the model error (K, 3) of the model so far.
     """
     model = at.model(t.prior)
     fitted = at.fitted
@@ -205,14 +202,7 @@ class Refined:
 
 
 def refine(t: TrainingSet, at: Estimate, nuisance: Nuisance, start: Start) -> Refined:
-    """A candidate, the effects found before and the nominal coefficients at their most likely values.
-
-    Args:
-        t: what is fitted to.
-        at: the model so far.
-        nuisance: nuisance parameters, from :func:`nuisance`.
-        start: of the new effect.
-    """
+    """A candidate, from a start, and what is fitted along with it at their most likely values."""
     e = next((e for n in start.values if (e := timed(at.start.ship, n))), None)
     if e is None:
         return Refinement(t, at, nuisance, start).solved()
@@ -253,6 +243,10 @@ class Refinement:
         """The candidate as it begins."""
         return self._evaluated(self.at.plus(self.start.values, np.zeros(self.t.prior.size)))
 
+    def rows(self, columns: np.ndarray) -> np.ndarray:
+        """(3 K, q), what one unit of everything explains by slopes (K, 3, p), in units of noise."""
+        return weighted_rows(np.concatenate([columns, self.nuisance.columns], axis=2), self.t.weight)
+
     def moved(self, r: Refined, step: np.ndarray) -> Refined:
         """An estimate after a step (q,), effects within their range."""
         names = [*self.start.fitted, *self.at.fitted]
@@ -263,14 +257,6 @@ class Refinement:
         left, x = self.t.error(estimate), self.theta(estimate)
         cost = float(((left * self.t.weight) ** 2).sum() + x @ self.precision @ x)
         return Refined(estimate, left, np.zeros((*left.shape, 0)), cost)
-
-    def rows(self, columns: np.ndarray) -> np.ndarray:
-        """(3 K, q), what one unit of everything takes away, in units of the noise.
-
-        Args:
-            columns: (K, 3, p), slopes of the candidate.
-        """
-        return weighted_rows(np.concatenate([columns, self.nuisance.columns], axis=2), self.t.weight)
 
     def about(self, r: Refined) -> Sloped:
         """The cost about an estimate."""

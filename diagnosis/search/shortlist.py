@@ -21,8 +21,9 @@ from .refinement import Estimate, Refined, Start, TrainingSet, as_shape, nuisanc
 
 LENGTH = 8  # of the shortlist
 CHANGED = 1.5  # ratio of an axis' weight from which on candidates are refined anew
-# Signal to noise, a sum of squares, that a candidate beside those found must be able to have of its
-# own: as much as its score must fall to be accepted.
+# Least fall of the score, which is twice a log likelihood ratio, and so the signal to noise, a sum of
+# squares, that a candidate beside those found must be able to have of its own. Chance does not give it
+# among some fifty candidates (2 log 50 = 7.8).
 NEW = 10.0
 TIE = 2.0  # paired standard errors within which two candidates are alike
 
@@ -64,11 +65,7 @@ def rank(t: TrainingSet, at: Estimate, known: Set[str]) -> Ranking:
 
 
 def weighted(
-    t: TrainingSet,
-    sigma: np.ndarray,
-    base: np.ndarray,
-    nuisance: Nuisance,
-    found: Sequence[Candidate],
+    t: TrainingSet, sigma: np.ndarray, base: np.ndarray, nuisance: Nuisance, found: Sequence[Candidate]
 ) -> Ranking:
     """Score candidates with an error counted in units of sigma (3,) [N, N, N m]."""
     table = gram_table(base, t.blocks, found, nuisance, sigma)
@@ -90,14 +87,10 @@ def novelty(t: GramTable, candidate: int, free: int) -> float:
     """Share of a linear candidate's force that what was found cannot give, set freely; else 1.
 
     Times the sum of squares of the model error, in units of the noise, it is the signal that a
-    candidate as large as that error has of its own.
-
-    Args:
-        t: the table it stands in.
-        candidate: its number.
-        free: how many of the nuisance parameters, the first, are of effects that were found.
+    candidate as large as that error has of its own. The first ``free`` nuisance parameters are those of
+    effects that were found.
     """
-    entry = t.entries[candidate, 0]
+    entry = t.entries[candidate][0]
     mine = entry.columns
     if free == 0 or entry.given >= 0 or not mine:
         return 1.0
@@ -168,9 +161,6 @@ def reweighted(
     all axes (the geometric mean of theirs): that an axis lacks something that lasts is no reason to
     believe the others more. On no axis does it count more than the error before, which a wrong winner
     may have made larger. None: weighed so, no candidate has a signal, and nothing can be told.
-
-    Args:
-        t, at, ranking: all candidates beside a model.
     """
     least = ranking.table.sigma
     t = replace(t, sigma=least)
@@ -199,7 +189,7 @@ def start(at: Estimate, ranking: Ranking, best: Scored) -> Start:
     shape = ranking.candidates[best.candidate].shapes[best.shape]
     mine = regression(ranking.table, best.candidate, best.shape)
     beta = dict(zip(mine.use.tolist(), mine.fitted(ranking.table.total).beta, strict=False))
-    columns = ranking.table.entries[best.candidate, best.shape].columns
+    columns = ranking.table.entries[best.candidate][best.shape].columns
     found = {n: float(beta[k]) for n, k in zip(shape.fitted, columns, strict=True) if k in beta}
     values = {n: shape.given.get(n, 0.0) + found.get(n, 0.0) for n in (*shape.given, *found)}
     fitted = [n for n in values if timed(at.start.ship, n) is None]

@@ -5,12 +5,10 @@ import numpy as np
 from fmus.ship import Ship
 
 from ..predictors.uncertainty import SHARE_OF_COMMAND
+from .candidates import LEAST_SHARE
 from .map_regression import Scored
 from .shortlist import NEW, TIE, Shortlist
 
-# Of acceptance: fall of the score, which is twice a log likelihood ratio. Chance does not give 10 among
-# some fifty candidates (2 log 50 = 7.8), and what is less than 0.3 % of the error changes no prediction.
-LEAST_FALL, LEAST_SHARE = NEW, 0.003
 LEAST_Q2 = 0.05  # cross-validated share of the model error that must be explained; chosen
 # Share of some axis' first sum of squares that must go with an effect: less shows in no prediction.
 LEAST_OF_AXIS = 0.02
@@ -19,14 +17,11 @@ LEAST_OF_AXIS = 0.02
 def beyond_chance(nothing: Scored, best: Scored, total: float) -> bool:
     """Whether a candidate explains more than chance does, by cross-validation over blocks.
 
-    Args:
-        nothing: the score without it.
-        best: its own.
-        total: sum of squares of the first model error, in units of the noise.
+    ``nothing`` is the score without it, ``total`` the first model error in units of the noise, squared.
     """
     fall = nothing.score - best.score
     explains = float(best.blocks.sum()) < (1.0 - LEAST_Q2) * total
-    return explains and fall > max(LEAST_SHARE * nothing.score, LEAST_FALL)
+    return explains and fall > max(LEAST_SHARE * nothing.score, NEW)
 
 
 def harmful(nothing: Scored, best: Scored) -> bool:
@@ -85,15 +80,10 @@ def matters(first: np.ndarray, without: np.ndarray, left: np.ndarray, command: n
 
 
 def better(present: str, best: Shortlist, ship: Ship) -> int | None:
-    """Number of the candidate of a shortlist that takes an effect's place; None: none does.
+    """Number of the candidate of a shortlist that takes the present effect's place; None: none does.
 
     A simple law goes before a free curve that is no better than two paired standard errors; else a
     candidate must be better than the present effect by as much as an effect must bring.
-
-    Args:
-        present: id of the effect that has the place.
-        best: candidates for the place, the present one mostly among them.
-        ship: whose effects they are.
     """
     scored = best.scored
     ids = [best.ids[s.candidate] for s in scored]
@@ -107,7 +97,7 @@ def better(present: str, best: Shortlist, ship: Ship) -> int | None:
     if present in ids:
         at = ids.index(present)
         simpler = smooth[at] and not smooth[chosen]
-        if not simpler and scored[at].score < scored[chosen].score + LEAST_FALL:
+        if not simpler and scored[at].score < scored[chosen].score + NEW:
             return None
     return chosen
 

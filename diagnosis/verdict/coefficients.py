@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ..predictors import Model
 from ..search.findings import Finding, Findings
+from ..search.gram import PARTS
 from ..search.prediction_fit.coefficient_calibration import Calibrator
 from ..search.prediction_fit.refit import Outcome
 from ..search.prior import NominalPrior
@@ -13,8 +14,6 @@ from .confidence import confidence_of
 from .paired_errors import gain, harm, harms
 from .pruning import without
 from .validation_data import ValidationData
-
-FEWEST = 4  # runs, from which on constants of each are told from coefficients; chosen
 
 
 class Conclusion(NamedTuple):
@@ -76,7 +75,7 @@ def calibrated(found: Findings, data: ValidationData, prior: NominalPrior) -> Ou
         prior: of the nominal coefficients.
     """
     train, start = data.train, data.start
-    if len(train) < FEWEST or not any(prior.std.values()):
+    if len(train) < PARTS or not any(prior.std.values()):
         return None
     runs = ValidationData(train, [], start, found.sigma)
     calibrator = Calibrator(found, train, start, prior)

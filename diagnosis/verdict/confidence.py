@@ -21,13 +21,10 @@ from ..search.refinement import at_limit
 # than its reliability diagram shows. These are first values, chosen: 0.99 without any doubt, one half
 # where a third of what the effect explains is left, or its size varies by as much.
 SURE = 4.6
-PER_LEFT = 14.0
-PER_VARIATION = 14.0
-# Confidence from which on an effect is found; and of its set from which on the set is a finding, else it
-# is a possibility; contract.
-FOUND, BELIEVED = 0.8, 0.5
-# Confidence at the most where an alternative is as likely as the effect: even odds, as long as the
-# alternative is not known.
+PER_DOUBT = 14.0
+FOUND = 0.8  # confidence from which on an effect is found; contract
+# Confidence at the most where an unknown alternative is as likely as the effect; that of a set of
+# effects from which on the set is a finding, and not only a possibility; contract.
 EVEN_ODDS = 0.5
 AT_LIMIT = "{0} is at the limit of what was looked for"
 MAY_BE_NONE = "by the interval of its value it may be nothing"
@@ -53,12 +50,12 @@ class Confidence(NamedTuple):
     @property
     def is_finding(self) -> bool:
         """Whether this is a finding, and not only a possibility; one without confidence is a finding."""
-        return not self.of_set < BELIEVED
+        return not self.of_set < EVEN_ODDS
 
 
 def probability(e: Evidence) -> float:
     """Probability that an effect with this evidence is a true cause."""
-    a_candidate_is_right = expit(SURE - PER_LEFT * e.left - PER_VARIATION * e.varies)
+    a_candidate_is_right = expit(SURE - PER_DOUBT * (e.left + e.varies))
     return float(e.bagged * a_candidate_is_right)
 
 

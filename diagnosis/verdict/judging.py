@@ -126,25 +126,18 @@ def judge(
     refitted = refitted or (changed and not left)
     if calibrates and not any_finding(fit.findings, start):
         advance("calibration")
-        alone = calibrated(fit.findings, data, prior)
-        if alone is not None:
-            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, alone
+        calibration = calibrated(fit.findings, data, prior)
+        if calibration is not None:
+            dropped, refitted, changed, fit = [*dropped, *fit.findings.effects], True, True, calibration
     advance("residual")
     # What fails at times of its own in a validation run says nothing of what was learned of others.
     judged = train if fit.findings.model.runs else data.runs
     remainder = remainder_of(judged, start, fit.findings, changed)
     learned = with_confidence(fit.findings, remainder, start)
-    return Verdict(
-        learned,
-        withdrawn,
-        remainder,
-        refitted,
-        dropped,
-        shares(learned, start, data.validate),
-        unique_shares(learned, start, train, data.validate),
-        fit.posterior,
-        fit.unrecorded,
-    )
+    explained = shares(learned, start, data.validate)
+    alone = unique_shares(learned, start, train, data.validate)
+    known, force = fit.posterior, fit.unrecorded
+    return Verdict(learned, withdrawn, remainder, refitted, dropped, explained, alone, known, force)
 
 
 def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Findings:
@@ -167,13 +160,9 @@ def with_confidence(found: Findings, remainder: Remainder, start: Model) -> Find
 def remainder_of(
     runs: Sequence[WeakWindows], start: Model, learned: Findings, changed: bool
 ) -> Remainder:
-    """What the learned model leaves, in numbers and words.
+    """What the learned model leaves in the runs that decide, in numbers and words.
 
-    Args:
-        runs: that decide.
-        start: the initial model.
-        learned: the findings.
-        changed: whether the learned model differs from the initial one.
+    ``changed`` says whether that model differs from the initial one.
     """
     model = learned.model if changed else start
     axes, left = remaining(runs, start, model), [omega(w, model) for w in runs]

@@ -17,12 +17,8 @@ def harm(its: Losses, others: Losses, more: int = 0) -> str:
     Where it predicts positions better and headings worse by as much, or the reverse, the relative
     changes of both mean squares count together.
 
-    Args:
-        its, others: losses of both models on the data that decide.
-        more: number of parameters that the first has in addition; not used, as the data were not fitted.
-
-    Returns:
-        Part of a sentence, with ``{where}`` in place of the data; empty: in none.
+    Arguments and result are those of :class:`.pruning_criteria.Harm`; ``more`` is not used, as the data
+    were not fitted.
     """
     if worse(its.omega, others.omega):
         return FITS

@@ -58,7 +58,8 @@ def prune(
     kept, left = found, judged
     while left:
         rests = {i: without(found, [*(w.id for w in gone), i], start) for i in left}
-        on = {i for i, rest in rests.items() if drives(kept.model, _model(rest, start))}
+        models = {i: rest.model if rest.effects else start for i, rest in rests.items()}
+        on = {i for i, model in models.items() if drives(kept.model, model)}
         worst = _at_limit(kept, left, start) or _worst(kept, rests, data, on, harm, sizes)
         if worst is None:
             break
@@ -114,13 +115,8 @@ def _worst(
 ) -> Withdrawn | None:
     """The effect without which the data that decide gain the most, of those to reject; None: none is.
 
-    Args:
-        kept: the findings.
-        rests: effect -> the findings without it.
-        data: the data that decide.
-        drive: effects with which the hull drives the ship on.
-        harm: the criterion.
-        sizes: effect -> number of its parameters.
+    Of each effect ``rests`` has the findings without it, ``sizes`` the number of its parameters; with
+    those of ``drive`` the hull drives the ship on.
     """
     others = [_alternative(rest, kept, data.start) for rest in rests.values()]
     full, *losses = data.losses(kept, *others)
@@ -134,10 +130,6 @@ def _worst(
             continue
         found.append((gain(full, other), Withdrawn(i, reason)))
     return max(found)[1] if found else None
-
-
-def _model(found: Findings, start: Model) -> Model:
-    return found.model if found.effects else start
 
 
 def without(found: Findings, ids: Sequence[str], start: Model) -> Findings:

@@ -13,10 +13,6 @@ def _squares(runs: Sequence[WeakWindows], model: Model, sigma: np.ndarray) -> fl
     return sum(float(np.sum((omega(w, model) / sigma) ** 2)) for w in runs)
 
 
-def _within(share: float) -> float:
-    return min(1.0, max(0.0, share))
-
-
 def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> list[float]:
     """Share of the initial sum of squares that each finding explains.
 
@@ -24,8 +20,7 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
     of cross-validation.
 
     Args:
-        learned: the findings and the model with them.
-        start: the initial model.
+        learned, start: the findings and the model with them, and the initial model.
         validate: validation runs.
     """
     found = [f.share for f in learned.effects]
@@ -35,14 +30,11 @@ def shares(learned: Findings, start: Model, validate: Sequence[WeakWindows]) -> 
         unseen = (-np.diff(sums) / sums[0]).tolist()
         pairs = zip(learned.effects, unseen, strict=True)
         found = [f.share if f.of_runs else share for f, share in pairs]
-    return [_within(share) for share in found]
+    return np.clip(found, 0.0, 1.0).tolist()
 
 
 def unique_shares(
-    learned: Findings,
-    start: Model,
-    train: Sequence[WeakWindows],
-    validate: Sequence[WeakWindows],
+    learned: Findings, start: Model, train: Sequence[WeakWindows], validate: Sequence[WeakWindows]
 ) -> list[float | None]:
     """Share of the first sum of squares that comes back without one finding.
 
@@ -51,8 +43,7 @@ def unique_shares(
     findings that explain the same, neither has a share of its own.
 
     Args:
-        learned: the findings and the model with them.
-        start: the initial model.
+        learned, start: the findings and the model with them, and the initial model.
         train: training runs; they count for what holds in them alone, such as times of failures.
         validate: validation runs; where there are any, they count for all else.
 
@@ -69,7 +60,7 @@ def unique_shares(
         if fitted and not others.plausible:
             without = learned.model.plus({name: -value for name, value in finding.values.items()})
         left, now, first = (_squares(runs, m, learned.sigma) for m in (without, learned.model, start))
-        return _within((left - now) / first)
+        return float(np.clip((left - now) / first, 0.0, 1.0))
 
     found: list[float | None] = []
     for finding in learned.effects:

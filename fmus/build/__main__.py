@@ -12,8 +12,12 @@ import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from cybership.message_text import printable
+from cybership.scratch_folder import sweep
+
 from ..declare import DeclarationError, Range, discover, variables
 from ..effects import STANDARD
+from ..installed import plus_files
 from ..interruption import program, run_interruptible
 from ..ship import Ship
 from ..ship import ship as make_ship
@@ -64,10 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--effects",
         type=Path,
-        metavar="FILE.py",
+        metavar="FILE.py|NAME",
         action="append",
         default=[],
-        help="a file of model effects of your own, for vessel and thrusters; may be repeated",
+        help="a file of model effects of your own, or one of an installed package, for vessel and "
+        "thrusters; may be repeated",
     )
     parser.add_argument(
         "--ship",
@@ -96,10 +101,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if not options.native and (options.target is not None or options.source is not None):
         parser.error("--target and --source need --native")
+    sweep()
     try:
-        effects = STANDARD
-        for file in options.effects:
-            effects = effects.plus_file(file)
+        effects = plus_files(STANDARD, options.effects)
         ship = described_ship(options.ship)
         if options.verify:
             _verify(options.names)
@@ -122,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever reads has seen enough; the rest must not raise while Python ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (BuildError, DeclarationError, OSError) as error:
-        print("error:", " ".join(str(error).split()), file=sys.stderr)
+        print("error:", printable(str(error)), file=sys.stderr)
         return 2
     return 0
 
@@ -168,7 +172,7 @@ def _print_list(names: Sequence[str], of: Ship, native: bool) -> None:
 
 
 def _note(text: str) -> None:
-    print("note:", text, file=sys.stderr)
+    print("note:", printable(text), file=sys.stderr)
 
 
 def _limits(allowed: Range) -> str:

@@ -2,11 +2,14 @@
 
 import hashlib
 import importlib.metadata
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from threading import Timer
 from typing import Any
+
+from cybership.scratch_folder import scratch_folder
 
 from ..declare import Component, discover
 from ..effects import STANDARD, EffectSet
@@ -22,6 +25,9 @@ from .platforms import Native, native_targets
 from .released import released
 from .start_values_file import Starts
 
+# Wall time after which a build says that it takes long [s]; chosen: an FMU takes a second or two, and
+# one that is compiled for all platforms up to ten.
+LONG = 15.0
 CHECKER = ROOT / "check"  # judges FMUs, and is in none
 
 
@@ -93,16 +99,16 @@ def export(
         found = [starts.baked(component) for component in found]
         _tell_unused(starts, [component.name for component in found], of, note)
     files = exported_source(found)
-    with tempfile.TemporaryDirectory(prefix="source_") as work:
+    with scratch_folder() as work:
         for name, text in files.items():
-            Path(work, name).write_text(text, encoding="utf-8")
-        return _placed([Path(work, name) for name in files], folder, overwrite)
+            (work / name).write_text(text, encoding="utf-8")
+        return _placed([work / name for name in files], folder, overwrite)
 
 
 def came_compiled(name: str) -> bool:
     """Whether a compiled FMU of a component came with the package, for this source and computer."""
-    with tempfile.TemporaryDirectory(prefix="fmu_") as work:
-        return released(name, own_source(), native_targets(), Path(work)) is not None
+    with scratch_folder() as work:
+        return released(name, own_source(), native_targets(), work) is not None
 
 
 def _placed(made: Sequence[Path], folder: Path, overwrite: bool) -> list[Path]:
@@ -179,19 +185,31 @@ def _cached(
         if not is_whole(fmu):
             if fmu.exists():
                 note(f"'{fmu}' in the cache was damaged, and is built again")
-            with tempfile.TemporaryDirectory(prefix="fmu_") as work:
+            with scratch_folder() as work, _told_if_long(component.name, note):
                 as_released = starts is None and own_file is None and of is make_ship()
                 if native is None:
-                    built = pack(component, module, own_file, Path(work), of)
-                elif as_released and (fits := released(stem, own_source(), native, Path(work))):
+                    built = pack(component, module, own_file, work, of)
+                elif as_released and (fits := released(stem, own_source(), native, work)):
                     built = fits
                 else:
                     code_hash = hash_of(sources(module, own_file, of), component.starts, of)
-                    built = _compiled(component, code_hash, native, Path(work), python)
+                    built = _compiled(component, code_hash, native, work, python)
                 with FileLock(cache_folder() / "ledger.lock"):
                     ledger.record(built, cache_folder())
                 store(built, fmu)
     return fmu
+
+
+@contextmanager
+def _told_if_long(name: str, note: Callable[[str], None]) -> Iterator[None]:
+    """Say while an FMU is built that it takes long."""
+    timer = Timer(LONG, note, [f"building {name} takes longer than {LONG:g} s"])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _compiled(

@@ -5,7 +5,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from cybership.message_text import printable
+
 from ..declare import DeclarationError, Variable
+from ..installed import plus_files
 from ..interruption import program
 from ..ship import ship
 from . import STANDARD
@@ -76,13 +79,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Print the table of all model effects as Markdown.",
         epilog="example:  %(prog)s my_effects.py",
     )
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE.py", help="effects of your own")
-    effects = STANDARD
+    parser.add_argument(
+        "files",
+        nargs="*",
+        type=Path,
+        metavar="FILE.py|NAME",
+        help="effects of your own, or of an installed package",
+    )
+    options = parser.parse_args(arguments)
     try:
-        for file in parser.parse_args(arguments).files:
-            effects = effects.plus_file(file)
+        effects = plus_files(STANDARD, options.files)
     except DeclarationError as error:
-        print("error:", error, file=sys.stderr)
+        print("error:", printable(str(error)), file=sys.stderr)
         return 2
     print(table(ship(effects).effects), end="")
     return 0

@@ -91,6 +91,17 @@ def slow(
     return function
 
 
+def _axis_sentence(way: str, what: str) -> Callable[[Found], str]:
+    return lost(
+        f"loss_{way}",
+        lambda size, than: (
+            f"Of the commanded {way} {what} {size} do not arrive."
+            if than == "less"
+            else f"The {way} {what} is {size} larger than commanded."
+        ),
+    )
+
+
 def _axis_loss(axis: str, way: str, what: str, wording: Wording) -> Effect:
     """A share of tau that is lost on one axis."""
     name, field = f"loss_{way}", f"loss_{axis}"
@@ -118,11 +129,7 @@ loss_surge = _axis_loss(
     "surge",
     "force",
     Wording(
-        lost(
-            "loss_surge",
-            "Of the commanded surge force {} do not arrive.",
-            "The surge force is {} larger than commanded.",
-        ),
+        _axis_sentence("surge", "force"),
         PROPELLERS,
         {"X_u": "pulse the speed instead of keeping it", "mass": "run steady and accelerating legs"},
     ),
@@ -132,11 +139,7 @@ loss_sway = _axis_loss(
     "sway",
     "force",
     Wording(
-        lost(
-            "loss_sway",
-            "Of the commanded sway force {} do not arrive.",
-            "The sway force is {} larger than commanded.",
-        ),
+        _axis_sentence("sway", "force"),
         SIDE_THRUST,
         {"Y_r": "crab to both sides with no turn"},
     ),
@@ -146,11 +149,7 @@ loss_yaw = _axis_loss(
     "yaw",
     "moment",
     Wording(
-        lost(
-            "loss_yaw",
-            "Of the commanded yaw moment {} do not arrive.",
-            "The yaw moment is {} larger than commanded.",
-        ),
+        _axis_sentence("yaw", "moment"),
         SIDE_THRUST,
         {"N_r": "turn on the spot, with starts and stops of the turn"},
     ),

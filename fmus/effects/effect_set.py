@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any
 
 from ..declare import DeclarationError, flatten, nearest
+from ..hull_functions import FUNCTIONS
 from ..scale import REFERENCE, Scale
 from .effect import Effect, Kind, Loaded, Running, Thrust
 
@@ -104,7 +105,8 @@ class EffectSet(Mapping[str, Effect]):
 
         Args:
             path: a Python file with functions decorated by :func:`fmus.effects.effect`, or with laws of
-                actuators (:class:`fmus.actuators.law.Law`), which register themselves.
+                actuators (:class:`fmus.actuators.law.Law`) or functions of the hull
+                (:func:`fmus.hull_functions.hull_function`), which register themselves.
 
         Raises:
             DeclarationError: the file cannot be read, fails, or declares nothing, or what is taken.
@@ -119,9 +121,8 @@ class EffectSet(Mapping[str, Effect]):
         name = f"{__package__}.{path.stem}_{digest}"
         module = sys.modules.get(name) or _imported(name, path)
         found = effects_of(module)
-        if not found and not any(
-            isinstance(x, type) and x.__module__ == name for x in vars(module).values()
-        ):
+        laws = [*(x for x in vars(module).values() if isinstance(x, type)), *FUNCTIONS.values()]
+        if not found and all(law.__module__ != name for law in laws):
             raise DeclarationError(
                 f"'{path}' registers no effect; decorate a function with @effect(...)"
             )

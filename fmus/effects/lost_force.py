@@ -21,13 +21,13 @@ LIMITS = (0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 
 def loss(d: Devices, others: bool = True) -> Effect:
     """A share of the force is lost; ``others``: there are a loss with speed and a failure as well."""
-    name, believed = f"loss_{d.name}", f"{d.does('give')} {{}} {{}} force than the model believes."
+    name = f"loss_{d.name}"
 
     @declared(
         d,
         name,
         (parameter(name, "1", f"share of {d.label} force lost", SHARE),),
-        lost(name, believed.format("{}", "less"), believed.format("{}", "more")),
+        lost(name, lambda size, than: f"{d.does('give')} {size} {than} force than the model believes."),
         apart={
             f"{d.name}_speed_loss": f"use the {d.title} at rest and at speed",
             f"{d.name}_failure": f"use the {d.title} from the very start of a run to its end",

@@ -54,9 +54,14 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def lost(name: str, less: str, more: str) -> Callable[[Found], str]:
-    """The sentence of a share that is lost, or gained where it is negative."""
-    return lambda f: (less if f[name] > 0.0 else more).format(percent(f[name]))
+def lost(name: str, sentence: Callable[[str, str], str]) -> Callable[[Found], str]:
+    """The sentence of a share that is lost, or gained where it is negative.
+
+    Args:
+        name: of the share.
+        sentence: what is said of its size, and of less or more.
+    """
+    return lambda f: sentence(percent(f[name]), "less" if f[name] > 0.0 else "more")
 
 
 def offset(f: Found, name: str) -> str:

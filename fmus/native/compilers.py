@@ -16,6 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cybership.scratch_folder import environment_with
+
 NO_ZIG = "needs zig: pip install 'cybership[native]'"
 OPTIONS = (
     "-std=c99", "-O1", "-w", "-fPIC", "-shared", "-fvisibility=hidden",
@@ -123,7 +125,9 @@ def compiled(source: Path, target: str, work: Path) -> bytes:
     for k, command in enumerate(compiler.commands):
         library = work / f"{target}_{k}{TARGETS[target].suffix}"
         arguments = [*command, "-I", str(work), "-o", str(library), str(source), *compiler.linked]
-        done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=work)
+        done = subprocess.run(
+            arguments, capture_output=True, text=True, check=False, cwd=work, env=environment_with(work)
+        )
         if done.returncode != 0 or not library.is_file():
             said = [line for line in done.stderr.splitlines() if line.strip()]
             why = next((line for line in said if "error" in line.lower()), " ".join(said[:1]))

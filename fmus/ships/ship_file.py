@@ -14,9 +14,13 @@ from pydantic import (
     ValidationError,
 )
 
+from cybership.message_text import Location, brief, first_fault
+
+from .. import installed
 from ..actuators import actuation as actuation  # registers the laws
 from ..actuators.law import Law
 from ..declare import DeclarationError, Range, Variable, nearest, parameters_of, variables
+from ..effects import STANDARD
 from ..effects.all_thrusters import LONGEST
 from ..hull import Inertia, mass_matrix, term_variable
 from ..hull_functions import FUNCTIONS
@@ -92,12 +96,13 @@ def json_schema() -> dict[str, Any]:
 
 
 def shipped_ships() -> list[str]:
-    """The names of the shipped ships."""
-    return sorted(path.stem for folder in FOLDERS for path in folder.glob("*.toml"))
+    """The names of the shipped ships, and of those of installed packages."""
+    shipped = {path.stem for folder in FOLDERS for path in folder.glob("*.toml")}
+    return sorted(shipped.union(installed.names(installed.SHIPS)))
 
 
 def find_ship(name: str | Path) -> Path:
-    """The file of a ship: a path, or the name of a shipped one.
+    """The file of a ship: a path, or the name of a shipped one, or of one of an installed package.
 
     Raises:
         DeclarationError: there is none.
@@ -111,6 +116,8 @@ def find_ship(name: str | Path) -> Path:
     for folder in FOLDERS:
         if (folder / f"{name}.toml").is_file() and Path(str(name)).name == str(name):
             return folder / f"{name}.toml"
+    if (found := installed.ship_file(str(name))) is not None:
+        return found
     known = shipped_ships()
     hint = nearest(str(name), known) or f"; there are {', '.join(known)}, or give a .toml file"
     raise DeclarationError(f"no ship '{name}'{hint}")
@@ -140,7 +147,7 @@ def _read(path: Path, _changed: int) -> Description:
     try:
         return _description(table)
     except DeclarationError as error:
-        raise DeclarationError(f"'{path}': {error}") from None
+        raise DeclarationError(f"'{path}': {brief(str(error))}") from None
 
 
 def _toml(path: Path) -> Any:
@@ -152,17 +159,16 @@ def _toml(path: Path) -> Any:
         import tomli as tomllib  # pyright: ignore[reportMissingImports]
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, OSError) as error:
-        raise DeclarationError(f"'{path}' cannot be read as TOML: {error}") from None
+    except (ValueError, RecursionError, OSError) as error:  # ValueError also of a number of 5,000 digits
+        raise DeclarationError(f"'{path}' cannot be read as TOML: {brief(str(error))}") from None
 
 
 def _told(error: ValidationError) -> str:
-    """A fault of a file in a line, with the nearest right key; keys that are not known come first."""
-    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    what, at = faults[0], faults[0]["loc"]
-    place = ".".join(str(part)[:40] for part in at if part not in ("number", "table"))
-    if what["type"] != "extra_forbidden":
-        return f"{place}: {what['msg'].removeprefix('Value error, ')}".removeprefix(": ")
+    """A fault of a file in a line, with the nearest right key."""
+    return first_fault(error, _nearest_key, lambda part: part in ("number", "table"))
+
+
+def _nearest_key(at: Location) -> str:
     table: type[BaseModel] = ShipTable
     if at[-2:-1] == ("table",):
         table = Number
@@ -170,7 +176,7 @@ def _told(error: ValidationError) -> str:
         table = Term
     elif at[0] == "hull":
         table = HullTable
-    return f"unknown key '{place}'{nearest(str(at[-1]), table.model_fields)}"
+    return nearest(str(at[-1]), table.model_fields)
 
 
 def _description(table: ShipTable) -> Description:
@@ -278,20 +284,27 @@ def _values(
 
 
 def _function(name: str, given: Mapping[str, Given], prime: Prime | None) -> Part:
-    if name not in FUNCTIONS:
-        raise DeclarationError(f"hull.functions: there is no '{name}'{_among(name, FUNCTIONS)}")
+    _require(name, FUNCTIONS, f"hull.functions: there is no '{name}'")
     declared = parameters_of(name, 3, FUNCTIONS[name])
     return Part(name, name, name, _values(f"hull.functions.{name}", given, declared, prime))
 
 
-def _among(name: str, known: Mapping[str, Any]) -> str:
-    return nearest(name, known) or f"; there are {', '.join(known)}"
+def _require(name: str, known: Mapping[str, Any], lacking: str) -> None:
+    """Refuse a law that is neither registered nor in an installed package, which then registers it.
+
+    Raises:
+        DeclarationError: there is none.
+    """
+    if name not in known and (file := installed.module_file(installed.LAWS, name)) is not None:
+        STANDARD.plus_file(file)
+    if name not in known:
+        hint = nearest(name, known) or f"; there are {', '.join(known)}"
+        raise DeclarationError(f"{lacking}{hint}")
 
 
 def _actuator(a: ActuatorTable, scale: Scale, prime: Prime | None) -> Part:
     where = f"actuator '{a.name}'"
-    if a.law not in Law.known:
-        raise DeclarationError(f"{where}: there is no law '{a.law}'{_among(a.law, Law.known)}")
+    _require(a.law, Law.known, f"{where}: there is no law '{a.law}'")
     law = Law.known[a.law]
     rates = [
         Variable(f"{c.name}_rate", f"{c.unit}/s", "limit of a command's rate", 0.0, Range(0.0))

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 LIST = Path(__file__).parents[1] / "slow_tests.txt"
 LONG = 0.7  # s; chosen: with all that take less the quick part lasts three minutes on two cores
-PROCESSOR = "processor_s"  # what the report calls it
+PROCESSOR, NODE = "processor_s", "node_id"  # what the report calls them
 
 
 def slow_tests() -> frozenset[str]:
@@ -24,10 +24,9 @@ def slow_tests() -> frozenset[str]:
 def long_ones(report: Path) -> Iterator[str]:
     """Node ids of the tests of a report that took longer than LONG."""
     for case in ElementTree.parse(report).iter("testcase"):
-        used = case.find(f".//property[@name='{PROCESSOR}']")
-        if used is not None and float(used.get("value", "0")) > LONG:
-            module, *classes = case.get("classname", "").removeprefix("tests.").split(".")
-            yield "::".join([f"tests/{module}.py", *classes, case.get("name", "")])
+        told = {p.get("name"): p.get("value", "") for p in case.iter("property")}
+        if float(told.get(PROCESSOR, "0")) > LONG:
+            yield told[NODE]
 
 
 if __name__ == "__main__":

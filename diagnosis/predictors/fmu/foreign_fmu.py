@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -14,19 +13,22 @@ import cosim
 from cosim.export import export_fmu
 from cosim.fmu import Model as FmuModel
 from cosim.system import prepare
+from cybership.scratch_folder import Scratch
 from fmus.frames import rotate_to_body
 from fmus.ship import Ship, ship
 
 from ...execution.progress import Advance, silent
-from ...runs import OF_UNIT, QUANTITY, UNITS, Column, Run, Smoothed, to_si
+from ...runs import OF_UNIT, QUANTITY, Run, Smoothed
 from ..black_box import MOTION, POSE, TAU, VELOCITY, BlackBox, Signals, at_samples, commands_at
 from ..described_ship import nominal
 from ..predictor import FOUND, MAP, UnmatchedError
 from ..ship_model import Model
+from ..thrust import LONGEST_STEP
 from ..weak_form import WeakWindows
+from ..windows import FREE_STEP
 from .instances import Begun, simulate
-from .short_steps import FIRST, LONGEST, SECOND, STEP, ShortSteps
-from .variable_map import VariableMap, completed, propose, quantities, read_map, unmatched, write_map
+from .short_steps import ShortSteps
+from .variable_map import VariableMap, completed, propose, read_map, signal_lines, unmatched, write_map
 from .wrapper import Wrapped, write_wrapper
 
 SYSTEMS = (".ssp", ".json")
@@ -55,8 +57,9 @@ class Fmu:
     ) -> None:
         self._given = self.path = Path(path).absolute()
         if self.path.suffix in SYSTEMS:
-            self._made = TemporaryDirectory(prefix="cosim_")
-            self.path = _as_one(self._given, Path(self._made.name))
+            self._made = Scratch()
+            finalize(self, self._made.remove)
+            self.path = _as_one(self._given, self._made.path)
         self.map = None if map is None else Path(map)
         self.told = None if self.map is None else read_map(self.map)
         self.model = FmuModel(self.path)
@@ -118,17 +121,10 @@ class Fmu:
 class FmuPredictor(BlackBox):
     """How an FMU predicts some runs.
 
-    Args:
-        fmu: the FMU.
-        runs: no two of the same name.
-        ship: model of the ship.
-
     Attributes:
         given: which of its variables is which signal, as it was told or proposed.
         map: the same with the units that the FMU declares.
-
-    Raises:
-        InputError: as :meth:`Fmu.variables`.
+        lines: see :func:`.variable_map.signal_lines`.
     """
 
     kind = "FMU"
@@ -137,7 +133,7 @@ class FmuPredictor(BlackBox):
         super().__init__(fmu.name, runs, ship)
         measured = [w.run for w in runs]
         self.fmu, self.given, self.map = fmu, fmu.given(measured), fmu.variables(measured)
-        self.units = SignalUnits(self.map, commands_of(measured))
+        self.lines = signal_lines(self.map, commands_of(measured))
         self.starts = frozenset(self.map.told("start")) & set(MOTION)
         self.inputs = frozenset(self.map.told("inputs"))
         self.sha256, self.given_map, self.own_run_in = fmu.sha256, self.given.content(), self.map.run_in
@@ -154,19 +150,17 @@ class FmuPredictor(BlackBox):
     def _along_runs(self) -> Model:
         inputs, outputs = ([c.name for c in self.map.told(g).values()] for g in ("inputs", "outputs"))
         time = self.runs[0].scale.time
-        h = min(self.fmu.step or STEP * time, LONGEST * time)
+        h = min(self.fmu.step or LONGEST_STEP * time, FREE_STEP * time)
         with closing(ShortSteps(self.fmu.model, inputs, outputs, h)) as self._steps:
             return super()._along_runs
 
     def motion(self, smoothed: Smoothed, rows: np.ndarray, h: float, steps: int) -> np.ndarray:
         run, columns = smoothed.track.run, self.map.told("outputs")
-        at, middle = self.units.variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        at, middle = self._variables("start", at_samples(smoothed)), (np.arange(steps) + 0.5) * h
+        given = [commands_at(run, time + middle) for time in smoothed.time[rows]]
         begun = [
-            Begun(
-                _row(at, row),
-                self.units.variables("inputs", commands_at(run, smoothed.time[row] + middle)),
-            )
-            for row in rows
+            Begun(_row(at, row), self._variables("inputs", commands))
+            for row, commands in zip(rows, given, strict=True)
         ]
         names = [c.name for c in columns.values()]
         try:
@@ -174,23 +168,23 @@ class FmuPredictor(BlackBox):
         except cosim.InputError as error:
             raise cosim.InputError(f"'{self.name}' failed on run '{run.name}': {error}") from None
         motion = np.full((steps + 1, len(MOTION), rows.size), np.nan)
-        for signal, values in self.units.outputs(told).items():
+        for signal, values in self._outputs(told).items():
             motion[:, MOTION.index(signal)] = values
         return motion
 
     def accelerations(self, signals: Signals) -> np.ndarray:
-        start, inputs = (self.units.variables(group, signals) for group in ("start", "inputs"))
+        start, inputs = (self._variables(group, signals) for group in ("start", "inputs"))
         size = next(iter(signals.values())).size
         return np.array([self._accelerated(_row(start, k), _row(inputs, k)) for k in range(size)])
 
     def _accelerated(self, start: Mapping[str, float], inputs: Mapping[str, float]) -> np.ndarray:
         """nu_dot (3,) from a start on, by differences of a few short steps."""
-        motion, h = self.units.outputs(self._steps.run(start, inputs)), self._steps.h
+        motion = self._outputs(self._steps.run(start, inputs))
+        slopes = self._steps.derivatives
         if set(VELOCITY) <= motion.keys():
-            return np.array([FIRST @ motion[s] for s in VELOCITY]) / h
+            return np.array([slopes(motion[s])[0] for s in VELOCITY])
         x, y, psi = (motion[s] for s in POSE)
-        rate = [FIRST @ p / h for p in (x, y, np.unwrap(psi))]
-        change = [SECOND @ p / h**2 for p in (x, y, np.unwrap(psi))]
+        rate, change = np.transpose([slopes(p) for p in (x, y, np.unwrap(psi))])
         u, v = rotate_to_body(psi[0], rate[0], rate[1])
         u_dot, v_dot = rotate_to_body(psi[0], change[0], change[1])
         return np.array([u_dot + rate[2] * v, v_dot - rate[2] * u, change[2]])
@@ -206,42 +200,21 @@ class FmuPredictor(BlackBox):
         if learned is None:
             write_map(folder / MAP, self.given.content())
             return []
-        wrapped = Wrapped(
-            self.name, self.fmu.path, self.fmu.model.variables, self.map, self.units.quantity
-        )
+        wrapped = Wrapped(self.name, self.fmu.model, self.map, self.lines)
         told, of_both = write_wrapper(folder / FOUND, wrapped, self.model, learned, runs)
         write_map(folder / MAP, (of_both or self.given).content())
         return [told]
 
-
-class SignalUnits:
-    """Values of an FMU's variables as signals in SI, and the other way.
-
-    Args:
-        map: with the units of all variables.
-        commands: of the runs: signal -> quantity.
-    """
-
-    def __init__(self, map: VariableMap, commands: Mapping[str, str]) -> None:  # noqa: A002
-        known = quantities(commands)
-        self.map = map
-        self.quantity = {**known["outputs"], **known["inputs"]}
-
-    def in_variable(self, signal: str, column: Column, values: Any) -> Any:
-        """Values of a signal in SI as its variable has them."""
-        factor = -column.factor if column.flip else column.factor
-        unit = UNITS[self.quantity[signal]].get(column.unit or "", 1.0)
-        return (values / unit - column.offset) / factor
-
-    def variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
+    def _variables(self, group: str, signals: Signals) -> dict[str, np.ndarray]:
         """Variable -> its values, for those of some signals [SI] that a group of the map has."""
-        told = self.map.told(group)
-        return {c.name: self.in_variable(s, c, signals[s]) for s, c in told.items() if s in signals}
+        lines, told = self.lines[group], self.map.told(group)
+        known = ((signals[s], lines[s], c.name) for s, c in told.items() if s in signals)
+        return {name: (x - line.offset) / line.gain for x, line, name in known}
 
-    def outputs(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _outputs(self, values: Signals) -> dict[str, np.ndarray]:
         """Signal -> its values [SI], by variables' values; also of those that stay the same."""
-        columns = self.map.told("outputs")
-        found = {s: to_si(values[c.name], s, c, self.quantity[s]) for s, c in columns.items()}
+        lines, columns = self.lines["outputs"], self.map.told("outputs")
+        found = {s: lines[s].gain * values[c.name] + lines[s].offset for s, c in columns.items()}
         like = next(iter(values.values()))
         return found | {s: np.full(like.shape, x) for s, x in self.map.fixed.items()}
 
@@ -252,8 +225,8 @@ def _row(values: Mapping[str, np.ndarray], k: int) -> dict[str, float]:
 
 def _as_one(path: Path, folder: Path) -> Path:
     """A system as one FMU, whose parameters are all that the system leaves open."""
-    system = prepare(cosim.load_scenario(path))
-    try:
+    made = folder / f"{path.stem}.fmu"
+    with closing(prepare(cosim.load_scenario(path))) as system:
         given = {f"{name}.{v.name}" for name, values in system.parameters.items() for v, _ in values}
         every = {
             f"{name}.{v.name}"
@@ -261,11 +234,8 @@ def _as_one(path: Path, folder: Path) -> Path:
             for v in model.variables.values()
             if v.causality == "parameter" and v.type == "Real"
         }
-        made = folder / f"{path.stem}.fmu"
         export_fmu(system, made, expose=every - given)
-        return made
-    finally:
-        system.close()
+    return made
 
 
 def commands_of(runs: Sequence[Run]) -> dict[str, str]:

@@ -1,11 +1,11 @@
 """Predictions of an FMU by cosim, one instance for each."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 import cosim
 from cosim.process import scratch_folder
@@ -23,15 +23,14 @@ class Begun(NamedTuple):
 def simulate(
     path: Path, isolated: bool, begun: Sequence[Begun], outputs: Sequence[str], h: float, steps: int
 ) -> dict[str, np.ndarray]:
-    """Each output (steps + 1, w) of w predictions.
+    """Each output (steps + 1, w) of w predictions in steps of h [s].
 
     Args:
         path: of the FMU.
         isolated: whether each instance needs a process of its own.
         begun: what is predicted.
         outputs: names of variables.
-        h: length of a step [s].
-        steps: of each.
+        h, steps: length of a step [s], and how many.
 
     Raises:
         InputError: the FMU fails.
@@ -50,21 +49,16 @@ def _together(
         # A row acts in the step that ends at its time, the first one before that, too.
         columns = {"time": np.round((np.arange(steps) + 1) * h, 12)}
         columns |= {f"{k}.{name}": x for k, one in windows.items() for name, x in one.inputs.items()}
-        with recording.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(zip(*(c.tolist() for c in columns.values()), strict=True))
+        pd.DataFrame(columns).to_csv(recording, index=False)
         scenario = {
             "name": "prediction",
             "step": h,
             "stop": round(steps * h, 9),
             "fmus": {
-                k: {"path": str(path), "parameters": dict(one.start), "isolate": isolated}
+                k: {"path": str(path), "parameters": one.start, "isolate": isolated}
                 for k, one in windows.items()
             },
-            "recordings": [
-                {"path": str(recording), "inputs": {name: name for name in columns if name != "time"}}
-            ],
+            "recordings": [{"path": str(recording), "inputs": {n: n for n in columns if n != "time"}}],
             "log": {"signals": [f"{k}.{name}" for k in windows for name in outputs]},
         }
         result = cosim.simulate(cosim.load_scenario(scenario), folder / "out", pictures=False)

@@ -16,15 +16,26 @@ ahead alone. A variable whose unit the map does not tell is in the one that its 
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    ValidationError,
+    field_validator,
+)
 
 from cosim import BASE_UNITS, InputError, Unit
 from cosim.errors import most_alike, nearest
 from cosim.fmu import Model, Variable
+from cybership.message_text import Location, first_fault
+from fmus.addition import Line
 from fmus.base_units import base_exponents
 
 from ...runs import QUANTITY, UNITS, Column, meaning
@@ -35,9 +46,9 @@ GROUPS = (*PROPOSED, "beside")
 # Inputs that act beside all else: forces, or accelerations.
 BESIDE = {"tau_X": "force", "tau_Y": "force", "tau_N": "moment",
           "u_dot": "acceleration", "v_dot": "acceleration", "r_dot": "angular acceleration"}  # fmt: skip
-SHOWN = 40  # characters of what a broken file holds that a message shows (chosen)
 # What marks a variable as a start value, before or behind the name of the signal.
-BEFORE, BEHIND = re.compile(r"(initial|init|start)_?"), re.compile(r"_?(0|initial|init|start)")
+BEFORE = re.compile(r"(initial|init|start)_?(?P<core>.+)")
+BEHIND = re.compile(r"(?P<core>.+?)_?(0|initial|init|start)")
 SI_UNIT = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s", "force": "N",
            "moment": "N.m", "shaft speed": "1/s", "command": "1", "acceleration": "m/s2",
            "angular acceleration": "rad/s2"}  # fmt: skip
@@ -59,8 +70,8 @@ class VariableMap(BaseModel):
     beside: dict[str, Column | None] = Field(
         default_factory=dict, description="forces or accelerations that act beside all else"
     )
-    run_in: float | None = Field(
-        default=None, ge=0.0, allow_inf_nan=False, description="time before a whole run counts [s]"
+    run_in: Annotated[NonNegativeFloat, AllowInfNan(False)] | None = Field(
+        default=None, description="time before a whole run counts [s]"
     )
 
     @field_validator(*GROUPS, mode="before")
@@ -103,15 +114,15 @@ def read_map(path: Path) -> VariableMap:
     try:
         return VariableMap.model_validate(json.loads(path.read_text(encoding="utf-8")))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part)[:SHOWN] for part in first["loc"])
-        extra = first["type"] == "extra_forbidden" and len(first["loc"]) == 1
-        hint = nearest(str(first["loc"][0]), VariableMap.model_fields) if extra else ""
-        raise InputError(f"'{path}': {place}: {first['msg']}{hint}") from None
+        raise InputError(f"'{path}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
         raise InputError(f"'{path}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{path}' cannot be read as a map: {error}") from None
+
+
+def _nearest_key(location: Location) -> str:
+    return nearest(str(location[0]), VariableMap.model_fields) if len(location) == 1 else ""
 
 
 def write_map(path: Path, content: Mapping[str, Any]) -> None:
@@ -124,6 +135,22 @@ def quantities(commands: Mapping[str, str]) -> dict[str, dict[str, str]]:
     motion = {signal: QUANTITY[signal] for signal in MOTION}
     start = {**motion, **commands}
     return {"inputs": dict(commands), "outputs": motion, "start": start, "beside": BESIDE}
+
+
+def signal_lines(map: VariableMap, commands: Mapping[str, str]) -> dict[str, dict[str, Line]]:  # noqa: A002
+    """Group -> signal in SI by its variable.
+
+    Args:
+        map: with the units of all variables.
+        commands: of the runs: signal -> quantity.
+    """
+
+    def line(c: Column, quantity: str) -> Line:
+        unit = UNITS[quantity].get(c.unit or "", 1.0)
+        return Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
+
+    known = quantities(commands)
+    return {g: {s: line(c, known[g][s]) for s, c in map.told(g).items()} for g in GROUPS}
 
 
 def propose(model: Model, commands: Mapping[str, str]) -> VariableMap:
@@ -162,17 +189,17 @@ def completed(given: VariableMap, model: Model, commands: Mapping[str, str], whe
         variables = {v.name: v for v in _candidates(model, group)}
         found[group] = dict(given.fixed) if group == "outputs" else {}
         for signal, column in given.told(group).items():
-            place = f"{where}: {group}.{signal[:SHOWN]}"
+            place = f"{where}: {group}.{signal}"
             if signal not in known:
                 raise InputError(f"{place} is no signal of these runs{nearest(signal, known)}")
             if column.name not in variables:
                 hint = nearest(column.name, variables)
-                raise InputError(f"{place}: the FMU has no such variable '{column.name[:SHOWN]}'{hint}")
+                raise InputError(f"{place}: the FMU has no such variable {shown(column.name)}{hint}")
             if column.factor == 0.0:
                 raise InputError(f"{place}.factor is not zero")
             if column.unit is not None and column.unit not in UNITS[known[signal]]:
                 hint = nearest(column.unit, UNITS[known[signal]])
-                raise InputError(f"{place}: '{column.unit[:SHOWN]}' is no unit of {signal}{hint}")
+                raise InputError(f"{place}: {shown(column.unit)} is no unit of {signal}{hint}")
             found[group][signal] = _with_unit(column, variables[column.name], known[signal], place)
     return VariableMap(**found)
 
@@ -216,19 +243,13 @@ def _signal(name: str, group: str, known: Mapping[str, str]) -> tuple[str, bool]
 
 def _same(name: str, signal: str) -> bool:
     """Whether a variable bears a signal's own name, which goes before other names of it."""
-    return bool(signal) and name.casefold().replace(".", "_").startswith(
-        signal.casefold().replace(".", "_")
-    )
+    own, known = (x.casefold().replace(".", "_") for x in (name, signal))
+    return bool(signal) and own.startswith(known)
 
 
 def _cores(name: str) -> list[str]:
     """A start value's name without what marks it as one."""
-    lower = name.casefold()
-    marks: list[tuple[re.Pattern[str], Callable[[re.Match[str]], str]]] = [
-        (re.compile(f"{BEFORE.pattern}(.+)"), lambda m: m[2]),
-        (re.compile(f"(.+?){BEHIND.pattern}"), lambda m: m[1]),
-    ]
-    cores = [core(m) for pattern, core in marks if (m := pattern.fullmatch(lower))]
+    cores = [m["core"] for mark in (BEFORE, BEHIND) if (m := mark.fullmatch(name.casefold()))]
     return [core for core in cores if len(core) > 1 or core in MOTION]
 
 

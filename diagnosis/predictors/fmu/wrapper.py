@@ -1,6 +1,7 @@
 """A foreign FMU with what was found beside it, as one FMU."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,47 +9,44 @@ import numpy as np
 
 import cosim
 from cosim.export import export_fmu
-from cosim.fmu import Variable
+from cosim.fmu import Model as FmuModel
 from cosim.process import scratch_folder
 from cosim.system import prepare
 from fmus.addition import ACCELERATION, FORCE, Line
 from fmus.build import BuildError, build, native_targets
 
-from ...runs import UNITS, Column
+from ...runs import Column
 from ..ship_model import Model
 from ..weak_form import WeakWindows, omega
 from ..windows import step_of
-from .variable_map import BESIDE, VariableMap
+from .variable_map import VariableMap
 
-SLIGHT = 1e-9  # of the ship's forces: less is none
 FOREIGN, ADDED = "model", "found"  # instances of the container
 
 NONE = "No FMU with what was found is written"
-SOURCE = '''"""What was found beside {name}."""
-
+SOURCE = """# What was found beside {name!r}.
 from fmus.addition import Line, addition
 from fmus.ship import ship
 from fmus.ship_description import Description, Part, Value
 
 COMPONENT = addition(ship(description={description!r}), {arguments})
-'''
+"""
 
 
 class Wrapped(NamedTuple):
     """An FMU that effects are added to.
 
     Attributes:
-        name, path: of the file.
-        variables: by their names.
-        map: which of them is which signal, with units.
-        quantity: of each signal.
+        name: of the file.
+        model: the FMU.
+        map: which of its variables is which signal, with units.
+        lines: see :func:`.variable_map.signal_lines`.
     """
 
     name: str
-    path: Path
-    variables: Mapping[str, Variable]
+    model: FmuModel
     map: VariableMap
-    quantity: Mapping[str, str]
+    lines: Mapping[str, Mapping[str, Line]]
 
 
 def write_wrapper(
@@ -56,18 +54,13 @@ def write_wrapper(
 ) -> tuple[str, VariableMap | None]:
     """Write an FMU of a foreign one and of what was found beside it.
 
-    Args:
-        path: of the file.
-        fmu: the foreign one.
-        start: that moves as it does.
-        learned: the same with what was found.
-        runs: on which that was.
+    ``start`` is a model that moves as the foreign one does, ``learned`` the same with what was found.
 
     Returns:
         What was written, or what is needed for it, in a sentence; the map of the new FMU, or None.
     """
     change = np.concatenate([omega(w, start) - omega(w, learned) for w in runs])
-    needed = np.abs(change).max(axis=0) > SLIGHT * np.array(start.ship.scale.forces)
+    needed = ~np.isclose(np.abs(change).max(axis=0) / start.ship.scale.forces, 0.0)
     takes = {*fmu.map.told("inputs"), *fmu.map.told("beside")}
     missing = [k for k in np.flatnonzero(needed) if not {FORCE[k], ACCELERATION[k]} & takes]
     if not needed.any():
@@ -80,11 +73,9 @@ def write_wrapper(
         return f"{NONE}: the ship has effects of your own.", None
     try:
         with scratch_folder() as folder:
-            system = prepare(cosim.load_scenario(_scenario(fmu, start, learned, folder, runs)))
-            try:
+            scenario = cosim.load_scenario(_scenario(fmu, start, learned, folder, runs))
+            with closing(prepare(scenario)) as system:
                 export_fmu(system, path, overwrite=True, expose=_start_values(fmu))
-            finally:
-                system.close()
     except (cosim.InputError, BuildError) as error:
         return f"{NONE}: {error}.", None
     return f"{path.name} is {fmu.name} with what was found.", _map(fmu)
@@ -95,12 +86,13 @@ def _scenario(
 ) -> dict[str, Any]:
     """The two FMUs, wired; values pass as they are, for the addition converts them."""
     groups = {group: fmu.map.told(group) for group in ("outputs", "inputs", "beside")}
-    told: dict[str, Line | float] = {**_lines(fmu, groups["outputs"]), **fmu.map.fixed}
+    lines = {g: {_plain(s): line for s, line in fmu.lines[g].items()} for g in groups}
+    told: dict[str, Line | float] = {**lines["outputs"], **fmu.map.fixed}
     parts = [
         {part: {n: float(x) for n, x in getattr(m, part).items()} for part in ("vessel", "thrusters")}
         for m in (start, learned)
     ]
-    arguments = (*parts, told, *(_lines(fmu, groups[g]) for g in ("inputs", "beside")))
+    arguments = (*parts, told, lines["inputs"], lines["beside"])
     source = folder / f"{ADDED}.py"
     description = start.ship.description
     text = ", ".join(map(repr, arguments))
@@ -119,7 +111,7 @@ def _scenario(
         "name": "wrapper",
         "step": h,
         "stop": round(max(float(w.run.time[-1] - w.run.time[0]) for w in runs) / h) * h,
-        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(fmu.path)}},
+        "fmus": {ADDED: {"path": str(made)}, FOREIGN: {"path": str(fmu.model.path)}},
         "connections": wires,
         "transformations": {target: {"factor": 1.0} for _, target in wires},
     }
@@ -130,17 +122,8 @@ def _plain(signal: str) -> str:
     return signal.replace(".", "_")
 
 
-def _lines(fmu: Wrapped, columns: Mapping[str, Column]) -> dict[str, Line]:
-    """Signal in SI by an FMU's variable."""
-    found = {}
-    for signal, c in columns.items():
-        unit = UNITS[{**fmu.quantity, **BESIDE}[signal]].get(c.unit or "", 1.0)
-        found[_plain(signal)] = Line((-c.factor if c.flip else c.factor) * unit, c.offset * unit)
-    return found
-
-
 def _start_values(fmu: Wrapped) -> list[str]:
-    parameters = (fmu.variables[c.name] for c in fmu.map.told("start").values())
+    parameters = (fmu.model.variables[c.name] for c in fmu.map.told("start").values())
     return [f"{FOREIGN}.{v.name}" for v in parameters if v.causality == "parameter"]
 
 

@@ -22,24 +22,35 @@ import json
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from reprlib import repr as shown
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    StringConstraints,
+    ValidationError,
+    field_validator,
+)
 
 from cosim import InputError
 from cosim.errors import nearest
 from cosim.results import read_options
 from cosim.trials import KINDS
+from cybership.message_text import Location, first_fault
 from fmus.ship import Ship
 
 from .unit_check import UNITS
 
-MOST_SKIPPED = 100_000  # lines; chosen: far more than any preamble has
+PREAMBLE = 1000  # lines; chosen: far more than any file has before its names
 UTF_8 = "utf-8-sig"  # with a mark at the beginning or without
 POSE = ("x", "y", "psi")
 TAU = ("tau_X", "tau_Y", "tau_N")
-SHOWN = 40  # characters of a name that a message shows; a broken file may have thousands (chosen)
 
 # Quantity of a ship's command, by the unit that its law has for it.
 OF_UNIT = {"1": "command", "1/s": "shaft speed", "rad": "angle", "N": "force"}
@@ -67,27 +78,6 @@ QUANTITY = {
     "tau_N": "moment",
     **BESIDE,
 }
-# Other names of signals that files use, without case, blanks and marks between words.
-CALLED: dict[str, tuple[str, ...]] = {
-    "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
-    "x": ("north", "northing", "n", "posx", "positionx", "xn"),
-    "y": ("east", "easting", "e", "posy", "positiony", "ye"),
-    "psi": ("heading", "yaw", "hdg", "headingangle", "yawangle"),
-    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
-    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
-    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
-    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
-    "v": ("swayspeed", "swayvelocity", "velocitysway"),
-    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
-    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
-    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
-    "speed": ("sog", "speedoverground"),
-    "course": ("cog", "courseoverground"),
-    "u_water": ("stw", "speedthroughwater"),
-    "wind_speed": ("truewindspeed", "tws"),
-    "wind_direction": ("truewinddirection", "twd"),
-}
-OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
 def outputs(commands: Iterable[str]) -> dict[str, str]:
@@ -104,7 +94,10 @@ def quantities(of: Ship) -> dict[str, str]:
 
 def no_unit(unit: str, signal: str, units: Iterable[str]) -> str:
     """The message about a unit that a signal cannot have."""
-    return f"'{unit[:SHOWN]}' is not a unit of {signal}{nearest(unit, units)}"
+    return f"{shown(unit)} is not a unit of {signal}{nearest(unit, units)}"
+
+
+Mark = Annotated[str, StringConstraints(min_length=1, max_length=1)]  # a character
 
 
 class Column(BaseModel):
@@ -112,20 +105,12 @@ class Column(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: str = Field(description="the column's name in the file")
-    unit: str | None = Field(default=None, description="its unit; SI if not said")
-    factor: float = Field(
-        default=1.0,
-        allow_inf_nan=False,
-        description="by which its numbers are multiplied to be in that unit",
-    )
-    flip: bool = Field(default=False, description="whether its axis points the other way")
-    offset: float = Field(
-        default=0.0, allow_inf_nan=False, description="what is added, in its unit, after the flip"
-    )
-    noise: float | None = Field(
-        default=None, gt=0.0, allow_inf_nan=False, description="standard deviation, in its unit"
-    )
+    name: str  # in the file
+    unit: str | None = None  # SI if not said
+    factor: FiniteFloat = 1.0  # by which its numbers are multiplied to be in that unit
+    flip: bool = False  # whether its axis points the other way
+    offset: FiniteFloat = 0.0  # what is added, in its unit, after the flip
+    noise: PositiveFloat | None = Field(default=None, allow_inf_nan=False)  # its standard deviation
 
 
 class Layout(BaseModel):
@@ -133,20 +118,20 @@ class Layout(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    separator: str = Field(default=",", min_length=1, max_length=1, description="between two cells")
-    decimal: str = Field(default=".", min_length=1, max_length=1, description="the decimal point")
-    encoding: str = Field(default=UTF_8, description="of the text, as Python calls it")
-    skip: int = Field(default=0, ge=0, le=MOST_SKIPPED, description="lines before that of the names")
-    units_line: bool = Field(default=False, description="whether the line below the names is of units")
-    columns: dict[str, Column] = Field(default_factory=dict, description="x, y, psi, ... -> a column")
-    trial: str | None = Field(default=None, description="the manoeuvring trial that it is, as zigzag")
+    separator: Mark = ","  # between two cells
+    decimal: Mark = "."  # the decimal point
+    encoding: str = UTF_8  # of the text, as Python calls it
+    skip: NonNegativeInt = Field(default=0, le=PREAMBLE)  # lines before that of the names
+    units_line: bool = False  # whether the line below the names is of units
+    columns: dict[str, Column] = {}  # x, y, psi, ... -> a column
+    trial: str | None = None  # the manoeuvring trial that it is, as zigzag
 
     @field_validator("trial")
     @classmethod
     def _is_trial(cls, value: str | None) -> str | None:
         if value is not None and value not in KINDS:
             hint = nearest(value, KINDS) or f"; there are {', '.join(KINDS)}"
-            raise ValueError(f"'{value[:SHOWN]}' is not a manoeuvring trial{hint}")
+            raise ValueError(f"{shown(value)} is not a manoeuvring trial{hint}")
         return value
 
     @field_validator("encoding")
@@ -156,7 +141,7 @@ class Layout(BaseModel):
             "".encode(value)  # there are others than those of texts
             return codecs.lookup(value).name
         except (LookupError, UnicodeError):
-            text = f"'{value[:SHOWN]}' is not an encoding; there are utf-8, latin-1, ..."
+            text = f"{shown(value)} is not an encoding; there are utf-8, latin-1, ..."
             raise ValueError(text) from None
 
     @field_validator("columns", mode="before")
@@ -186,11 +171,7 @@ class Layout(BaseModel):
 
 
 def log_of(commands: Iterable[str]) -> Layout:
-    """Our own log: the pose after all faults, the force after clipping, and the commands.
-
-    Args:
-        commands: of the ship, ``ACTUATOR.COMMAND`` or the names of variables.
-    """
+    """Our own log: the pose after all faults, the force after clipping, and the ship's commands."""
     names = {"x": "observer.x_m", "y": "observer.y_m", "psi": "observer.psi_m"}
     names |= {f"tau_{axis}": f"thrusters.tau_cmd_{axis}" for axis in "XYN"}
     names |= {name: f"thrusters.{name.replace('.', '_')}" for name in commands}
@@ -234,11 +215,7 @@ def layout_of(
     try:
         return Layout.model_validate({"columns": columns})
     except ValidationError as error:
-        raise InputError(f"{where}: {_text(error)}") from None
-
-
-def _text(error: ValidationError) -> str:
-    return error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise InputError(f"{where}: {first_fault(error)}") from None
 
 
 def to_si(values: Any, signal: str, column: Column, quantity: str) -> Any:
@@ -267,15 +244,16 @@ def read_layout(path: Path) -> Layout | None:
     try:
         return Layout.model_validate(json.loads(beside.read_text(encoding="utf-8")))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part)[:SHOWN] for part in first["loc"])
-        known = Column.model_fields if "columns" in first["loc"] else Layout.model_fields
-        hint = nearest(str(first["loc"][-1]), known) if first["type"] == "extra_forbidden" else ""
-        raise InputError(f"'{beside}': {place}: {_text(error)}{hint}") from None
+        raise InputError(f"'{beside}': {first_fault(error, _nearest_key)}") from None
     except RecursionError:
         raise InputError(f"'{beside}' cannot be read: it is nested too deeply") from None
     except (OSError, ValueError) as error:
         raise InputError(f"'{beside}' cannot be read: {error}") from None
+
+
+def _nearest_key(location: Location) -> str:
+    known = Column.model_fields if "columns" in location else Layout.model_fields
+    return nearest(str(location[-1]), known)
 
 
 def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[str]:
@@ -298,9 +276,7 @@ def signals(layout: Layout, names: Sequence[str], where: str, of: Ship) -> list[
     known = quantities(of)
     strange = next((signal for signal in layout.columns if signal not in known), None)
     if strange:
-        raise InputError(
-            f"{where}: '{strange[:SHOWN]}' is not a signal of a run{nearest(strange, known)}"
-        )
+        raise InputError(f"{where}: {shown(strange)} is not a signal of a run{nearest(strange, known)}")
     if not groups:
         forms = ", or ".join(", ".join(group) for group in every)
         told = f'{{"columns": {{"{every[0][0]}": "name of its column", ...}}}}'

@@ -15,8 +15,6 @@ from ..cleaning import in_order, lost, repeated
 from ..files.reading import Run, column_names, read
 from ..files.text_layout import bare_unit, table_cells, text_layout
 from .columns import (
-    CALLED,
-    OPPOSITE,
     QUANTITY,
     UNITS,
     UTF_8,
@@ -32,6 +30,27 @@ from .unit_check import OFTENEST, RAREST, doubts, likely_unit
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # how such a text begins
 NO_UNIT = ("", "-")
+# Other names of signals that files use, without case, blanks and marks between words.
+CALLED: dict[str, tuple[str, ...]] = {
+    "time": ("t", "timestamp", "datetime", "utc", "utctime", "elapsedtime", "seconds"),
+    "x": ("north", "northing", "n", "posx", "positionx", "xn"),
+    "y": ("east", "easting", "e", "posy", "positiony", "ye"),
+    "psi": ("heading", "yaw", "hdg", "headingangle", "yawangle"),
+    "tau_X": ("surgeforce", "forcex", "forcesurge", "fx", "taux", "tausurge", "tau1"),
+    "tau_Y": ("swayforce", "forcey", "forcesway", "fy", "tauy", "tausway", "tau2"),
+    "tau_N": ("yawmoment", "momentyaw", "momentz", "mz", "taun", "tauyaw", "taupsi", "tau3"),
+    "u": ("surgespeed", "surgevelocity", "velocitysurge"),
+    "v": ("swayspeed", "swayvelocity", "velocitysway"),
+    "r": ("yawrate", "rateofturn", "rot", "psidot", "headingrate"),
+    "x_dot": ("velocitynorth", "northvelocity", "xdot", "vn"),
+    "y_dot": ("velocityeast", "eastvelocity", "ydot", "ve"),
+    "speed": ("sog", "speedoverground"),
+    "course": ("cog", "courseoverground"),
+    "u_water": ("stw", "speedthroughwater"),
+    "wind_speed": ("truewindspeed", "tws"),
+    "wind_direction": ("truewinddirection", "twd"),
+}
+OPPOSITE = {"south": "x", "west": "y"}  # of those that point the other way
 
 
 def _folded(name: str) -> str:

@@ -1,9 +1,11 @@
 """The line for the file beside a measurement, where it seems to be read otherwise than meant."""
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -11,10 +13,8 @@ import pandas as pd
 from cosim import InputError
 
 from ..files.text_layout import text_layout
-from .columns import QUANTITY, SHOWN, UNITS, UTF_8, Column, Layout, read_layout
+from .columns import QUANTITY, UNITS, UTF_8, Column, Layout, read_layout
 
-SI = ("s", "m", "rad", "N", "N.m", "1", "m/s", "rad/s", "m/s2")  # need not be said
-SAME_UNIT = 1e-6  # relative difference of two factors of the same unit: rounding
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 
 
@@ -53,7 +53,7 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
         column = layout.column(source)
         units = UNITS.get(QUANTITY.get(signal, ""), {})  # of an actuator's own command none is known
         wanted = factor * units.get(column.unit or "", 1.0)
-        unit = next((u for u, size in units.items() if abs(size / wanted - 1.0) < SAME_UNIT), None)
+        unit = next((u for u, size in units.items() if math.isclose(size, wanted)), None)
         changed = {"name": name or column.name, "flip": column.flip != (sign < 0.0)}
         changed |= {"unit": unit, "offset": sign * column.offset}
         if unit is None:
@@ -63,18 +63,15 @@ def line_beside(path: Path | None, changes: Mapping[str, Change], name: str | No
         columns[signal] = Column.model_validate(column.model_dump() | changed).model_dump(
             exclude_defaults=True
         )
-        if columns[signal].get("unit") in SI:
+        if units.get(columns[signal].get("unit", "")) == 1.0:  # SI need not be said
             del columns[signal]["unit"]
-    return f"; {_line(path, {'columns': columns})}"
-
-
-def _line(path: Path, content: Mapping[str, Any]) -> str:
-    return f"put {json.dumps(content)} into '{path}.json'"
+    return f"; {_changed(path, Layout(), columns=columns)}"
 
 
 def _changed(path: Path, layout: Layout, **changes: Any) -> str:
     """What to put into the file beside a measurement, with what it says now."""
-    return _line(path, layout.model_dump(exclude_defaults=True) | changes)
+    content = layout.model_dump(exclude_defaults=True) | changes
+    return f"put {json.dumps(content)} into '{path}.json'"
 
 
 def refuse_encoding(path: Path, layout: Layout) -> None:
@@ -105,9 +102,9 @@ def refuse_units(path: Path, layout: Layout, table: pd.DataFrame) -> None:
     if cells.empty or cells.isna().any(axis=None) or list(numbers.notna().all(axis=1)) != [False, True]:
         return
     if numbers.iloc[0].isna().all():
-        shown = ", ".join(cells.iloc[0])[:SHOWN]
+        told = shown(", ".join(cells.iloc[0]))
         raise InputError(
-            f"'{path}' has a line of units below the names ({shown}); "
+            f"'{path}' has a line of units below the names ({told}); "
             f"{_changed(path, layout, units_line=True)}, with the units of "
             'columns that are not in SI, as in "columns": {"x": {"name": "x", "unit": "mm"}}'
         )

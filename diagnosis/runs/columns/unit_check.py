@@ -6,35 +6,33 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy import constants as c
 
 from cosim import InputError
 from fmus.scale import REFERENCE, Scale
 
-# Quantity -> unit -> factor to SI.
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": 0.3048, "in": 0.0254},
-    "angle": {"rad": 1.0, "deg": 0.017453292519943295, "°": 0.017453292519943295},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "moment": {"N.m": 1.0, "N.mm": 1e-3, "N.cm": 1e-2, "kN.m": 1e3},
-    "command": {"1": 1.0, "%": 1e-2},
-    "shaft speed": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
-    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0},
-    "rate": {"rad/s": 1.0}
-    | dict.fromkeys(("deg/s", "°/s"), math.pi / 180.0)
-    | {"deg/min": math.pi / 10800.0},
-    "acceleration": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
-    "angular acceleration": {"rad/s2": 1.0, "deg/s2": 0.017453292519943295},
+# Quantity -> its unit in SI, and other units -> factor to that.
+OTHERS: dict[str, tuple[str, dict[str, float]]] = {
+    "time": ("s", {"ms": c.milli, "us": c.micro, "ns": c.nano, "min": c.minute}),
+    "length": ("m", {"mm": c.milli, "cm": c.centi, "km": c.kilo, "ft": c.foot, "in": c.inch}),
+    "angle": ("rad", {"deg": c.degree, "°": c.degree}),
+    "force": ("N", {"mN": c.milli, "kN": c.kilo}),
+    "moment": ("N.m", {"N.mm": c.milli, "N.cm": c.centi, "kN.m": c.kilo}),
+    "command": ("1", {"%": c.centi}),
+    "shaft speed": ("1/s", {"rpm": 1.0 / c.minute, "rad/s": 1.0 / math.tau}),
+    "speed": ("m/s", {"mm/s": c.milli, "cm/s": c.centi, "km/h": c.kmh, "kn": c.knot}),
+    "rate": ("rad/s", {"deg/s": c.degree, "°/s": c.degree, "deg/min": c.degree / c.minute}),
+    "acceleration": ("m/s2", {"mm/s2": c.milli, "g": c.g}),
+    "angular acceleration": ("rad/s2", {"deg/s2": c.degree}),
 }
+UNITS = {quantity: {unit: 1.0, **others} for quantity, (unit, others) in OTHERS.items()}
 GO_ON = "--anyway goes on all the same"
-# s between two samples of a measurement, by which a unit of time is guessed (chosen)
-USUAL = 1e-3, 1.0
-TURN = 6.3  # rad, just above a turn; a heading that stays below is in radians, and may wrap
 # s between two samples, times the scale of the ship, whose own time constants are shorter (chosen)
 RAREST = 2.0
 OFTENEST = 1e-4  # s between two samples; no camera is quicker (chosen)
-LONGEST = 1e9  # s, of a run; thirty years are a mistake in a time stamp
-FARTHEST = 1e9  # m, rad; beyond is no place on earth
+# s of a run, m or rad of a pose, N or N m of a force, times the full power: no ship has as much, and
+# sums of squares are far from overflow (chosen)
+LARGEST = 1e9
 # Beyond these no ship moves, so that the unit must be another one (chosen).
 FASTEST, QUICKEST = 30.0, 3.0  # m/s, rad/s
 
@@ -50,14 +48,7 @@ class Doubt(NamedTuple):
 def refuse_time(
     row: float, seconds: float, where: str, called: Mapping[str, str], scale: Scale = REFERENCE
 ) -> None:
-    """Refuse a time in another unit than stated.
-
-    Args:
-        row: median time between two rows [s].
-        seconds: length of the run [s].
-        where: what messages call the run.
-        called: signal -> its column in the file, where that has another name.
-        scale: of the ship.
+    """Refuse a time in another unit than stated, by the median between two rows and the length [s].
 
     Raises:
         InputError: rows are too rare or too frequent, or the run is too long.
@@ -70,27 +61,20 @@ def refuse_time(
             f"{where}: a sample each {row:.4g} s is too {'rare' if rare else 'frequent'}; "
             f"is the time in another unit?{remedy}"
         )
-    if seconds > LONGEST:
+    if seconds > LARGEST:
         raise InputError(f"{where} lasts {seconds:.3g} s: a time stamp cannot be right")
 
 
 def refuse_units(
     time: np.ndarray, pose: np.ndarray, where: str, anyway: bool, called: Mapping[str, str]
 ) -> None:
-    """Refuse units of a pose that no ship's motion can be in.
-
-    Args:
-        time: (n,) [s].
-        pose: (n, 3), as it was read.
-        where: what messages call the run.
-        anyway: whether every speed is accepted.
-        called: signal -> its column in the file, where that has another name.
+    """Refuse units of a pose (n, 3), as it was read at times (n,) [s], that no ship's motion can be in.
 
     Raises:
         InputError: it goes or turns too fast, or is nowhere on earth.
     """
     far = float(np.sort(np.abs(pose), axis=0)[len(pose) // 2].max())
-    if far > FARTHEST:
+    if far > LARGEST:
         raise InputError(f"{where} is {far:.3g} m or rad from its origin: another column is meant")
     for signals, unit, reason in () if anyway else doubts(time, pose):
         raise InputError(f"{where} {reason} {_remedy(signals, unit, called)}; {GO_ON}")
@@ -107,7 +91,7 @@ def doubts(time: np.ndarray, pose: np.ndarray) -> Iterator[Doubt]:
         yield Doubt(("x", "y"), "mm", f"goes {speed:.3g} m/s: is its position in mm?")
     psi = pose[:, 2]
     reach = float(np.quantile(np.abs(psi), 0.9))
-    if reach <= TURN:
+    if reach <= math.tau:
         return
     jumps = np.abs(np.abs(np.diff(psi)) - 360.0) < 10.0
     turn = float(np.quantile(moved[:, 2], 0.75)) if dt.size else 0.0
@@ -123,6 +107,6 @@ def _remedy(signals: Sequence[str], unit: str, called: Mapping[str, str]) -> str
 
 
 def likely_unit(row: float) -> str | None:
-    """The unit of a time in which a row each so many seconds is one of a usual measurement."""
+    """The unit of a time in which a row each so many seconds is neither too rare nor too frequent."""
     units = ((unit, row * size) for unit, size in UNITS["time"].items() if unit != "s")
-    return next((unit for unit, period in units if USUAL[0] <= period < USUAL[1]), None)
+    return next((unit for unit, period in units if OFTENEST <= period < RAREST), None)

@@ -10,17 +10,18 @@ from fmus.ship import Ship
 from ..columns.columns import POSE
 
 MATLAB = "cse1_data"
-MATLAB_POSE, MATLAB_COMMANDS = [1, 2, 6], slice(7, 12)
-# Two power settings: by hand that forward first, in dynamic positioning that aft.
-MATLAB_POWER = slice(12, 14)
+# Its first rows, and those of the five commands. Of the two power settings the first is that forward by
+# hand, and that aft in dynamic positioning.
+ROWS = ("time", "x", "y", "z", "roll", "pitch", "psi")
+COMMANDS = slice(7, 12)
+POWER = slice(12, 14)
 # The settings in dynamic positioning, at which the thrusters give their nominal force.
 FULL = (0.4, 0.5)
-SAME_COMMAND = 1e-6  # of the full command; a difference below is rounding in the file
 
 
 def fits_matlab(of: Ship) -> bool:
     """Whether these files have the commands of a ship: five of its units, and two power settings."""
-    width = MATLAB_COMMANDS.stop - MATLAB_COMMANDS.start
+    width = COMMANDS.stop - COMMANDS.start
     return len(of.layouts[-1].commands) == width and len(of.power_settings) == len(FULL)
 
 
@@ -38,15 +39,16 @@ def read_matlab(path: Path, of: Ship) -> dict[str, np.ndarray]:
         from scipy.io import loadmat  # most runs are no MATLAB files
 
         data = np.asarray(loadmat(path)[MATLAB], float)
-        if data.ndim != 2 or data.shape[0] < MATLAB_POWER.stop or not data.size:
+        if data.ndim != 2 or data.shape[0] < len(ROWS) or not data.size:
             raise ValueError(f"a matrix of shape {data.shape}")
     except KeyError:
         raise InputError(f"'{path}' is not a measured run: it has no '{MATLAB}'") from None
     except Exception as error:  # a broken file makes the reader stumble in many ways
         raise InputError(f"'{path}' is not a measured run: {' '.join(str(error).split())}") from None
-    rows = [data[0], *data[MATLAB_POSE], *data[MATLAB_COMMANDS], *_power(data)]
-    names = ("time", *POSE, *of.layouts[-1].commands, *of.power_settings)
-    return dict(zip(names, rows, strict=True))
+    rows: dict[str, np.ndarray] = dict(zip(ROWS, data, strict=False))
+    names = (*of.layouts[-1].commands, *of.power_settings)
+    given = zip(names, [*data[COMMANDS], *_power(data)], strict=True)
+    return {s: rows[s] for s in ("time", *POSE)} | dict(given)
 
 
 def _power(data: np.ndarray) -> np.ndarray:
@@ -56,8 +58,8 @@ def _power(data: np.ndarray) -> np.ndarray:
     sway command. Their thrust goes with the square of their speed (2.11), that of the thruster forward
     with its limit.
     """
-    fore, aft = data[MATLAB_POWER]
-    alike = np.abs(data[MATLAB_COMMANDS][1] - data[MATLAB_COMMANDS][3]) < SAME_COMMAND
+    fore, aft = data[POWER]
+    alike = np.isclose(data[COMMANDS][1], data[COMMANDS][3])
     stretch = np.cumsum(
         np.diff(fore, prepend=fore[0]).astype(bool) | np.diff(aft, prepend=aft[0]).astype(bool)
     )

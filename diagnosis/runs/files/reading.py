@@ -18,6 +18,7 @@ from cosim.errors import nearest
 from cosim.results import read_options
 from fmus.ship import Ship, ship
 from fmus.ship_description import Description
+from fmus.ships.naming import DEFAULT
 
 from ..columns.columns import (
     BESIDE,
@@ -32,16 +33,13 @@ from ..columns.columns import (
     signals,
     to_si,
 )
-from ..columns.unit_check import UNITS
+from ..columns.unit_check import LARGEST, UNITS
 from .matlab_files import fits_matlab, read_matlab
 from .tables import column_names, date_stamps, numbers, table_of_file
 
 LOGS = ("log.csv", "log.parquet")
 # Real commands overshoot by rounding; far beyond they are in another unit.
 MOST_COMMAND = 1.05  # of the full command
-# N, N m; of a force or moment, and as many times the full thrust. Chosen: far above any ship's, and far
-# below where sums of squares overflow.
-MOST_FORCE, MOST_POWER = 1e9, 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +160,7 @@ def _tabular(path: Path, layout: Layout | None, of: Ship, also: set[str]) -> tup
         wanted = {layout.column(s).name for s in signals(layout, names, f"'{path}'", of)}
         return table_of_file(path, layout, wanted | also.intersection(names)), layout
     except ImportError:
-        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[parquet]'") from None
+        raise InputError("reading Parquet needs pyarrow: pip install 'cybership[tables]'") from None
     except InputError:
         raise
     except Exception as error:  # a broken file makes the readers stumble in many ways
@@ -211,9 +209,9 @@ def _run(name: str, columns: dict[str, np.ndarray], where: str, of: Ship) -> Run
         most = float(np.abs(commands).max(initial=0.0))
         if most > MOST_COMMAND:
             raise InputError(f'{where}: commands reach {most:g}, not -1 to 1; are they of "unit": "%"?')
-    if power is not None and power.max(initial=0.0) > MOST_POWER:
+    if power is not None and power.max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: power reaches {power.max():g} times the full thrust, not 1")
-    if tau is not None and np.abs(tau).max(initial=0.0) > MOST_FORCE:
+    if tau is not None and np.abs(tau).max(initial=0.0) > LARGEST:
         raise InputError(f"{where}: commands reach {np.abs(tau).max():g} N, as no thruster does")
     missing = [~np.isfinite(columns[s]) for s in dict.fromkeys((*TAU, *own, *settings)) if s in columns]
     lost = sum(gaps.any() for gaps in missing)
@@ -258,3 +256,25 @@ def layout_beside(run: Run) -> dict[str, Any]:
     kept = (before or Layout()).model_dump(exclude_defaults=True, include={"trial"})
     columns = {name: Column(name=name, noise=std) for name, std in run.noise.items()}
     return kept | Layout(columns=columns).model_dump(exclude_defaults=True)
+
+
+def ship_of_logs(paths: Iterable[Path]) -> tuple[str, Path] | None:
+    """The ship that logs of :mod:`cosim` are of, and the first one that says so.
+
+    Args:
+        paths: of runs; files that are no logs say nothing.
+
+    Returns:
+        The name or file of the ship; None: CyberShip Enterprise 1, or no log tells.
+
+    Raises:
+        InputError: they are of several ships.
+    """
+    logs = {path: read_options(path if path.is_dir() else path.parent) for path in paths}
+    told = {path: log.ship or log.outline.name for path, log in logs.items() if log.outline}
+    ships = dict.fromkeys(told.values())
+    if len(ships) > 1:
+        each = ", ".join(f"'{path}' of {ship}" for path, ship in told.items())
+        raise InputError(f"the runs are of several ships: {each}")
+    first = next(iter(told.items()), None)
+    return None if first is None or first[1] == DEFAULT else (first[1], first[0])

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from pathlib import Path
+from reprlib import repr as shown
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pandas as pd
 
 from cosim import InputError
 
-from ..columns.columns import SHOWN, Layout
+from ..columns.columns import Layout
 from ..columns.side_car import decimal_comma, refuse_encoding, refuse_layout, refuse_units
 
 # What pandas makes of Ctrl-C while it reads from memory, where nothing else can fail.
@@ -50,18 +51,13 @@ def table_of_file(path: Path, layout: Layout, wanted: Collection[str]) -> pd.Dat
 
 def csv_table(path: Path, layout: Layout, wanted: Collection[str]) -> pd.DataFrame:
     """The columns of some names of a CSV file, those of them that there are."""
-    try:
-        return _csv(
-            path,
-            layout,
-            usecols=lambda name: str(name).strip() in wanted,
-            decimal=layout.decimal,
-            skipinitialspace=True,
-        ).rename(columns=str.strip)
-    except pd.errors.ParserError as error:
-        if READ_INTERRUPTED in str(error):
-            raise KeyboardInterrupt from error
-        raise
+    return _csv(
+        path,
+        layout,
+        usecols=lambda name: str(name).strip() in wanted,
+        decimal=layout.decimal,
+        skipinitialspace=True,
+    ).rename(columns=str.strip)
 
 
 def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
@@ -79,6 +75,10 @@ def _csv(path: Path, layout: Layout, **options: Any) -> pd.DataFrame:
     except UnicodeDecodeError:
         refuse_encoding(path, layout)
         raise
+    except pd.errors.ParserError as error:
+        if READ_INTERRUPTED in str(error):
+            raise KeyboardInterrupt from error
+        raise
 
 
 def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
@@ -95,7 +95,7 @@ def date_stamps(cells: pd.Series, where: str) -> np.ndarray | None:
         return None
     wrong = _first(cells, stamps.isna())
     if wrong is not None:
-        raise InputError(f"{where}: {cells.name} = {wrong!r} is not a date stamp of ISO 8601")
+        raise InputError(f"{where}: {cells.name} = {shown(wrong)} is not a date stamp of ISO 8601")
     return np.asarray((stamps - stamps.dropna().iloc[0]).dt.total_seconds(), float)
 
 
@@ -108,11 +108,11 @@ def numbers(cells: pd.Series, path: Path, layout: Layout) -> np.ndarray:
     wrong = _first(cells, np.isnan(found))
     if wrong is not None:
         hint = decimal_comma(path, layout, wrong)
-        raise InputError(f"'{path}': {cells.name} = {wrong!r} is not a number{hint}")
+        raise InputError(f"'{path}': {cells.name} = {shown(wrong)} is not a number{hint}")
     return found
 
 
 def _first(cells: pd.Series, unreadable: Any) -> str | None:
-    """The beginning of the first cell that is not empty and could not be read."""
+    """The first cell that is not empty and could not be read."""
     wrong = np.flatnonzero(unreadable & np.asarray(cells.notna()))
-    return str(cells.iloc[wrong[0]])[:SHOWN] if wrong.size else None
+    return str(cells.iloc[wrong[0]]) if wrong.size else None

@@ -9,7 +9,6 @@ import numpy as np
 # A row is on a line to rounding, which must be less than this share of how far the others are off: with
 # normal noise in two channels one row in two thousand is on a line by chance then. Chosen.
 ON_LINE = 0.03
-FUZZ = 1e-9  # relative, of numbers that were not rounded
 FEWEST = 0.15  # share of rows on lines from which on a log counts as filled; chosen, far above chance
 LONGEST = 8  # rows in a line that is no ship's steady motion without noise (chosen)
 
@@ -17,11 +16,8 @@ LONGEST = 8  # rows in a line that is no ship's steady motion without noise (cho
 def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
     """(n,): rows that a straight line between two measurements has filled; none in most logs.
 
-    Of the two rows about a telegram the one nearer to it stays.
-
-    Args:
-        time: (n,) [s], in order.
-        position: (n, 2) [m], finite.
+    Of the two rows about a telegram the one nearer to it stays. Times (n,) [s] are in order, positions
+    (n, 2) [m] finite.
     """
     none = np.zeros(time.size, bool)
     if time.size < 2 * LONGEST:
@@ -31,13 +27,8 @@ def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
     rounding = max(_rounding(channel) for channel in position.T)
     on = none.copy()
     on[1:-1] = off <= rounding
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], on, [0]]).astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    if (
-        rounding > ON_LINE * np.quantile(off, 0.9)
-        or on.mean() < FEWEST
-        or np.mean(lengths > LONGEST) > 0.1
-    ):
+    too_long = np.mean([end - begin > LONGEST for begin, end in groups_of(on)] or [False]) > 0.1
+    if rounding > ON_LINE * np.quantile(off, 0.9) or on.mean() < FEWEST or too_long:
         return none
     first = np.flatnonzero(~on & np.concatenate([[True], on[:-1]]))  # of each block of rows on no line
     rows = np.flatnonzero(~on)
@@ -57,7 +48,11 @@ def filled(time: np.ndarray, position: np.ndarray) -> np.ndarray:
 def _rounding(values: np.ndarray) -> float:
     """How far from a line rounding takes a row [m]: the step between values, and a little for digits."""
     steps = np.diff(np.unique(values))
-    fuzz = FUZZ * float(np.ptp(values))
-    return 1.05 * max(
-        float(steps[steps > fuzz].min(initial=np.inf)) if (steps > fuzz).any() else 0.0, fuzz
-    )
+    fuzz = float(np.sqrt(np.finfo(float).eps) * np.ptp(values))
+    return 1.05 * float(min(steps[steps > fuzz], default=fuzz))
+
+
+def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
+    """First index, and the one after the last, of each group of successive true values (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))

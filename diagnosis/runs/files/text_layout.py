@@ -7,25 +7,19 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from ..columns.columns import UNITS, Layout
+from ..columns.columns import PREAMBLE, UNITS, Layout
 
 SEPARATORS = (",", ";", "\t", "|")  # that a table may have between its cells
-LINES = 250  # that are looked at: far more than any preamble has (chosen)
 KNOWN = {unit for units in UNITS.values() for unit in units}
 
 
 def text_layout(path: Path, encoding: str) -> Layout | None:
     """Separator, decimal mark, line of the names and of the units, as the first lines suggest.
 
-    Args:
-        path: of a CSV file.
-        encoding: of its text.
-
-    Returns:
-        A layout without columns; None if there is no table of numbers below a line of names.
+    Without columns; None if there is no table of numbers below a line of names.
     """
     with path.open(encoding=encoding, errors="replace", newline="") as file:
-        lines = list(islice(file, LINES))
+        lines = list(islice(file, PREAMBLE))
     found = [_with(separator, decimal, lines) for separator in SEPARATORS for decimal in ".,"]
     best = max(found, key=lambda each: each[0])
     return best[1]

@@ -23,24 +23,25 @@ from scipy.sparse import csr_array
 
 from ..smoothing.outliers import OUTLIER
 from ..smoothing.penalised import Equations, System
+from ..thinning import MOST_ROWS
 from .constants import Column
 from .evidence import Evidence
 
-STATES = 4  # unknowns of a node: north, east, heading, rate of the clock
-CLOCKS = slice(STATES - 1, None, STATES)  # the rates among all unknowns
+NODE = ("north", "east", "heading", "rate of the clock")  # the unknowns of a node
+STATES = len(NODE)
+CLOCKS = slice(NODE.index("rate of the clock"), None, STATES)  # the rates among all unknowns
 # s between two nodes, or as long as a sampling period. Chosen: a clock of arrival wanders over seconds.
 SPACING = 1.0
-# Nodes, and samples between two of them, evenly chosen of more: memory and time. Chosen: a hundred MB.
-MOST_NODES, MOST_SAMPLES = 20_000, 8
-# Prior standard deviation of c about 1 at each node: of a clock that may be off, none of which runs at
-# half or double rate, and of one that may not; also the inverse [m, rad] of that of a pose (chosen).
+MOST_SAMPLES = 8  # between two nodes, evenly chosen of more; chosen: the path between is nearly straight
+# Prior standard deviation of c about 1 at each node; chosen: no clock runs at half or double rate.
 ANCHOR = 0.5
-EVEN = 1e-6
+# The same of a clock that may not be off; m or rad of a noise; inverse of the prior standard deviation
+# of a pose. It keeps the equations well-posed.
+NEGLIGIBLE = 1e-6
 SLOWEST = 0.1  # true seconds in a second of the log, at the least: time does not fall; chosen
 BEGIN = 0.1  # of the walks in a second, times the noise or the rate; first guess
 LEAST = 1e-3  # of the noise, and of the walks over the whole run; less changes no path (chosen)
 SWEEPS = 25  # of the fixed point; chosen: the likelihood then changes by less than 0.1
-STILL = 1e-6  # relative change of all deviations in a sweep that ends them (chosen)
 # Groups of equations of one variance: samples along, across, heading; drift of velocity, of rate; clock.
 ALONG, ACROSS, HEADING, DRIFT, TURN, CLOCK, RATE, FIXED = range(8)
 
@@ -66,7 +67,7 @@ class PathProblem:
         time, rows = e.time, e.rows
         for start, end in gaps:
             rows = rows[(time[rows] <= start) | (time[rows] >= end)]
-        spacing = max(SPACING, float(time[rows[-1]] - time[rows[0]]) / MOST_NODES)
+        spacing = max(SPACING, float(time[rows[-1]] - time[rows[0]]) * MOST_SAMPLES / MOST_ROWS)
         self.nodes = rows[_spaced(time[rows], spacing)]
         self.edges = time[self.nodes]
         self.cut = np.zeros(self.nodes.size - 1, bool)
@@ -125,16 +126,20 @@ class PathProblem:
         add(CLOCK, of, np.zeros(j.size), 0.5 * (steps[j] + steps[j + 1]))
         add(RATE, [(STATES * np.arange(m) + clock, one)], np.ones(m), one)
         for i in range(clock):
-            add(FIXED, [(STATES * np.arange(m) + i, np.array([EVEN]))], np.zeros(m), one)
+            add(FIXED, [(STATES * np.arange(m) + i, np.array([NEGLIGIBLE]))], np.zeros(m), one)
         equation, unknown, factor = (np.concatenate(each) for each in zip(*entries, strict=True))
         self.right, group = np.concatenate(right), np.concatenate(groups)
         matrix = csr_array((factor, (equation, unknown)), shape=(group.size, STATES * m))
         root = 1.0 / np.sqrt(np.concatenate(lengths))
         self.present = sorted(set(group.tolist()) - {RATE, FIXED})
-        normals = np.array([_normal(matrix[group == g], root[group == g]) for g in range(FIXED + 1)])
+        normals = []
+        for g in range(FIXED + 1):  # lower band of M^T W M, in which two neighbouring nodes lie
+            of = matrix[group == g]
+            normal = of.T @ (of * (root[group == g] ** 2)[:, None])
+            normals.append([np.pad(normal.diagonal(-k), (0, k)) for k in range(2 * STATES)])
         # The walk of the clock and its anchor are one prior, which counts as a whole.
         counts = np.array([np.sum(group == g) if g < CLOCK else 0 for g in range(FIXED + 1)])
-        self.equations = Equations(matrix, matrix.T, root, group, normals, counts)
+        self.equations = Equations(matrix, matrix.T, root, group, np.array(normals), counts)
 
     def border(self, constants: Sequence[Column], clock: np.ndarray) -> np.ndarray:
         """(equations, constants): what one unit of each constant changes, with a rate of the clock."""
@@ -150,15 +155,10 @@ class PathProblem:
         return made
 
     def solve(self, constants: Sequence[Column], fixed_clock: bool = False) -> "Path":
-        """The likeliest path.
-
-        Args:
-            constants: faults that are looked for.
-            fixed_clock: whether the clock is taken to run evenly at rate 1.
-        """
+        """The likeliest path with some constant faults; a fixed clock runs evenly at rate 1."""
         place, angle = self.noise
         samples, walk = np.array([place, place, angle]), np.array([place, angle, 1.0])
-        std = np.array([*samples, *(BEGIN * walk), EVEN if fixed_clock else ANCHOR, 1.0])
+        std = np.array([*samples, *(BEGIN * walk), NEGLIGIBLE if fixed_clock else ANCHOR, 1.0])
         least = LEAST * np.array([*samples, *(walk / np.sqrt(self.edges[-1] - self.edges[0]))])
         path = Path(self, constants, std, np.ones(self.nodes.size - 1))
         for _ in range(SWEEPS):
@@ -169,7 +169,7 @@ class PathProblem:
                 off = path.residual[self.equations.group == g]
                 free = max(off.size - path.system.trace(g), 1.0)
                 std[g] = max(std[g] * float(np.sqrt((off**2).sum() / free)), least[g])
-            changed = (np.abs(std - path.std) > STILL * path.std).any()
+            changed = (np.abs(std - path.std) > NEGLIGIBLE * path.std).any()
             path = Path(self, constants, std, path.clock)
             if not changed:
                 break
@@ -234,18 +234,11 @@ class Path:
         return np.sqrt(variance)
 
 
-def _normal(matrix: csr_array, root: np.ndarray) -> np.ndarray:
-    """(band, unknowns): lower band of M^T W M, in which two neighbouring nodes lie."""
-    normal = matrix.T @ (matrix * (root**2)[:, None])
-    bands = [np.pad(normal.diagonal(-k), (0, k)) for k in range(2 * STATES)]
-    return np.array(bands)
-
-
 def _spaced(time: np.ndarray, spacing: float) -> np.ndarray:
     """Indices of times [s] at least that far apart."""
     kept, last = [], -np.inf
     for k, t in enumerate(time.tolist()):
-        if t - last >= spacing * (1.0 - 1e-9):
+        if t - last >= spacing * (1.0 - NEGLIGIBLE):
             kept.append(k)
             last = t
     return np.array(kept)

@@ -9,8 +9,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from fmus.scale import Scale
+from fmus.scale import REFERENCE_LENGTH, Scale
 
+from ..cleaning import SHORTEST
 from .evidence import Evidence, integral
 
 Needs = Literal["velocity", "rate"]
@@ -24,12 +25,9 @@ DEVIATIONS: Mapping[Deviation, Callable[[np.ndarray], np.ndarray]] = {
     "deviation_sin_2": lambda psi: np.sin(2.0 * psi),
     "deviation_cos_2": lambda psi: np.cos(2.0 * psi),
 }
-# Smaller faults are not reported, as they matter in no manoeuvre; metres and seconds are those of
-# CyberShip Enterprise 1, times the scale of the ship. All chosen.
-LEAST_SCALE = 0.005  # of the channel
-LEAST_ANGLE = 0.0035  # rad, 0.2 deg
-LEAST_RATE = 1e-3  # rad/s: half a degree in a window of prediction
-LEAST_PLACE = 0.01  # m
+# Of a channel or a clock, rad, ship's lengths, or rad in a window of prediction; of a delay as below.
+# Chosen: smaller faults matter in no manoeuvre.
+LEAST = 0.005
 LEAST_DELAY = 0.5  # of the time between two samples
 
 
@@ -61,6 +59,11 @@ def columns(e: Evidence, scale: Scale) -> list[Column]:
     return [*_of_velocity(e, scale, late), *_of_rate(e, scale, late)]
 
 
+def least_place(scale: Scale) -> float:
+    """Distance [m] from which on another place aboard matters."""
+    return LEAST * REFERENCE_LENGTH * scale.length
+
+
 def _path(e: Evidence, move: np.ndarray | float = 0.0, turn: np.ndarray | float = 0.0) -> np.ndarray:
     path = np.zeros((e.time.size, 3))
     path[:, :2], path[:, 2] = move, turn
@@ -75,7 +78,7 @@ def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[Column]:
     axes = "psi" if e.by == ("u", "v") else e.by[1]
     across = np.column_stack([e.gone[:, 1], -e.gone[:, 0]]) * (-1.0 if axes == "y_dot" else 1.0)
     # The position is measured that far ahead and to starboard of where the velocity is.
-    c, s, place = np.cos(e.psi), np.sin(e.psi), LEAST_PLACE * scale.length
+    c, s, place = np.cos(e.psi), np.sin(e.psi), least_place(scale)
     ahead, aside = (_path(e, np.column_stack(side)) for side in ((c, s), (-s, c)))
     # In the ship's own axes the velocity is turned by the heading of now, so that what turns of the ship
     # change in the velocity over ground is not late.
@@ -84,8 +87,8 @@ def _of_velocity(e: Evidence, scale: Scale, late: float) -> list[Column]:
         mean, turn = 0.5 * (e.velocity[1:] + e.velocity[:-1]), np.diff(e.psi)
         delay[1:, :2] -= np.cumsum(np.column_stack([-mean[:, 1], mean[:, 0]]) * turn[:, None], axis=0)
     return [
-        Column(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST_SCALE),
-        Column(axes, "offset", "rad", "velocity", _path(e, across), LEAST_ANGLE),
+        Column(e.by[0], "scale", "1", "velocity", _path(e, -e.gone), LEAST),
+        Column(axes, "offset", "rad", "velocity", _path(e, across), LEAST),
         Column("x", "place", "m", "velocity", ahead, place, False),
         Column("y", "place", "m", "velocity", aside, place, False),
         Column(e.by[0], "delay", "s", "velocity", delay, late, False),
@@ -98,8 +101,8 @@ def _of_rate(e: Evidence, scale: Scale, late: float) -> list[Column]:
         return []
     offset = _path(e, turn=e.time[0] - e.time)
     return [
-        Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST_SCALE),
-        Column("r", "offset", "rad/s", "rate", offset, LEAST_RATE * scale.rate),
+        Column("r", "scale", "1", "rate", _path(e, turn=-e.turned), LEAST),
+        Column("r", "offset", "rad/s", "rate", offset, LEAST / (SHORTEST * scale.time)),
         Column("r", "delay", "s", "rate", _path(e, turn=e.rate), late, False),
     ]
 
@@ -115,5 +118,5 @@ def deviations(e: Evidence) -> list[Column]:
         if e.by == ("u", "v") and e.velocity is not None:
             across = np.column_stack([e.velocity[:, 1], -e.velocity[:, 0]]) * path[:, 2:]
             path[:, :2] = integral(e.time, across)
-        made.append(Column("psi", kind, "rad", "rate", path, LEAST_ANGLE, False))
+        made.append(Column("psi", kind, "rad", "rate", path, LEAST, False))
     return made

@@ -7,14 +7,18 @@ import numpy as np
 
 from fmus.frames import rotate_to_earth
 
-from ..cleaning import in_order, lost, noise, repeated
+from ..cleaning import NORMAL_MAD, in_order, lost, noise, repeated
 from ..files.reading import Run
 from ..files.telegrams import filled
 
-FEWEST = 60  # samples or windows; chosen: an estimate of a few constants and of two noises
+# Samples or windows, of which some constants and noises are estimated, and parts of a run whose spread
+# gives a standard deviation (chosen).
+FEWEST = 20
 SURE = 4.0  # standard deviations; the noise is estimated, and some ten faults are looked for (chosen)
-BLOCKS = 20  # parts of a run whose spread gives a standard deviation; chosen
+FAR = 8.0  # times what is usual, from which on a step or a sample is none of a ship's motion (chosen)
 AGREED = 0.7  # correlation from which on two channels tell of the same motion (chosen)
+ALIKE = 0.3  # relative difference up to which two quantities may be the same but for a fault (chosen)
+LEAST_TURN = 0.1  # rad in a step, from which on a heading may have jumped (chosen)
 # Of the largest yaw rate, 95 % of all, up to which rows are on straight legs (chosen).
 STRAIGHT = 0.25
 # Channels that give the velocity over ground, best first: with the heading, or without it.
@@ -76,11 +80,8 @@ def evidence(run: Run) -> Evidence | None:
     psi = np.interp(run.time, run.time[fresh], np.unwrap(run.pose[fresh, 2]))
     by = next((pair for pair in VELOCITIES if all(_given(run, name) for name in pair)), None)
     rate = _whole(run, "r") if _given(run, "r") else None
-    if by is None and rate is None:
-        return None
-    return Evidence(
-        run, rows, psi, None if by is None else velocity_over_ground(run, by, psi), rate, by, between
-    )
+    velocity = None if by is None else velocity_over_ground(run, by, psi)
+    return None if by is None and rate is None else Evidence(run, rows, psi, velocity, rate, by, between)
 
 
 def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -96,21 +97,19 @@ def _given(run: Run, name: str) -> bool:
 
 
 def _whole(run: Run, name: str) -> np.ndarray:
-    values = run.measured[name]
-    there = np.isfinite(values)
-    return np.interp(run.time, run.time[there], values[there])
+    there = np.isfinite(run.measured[name])
+    values = run.measured[name][there]
+    return np.interp(run.time, run.time[there], np.unwrap(values) if name == "course" else values)
 
 
 def velocity_over_ground(run: Run, by: tuple[str, str], psi: np.ndarray) -> np.ndarray:
     """Velocity (n, 2) to north and east [m/s]."""
+    first, second = (_whole(run, name) for name in by)
     if by == ("x_dot", "y_dot"):
-        return np.column_stack([_whole(run, name) for name in by])
+        return np.column_stack([first, second])
     if by == ("speed", "course"):
-        speed, there = _whole(run, "speed"), np.isfinite(run.measured["course"])
-        course = np.unwrap(run.measured["course"][there])
-        course = np.interp(run.time, run.time[there], course)
-        return np.column_stack([speed * np.cos(course), speed * np.sin(course)])
-    return np.column_stack(rotate_to_earth(psi, _whole(run, "u"), _whole(run, "v")))
+        return np.column_stack([first * np.cos(second), first * np.sin(second)])
+    return np.column_stack(rotate_to_earth(psi, first, second))
 
 
 def straight(rate: np.ndarray) -> np.ndarray:
@@ -118,9 +117,14 @@ def straight(rate: np.ndarray) -> np.ndarray:
     return np.abs(rate) < STRAIGHT * np.quantile(np.abs(rate), 0.95)
 
 
+def large(values: np.ndarray) -> np.ndarray:
+    """(n,): values (n,) that are at least half as large as the largest, 90 % of all."""
+    return np.abs(values) > np.nanquantile(np.abs(values), 0.9) / 2.0
+
+
 def spread_of(values: np.ndarray) -> float:
     """Standard deviation of normal values about their median, by the median of their distances to it."""
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
 
 
 def blocked_fit(
@@ -137,18 +141,12 @@ def blocked_fit(
         Two arrays (k,).
     """
     several = right.size // time.size
-    block = np.tile((BLOCKS * np.arange(time.size)) // time.size, several)
+    block = np.tile((FEWEST * np.arange(time.size)) // time.size, several)
 
     def solved(keep: np.ndarray) -> np.ndarray:
         return np.linalg.lstsq(columns[keep], right[keep], rcond=None)[0]
 
     value = solved(np.ones(right.size, bool))
-    parts = np.array([solved(block != k) for k in range(BLOCKS)])
-    std = np.sqrt((BLOCKS - 1) / BLOCKS * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    parts = np.array([solved(block != k) for k in range(FEWEST)])
+    std = np.sqrt((FEWEST - 1) / FEWEST * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
     return value, np.maximum(std, float(noise(right[:, None])[0]) / np.sqrt(right.size))
-
-
-def groups_of(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First index, and the one after the last, of each group of successive true values (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]).astype(int))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))

@@ -17,13 +17,12 @@ import numpy as np
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import in_order
+from ..cleaning import WIDTH, in_order
 from ..files.reading import Run
-from .constants import LEAST_ANGLE, LEAST_DELAY, LEAST_PLACE, LEAST_SCALE, Kind
+from .constants import LEAST, LEAST_DELAY, Kind, least_place
 from .evidence import FEWEST, SURE, blocked_fit, evidence, integral
 from .sensor_finding import Examined, SensorFinding
 
-WINDOW = 2.0  # s, times the scale of the ship: the velocity then changes by more than its noise (chosen)
 LEAST_OFFSET = 1e-3  # m/s2, the same on a ship of any size: a tenth of a millig (chosen)
 WATER = ("u_water", "v_water")
 
@@ -76,7 +75,7 @@ def receivers(run: Run, scale: Scale) -> Examined:
             time = run.time[there]
             value, std = blocked_fit(np.ones((time.size, 1)), apart[there], time)
             text = "the second heading is {1:.3g}° from the first"
-            turned = _findings([_Fault("psi_2", "offset", "rad", LEAST_ANGLE, text)], value, std, time)
+            turned = _findings([_Fault("psi_2", "offset", "rad", LEAST, text)], value, std, time)
             repaired["psi_2"] = two["psi_2"] - sum(f.value for f in turned)
             found += turned
     return Examined(replace(run, measured=repaired) if found else run, tuple(found))
@@ -89,7 +88,7 @@ def _places(run: Run, scale: Scale) -> list[SensorFinding]:
     body = np.concatenate(rotate_to_body(pose[:, 2], *apart.T))
     speed = np.concatenate(rotate_to_body(pose[:, 2], *np.gradient(pose[:, :2], time, axis=0).T))
     sides = np.repeat(np.eye(2), time.size, axis=0)
-    least, period = LEAST_PLACE * scale.length, float(np.median(np.diff(time)))
+    least, period = least_place(scale), float(np.median(np.diff(time)))
     antenna = "the second antenna is {:.3g} m "
     late = "the second position comes {:.3g} s later than the first"
     faults = (
@@ -107,7 +106,7 @@ def accelerations(run: Run, scale: Scale) -> Examined:
     if e is None or e.velocity is None or e.rate is None or not given:
         return Examined(run)
     a = np.column_stack([e.run.measured["a_x"], e.run.measured["a_y"]])
-    time, seconds = e.time, WINDOW * scale.time
+    time, seconds = e.time, WIDTH * scale.time
     edges = np.searchsorted(time, np.arange(time[0], time[-1], seconds))
     whole = time[edges[1:]] - time[edges[:-1]] < 2.0 * seconds
     first, last = edges[:-1][whole], edges[1:][whole]
@@ -128,13 +127,13 @@ def accelerations(run: Run, scale: Scale) -> Examined:
     right = ((nu - turning)[last] - (nu - turning)[first]).T.ravel()
     value, std = blocked_fit(columns, right, time[first])
     factor, turn = np.hypot(value[0], value[3]), np.arctan2(value[3], value[0])
-    place, least = "the acceleration is measured {:.3g} m ", LEAST_PLACE * scale.length
+    place, least = "the acceleration is measured {:.3g} m ", least_place(scale)
     axes = "the axes of a_x and a_y are turned by {:.3g} rad from those of the velocity"
     faults = (
-        _Fault("a_x", "scale", "1", LEAST_SCALE, "a_x and a_y are {:.4g} times what the velocity says"),
+        _Fault("a_x", "scale", "1", LEAST, "a_x and a_y are {:.4g} times what the velocity says"),
         _Fault("a_x", "offset", "m/s2", LEAST_OFFSET, "a_x is {:.3g} m/s2 too large"),
         _Fault("a_y", "offset", "m/s2", LEAST_OFFSET, "a_y is {:.3g} m/s2 too large"),
-        _Fault("a_y", "offset", "rad", LEAST_ANGLE, axes),
+        _Fault("a_y", "offset", "rad", LEAST, axes),
         _Fault("a_x", "place", "m", least, place + "ahead of where the velocity is"),
         _Fault("a_y", "place", "m", least, place + "to starboard of where the velocity is"),
     )
@@ -169,7 +168,7 @@ def through_water(run: Run, scale: Scale) -> Examined:
             "that is a current, if the speed through the water is right",
         )
     text = "the speed through the water is {:.4g} times what the velocity over ground says"
-    fault = _Fault(WATER[given[0]], "scale", "1", LEAST_SCALE, text)
+    fault = _Fault(WATER[given[0]], "scale", "1", LEAST, text)
     found = _findings([fault], 1.0 / value[:1], std[:1] / value[:1] ** 2, e.time)
     if not found:
         return Examined(run, notes=notes)

@@ -2,22 +2,15 @@
 
 import numpy as np
 
-from ..cleaning import LONG
-from .evidence import AGREED, Evidence, groups_of, spread_of
-from .sensor_finding import Z95, SensorFinding
+from ..cleaning import HELD, LONG, Z95
+from ..files.telegrams import groups_of
+from ..thinning import MOST_ROWS
+from .constants import LEAST
+from .evidence import AGREED, ALIKE, FAR, FEWEST, LEAST_TURN, Evidence, spread_of
+from .sensor_finding import SensorFinding
 
-FAR = 8.0  # robust standard deviations of how far steps differ from what the speed says (chosen)
-SHORTEST = 0.5  # s; a shorter jump does no harm (chosen)
-FAST = 3.0  # times the log's step: what is less is a clock that runs fast (chosen)
-STAND = 0.75  # of the log's step that no motion fills, where the log jumps ahead (chosen)
-LEAST_TURN = 0.1  # rad, of a heading that jumps along; chosen
-MOST_BEND = 1.5  # rad, half of the turn of a bend that is taken as even (chosen)
-# Windows elsewhere: times that are tried, from a share to a multiple of what the speed says; how many
-# windows of each are looked at, and how many the least. Chosen.
-WIDE, TIMES, MOST_WINDOWS, FEWEST = 3.0, 81, 1000, 20
-ALIKE = 0.3  # relative difference of their turns, and of speeds at their ends (chosen)
-AROUND = 5  # samples before and after, in which a spike returns, and whose speed counts (chosen)
-SPEED = 0.01  # relative uncertainty of a speed that does not change (chosen)
+FAST = 3.0  # times the log's step, or its inverse: what is less is a clock that runs fast (chosen)
+AROUND = int(LONG)  # samples before and after, in which a spike returns, and whose speed counts
 
 
 def gaps(e: Evidence) -> list[SensorFinding]:
@@ -39,8 +32,8 @@ def gaps(e: Evidence) -> list[SensorFinding]:
     least = FAR * spread_of(turned)
     # Position and heading jump together in time alone, however the ship went meanwhile.
     missing = (late > FAST * step) & (aligned | (np.abs(turned) > max(least, LEAST_TURN)))
-    ahead = (late < -STAND * step) & (step > LONG * period)
-    shortest = max(SHORTEST, 2.0 * period)
+    ahead = (FAST * (late + step) < step) & (step > LONG * period)
+    shortest = max(HELD, 2.0 * period)
     jumps = (np.abs(beyond) > FAR * noise) & (np.abs(late) > shortest)
     jumps &= going & (missing | ahead)
     found = []
@@ -57,7 +50,7 @@ def gaps(e: Evidence) -> list[SensorFinding]:
         near = (time > time[a] - reach) & (time < time[b] + reach)
         share = float(np.hypot((at[1] - at[0]) / 2.0, np.std(speed[near])) / u)
         share += 1.0 - float(np.exp(-0.5 * np.var(psi[near])))  # of a way that bends
-        half = Z95 * float(np.hypot(noise / u, value * (share + SPEED)))
+        half = Z95 * float(np.hypot(noise / u, value * (share + LEAST)))
         low, high = value - half, value + half
         if value > 0.0:
             by_speed = value, max(low, 0.0), high
@@ -72,9 +65,8 @@ def gaps(e: Evidence) -> list[SensorFinding]:
 
 def _arc(chord: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Length of an even bend with a chord (..., 2) [m], in which the heading turns (...) [rad]."""
-    half = np.clip(0.5 * np.abs(turn), 1e-6, None)
-    bent = np.where(half < MOST_BEND, half / np.sin(np.minimum(half, MOST_BEND)), 1.0)
-    return np.asarray(np.hypot(chord[..., 0], chord[..., 1]) * bent)
+    bent = np.where(np.abs(turn) < np.pi, np.sinc(turn / (2.0 * np.pi)), 1.0)
+    return np.asarray(np.hypot(chord[..., 0], chord[..., 1]) / bent)
 
 
 def _elsewhere(
@@ -83,21 +75,16 @@ def _elsewhere(
     """Likeliest, shortest and longest time [s] that is missing, by how the ship goes elsewhere.
 
     A ship that winds goes less far than its speed says. A time is possible if windows of that length,
-    which begin and end about as fast and turn as much, would be told as the jump is. None: there are
-    too few of these.
-
-    Args:
-        e: the channels.
-        speed: (k,), at the rows with a pose [m/s].
-        jump: the rows before and after it.
-        value: time that is missing for the speed [s].
+    which begin and end about as fast (k,) [m/s] and turn as much, would be told as the jump between two
+    rows is, whose way needs a value [s] at its speed. None: there are too few of these.
     """
     rows, time, (a, b) = e.rows, e.time[e.rows], jump
     ends = np.median(speed[max(0, a - AROUND) : a + 1]), np.median(speed[b : b + AROUND + 1])
     turn, step = float(e.psi[rows[b]] - e.psi[rows[a]]), float(time[b] - time[a])
-    starts = np.arange(0, time.size, max(1, time.size // MOST_WINDOWS))
+    starts = np.arange(0, time.size, -(-time.size // MOST_ROWS))
+    times = np.geomspace((value + step) / FAST, (value + step) * FAST)
     possible: list[tuple[float, float]] = []
-    for seconds in np.geomspace((value + step) / WIDE, (value + step) * WIDE, TIMES):
+    for seconds in times:
         last = np.searchsorted(time, time[starts] + seconds)
         inside = (last < time.size) & ((starts > a) | (last < b))
         i, j = starts[inside], last[inside]
@@ -115,6 +102,6 @@ def _elsewhere(
     if len(possible) < 2:
         return None
     _, likeliest = min(possible)
-    between = WIDE ** (2.0 / (TIMES - 1))  # two times that are tried
+    between = float(times[1] / times[0])
     shortest, longest = min(t for _, t in possible) / between, max(t for _, t in possible) * between
     return likeliest - step, shortest - step, longest - step

@@ -7,24 +7,20 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.special import chdtri
+from scipy.special import chdtrc, chdtri
 
 from fmus.scale import Scale
 
 from ..cleaning import noise
 from ..files.reading import Run
-from .clock_path import DRIFT, HEADING, TURN, Path, PathProblem, integral_of
-from .constants import DEVIATIONS, LEAST_SCALE, Column, columns, deviations
-from .evidence import SURE, Evidence, evidence, straight
+from .clock_path import DRIFT, HEADING, NEGLIGIBLE, TURN, Path, PathProblem, integral_of
+from .constants import DEVIATIONS, LEAST, Column, columns, deviations
+from .evidence import FEWEST, SURE, Evidence, evidence, large, spread_of, straight
 from .gaps import gaps
 from .repairing import Correction, corrected
 from .sensor_finding import Examined, SensorFinding
 
-CHANCE = 5e-4  # of a fall of -2 log L by which a clock or a compass is found where it is sound (chosen)
-LEAST_CLOCK = 0.01  # of the rate: a clock that is nearer to one does no harm (chosen)
 STRETCH, MOST_STRETCHES = 20.0, 200  # s over which the rate is averaged to tell where it is off; chosen
-TURNS = 0.02  # standard deviation of the yaw rate's scale up to which turns tell the clock (chosen)
-SWING = 2.0 * np.pi  # rad: headings all round, as a ship is swung to adjust its compass
 CLOCK_OR_SCALE = "the data have too little turning: a clock that runs at this rate would look the same"
 CLOCK_OR_COMPASS = "a compass that is off by heading would look the same"
 CLOCK_OR_RATE = "no speed is measured: a clock that runs at this rate would look the same"
@@ -35,8 +31,6 @@ TWO_CLOCKS = (
     "position and speed would need another clock than heading and yaw rate: something else is wrong "
     "there, such as a filter, or values that were held, and nothing but a delay is repaired"
 )
-LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.15  # rad, of a leeway that may be of a heading's axis (chosen)
-LEAST_NOISE = 1e-6  # m, rad; keeps the equations well-posed where nothing is noisy
 
 
 class Motion(NamedTuple):
@@ -104,14 +98,14 @@ def _correction(
     if not wanders:
         clock = np.full_like(clock, rates[0] if rates else 1.0)
     true = problem.edges[0] + integral_of(problem.edges, np.where(problem.cut, 1.0, clock))
-    return Correction(values, problem.edges, true, jumps)
+    return Correction(values, (problem.edges, true), jumps)
 
 
 def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFinding]) -> Motion:
     """The likeliest clock and the constants that are sure."""
     cut = [(jump.start, jump.end) for jump in jumps]
     sigma = noise(np.column_stack([e.run.pose[e.rows, :2], e.psi[e.rows]]))
-    sizes = max(float(np.hypot(*sigma[:2])), LEAST_NOISE), max(float(sigma[2]), LEAST_NOISE)
+    sizes = max(float(np.hypot(*sigma[:2])), NEGLIGIBLE), max(float(sigma[2]), NEGLIGIBLE)
     # Where the mean rate of the clock is free, there is one scale less.
     level = "r" if e.rate is not None else (e.by or ("",))[0]
     free = [c for c in every if (c.channel, c.kind) != (level, "scale")]
@@ -121,11 +115,13 @@ def _estimated(e: Evidence, every: Sequence[Column], jumps: Sequence[SensorFindi
         problem = PathProblem(e, sizes, cut, without)
         loose = problem.solve(free)
     path = problem.solve(every, fixed_clock=True)
-    likelier, deviates = (float(chdtri(k, CHANCE)) for k in (1, len(DEVIATIONS)))
+    likelier = SURE**2  # of a clock, and of a compass by the same chance
+    deviates = float(chdtri(len(DEVIATIONS), chdtrc(1, likelier)))
     wanders = path.criterion - loose.criterion > likelier and _uneven(loose)
     if wanders:
         path = loose
-    swung, either = float(np.ptp(e.psi[e.rows])) > SWING, False
+    # Headings all round, as a ship is swung to adjust its compass.
+    swung, either = float(np.ptp(e.psi[e.rows])) > 2.0 * np.pi, False
     # A compass that is off by heading looks like a wandering clock.
     if e.rate is not None and (swung or wanders):
         deviating = problem.solve([*every, *deviations(e)], fixed_clock=True)
@@ -174,7 +170,7 @@ def _even(found: Motion) -> tuple[float, float] | None:
     if found.wanders or len(at) < 2:
         return None
     values, variances = found.path.constants[at], found.path.deviation[at] ** 2
-    if abs(values[0] - values[1]) > max(SURE * np.sqrt(variances.sum()), LEAST_SCALE):
+    if abs(values[0] - values[1]) > max(SURE * np.sqrt(variances.sum()), LEAST):
         return None
     weights = 1.0 / variances
     return 1.0 - float((weights * values).sum() / weights.sum()), float(weights.sum() ** -0.5)
@@ -183,9 +179,9 @@ def _even(found: Motion) -> tuple[float, float] | None:
 def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
     by_clock = _even(found) is not None
     path, made, edges = found.path, [], found.path.problem.edges
-    # Whether the run turns so much that its turns tell the rate of the clock.
+    # Whether the run turns so much that its turns tell by how much the clock is off at the least.
     drift = path.std[TURN] * np.sqrt(e.time[-1] - e.time[0])
-    turns = e.rate is not None and np.hypot(drift, path.std[HEADING]) < TURNS * np.ptp(e.psi)
+    turns = e.rate is not None and np.hypot(drift, path.std[HEADING]) < SURE * LEAST * np.ptp(e.psi)
     for c, x, s in zip(path.columns, path.constants.tolist(), path.deviation.tolist(), strict=True):
         value, std, text, alike = x, s, "", ()
         if c.kind == "scale":
@@ -193,7 +189,7 @@ def _constants(found: Motion, e: Evidence) -> list[SensorFinding]:
                 continue
             value, std = 1.0 / (1.0 - x), s / (1.0 - x) ** 2
             # No speed tells whether the clock is at fault; nearer to one it does no harm.
-            only = e.velocity is None and abs(value - 1.0) > LEAST_CLOCK
+            only = e.velocity is None and abs(value - 1.0) > LEAST
             if not found.wanders and (only or not turns):
                 alike, text = ("clock_rate",), f"; {CLOCK_OR_RATE if only else CLOCK_OR_SCALE}"
         fault = c.channel, c.kind, c.unit
@@ -248,7 +244,7 @@ def _uneven(path: Path) -> bool:
     """Whether the clock is off its own mean somewhere, so that no constant fault can be it."""
     b = _blocks(path)
     off = np.abs(b.mean - np.average(b.mean, weights=b.std**-2.0))
-    return bool((off > np.maximum(SURE * b.std, LEAST_CLOCK)).any())
+    return bool((off > np.maximum(SURE * b.std, LEAST)).any())
 
 
 def _two_clocks(path: Path) -> bool:
@@ -273,7 +269,7 @@ def _two_clocks(path: Path) -> bool:
 def _stretches(path: Path) -> list[tuple[float, float, float, float]]:
     """Begin, end [s] and mean rate of the clock with its standard deviation, where it is off."""
     mean, std, first, last = _blocks(path)
-    off = np.where(np.abs(mean - 1.0) > np.maximum(SURE * std, LEAST_CLOCK), np.sign(mean - 1.0), 0.0)
+    off = np.where(np.abs(mean - 1.0) > np.maximum(SURE * std, LEAST), np.sign(mean - 1.0), 0.0)
     made = []
     for way, group in groupby(range(off.size), key=lambda k: off[k]):
         of = list(group)
@@ -289,13 +285,12 @@ def _leeway(e: Evidence) -> tuple[str, ...]:
     if e.by != ("u", "v") or e.rate is None:
         return ()
     u, v = e.run.measured["u"][e.rows], e.run.measured["v"][e.rows]
-    fast = np.abs(u) > 0.5 * np.nanquantile(np.abs(u), 0.9)
-    legs = fast & straight(e.rate[e.rows])
-    if legs.sum() < len(e.rows) // 20:
+    legs = large(u) & straight(e.rate[e.rows])
+    if legs.sum() < FEWEST:
         return ()
     angle = np.arctan2(v[legs], np.abs(u[legs]))
-    middle, spread = float(np.median(angle)), float(np.median(np.abs(angle - np.median(angle))))
-    if not max(LEAST_LEEWAY, 2.0 * spread) < abs(middle) < MOST_LEEWAY:
+    middle = float(np.median(angle))
+    if abs(middle) < max(LEAST, spread_of(angle)):
         return ()
     return (
         f"on straight legs the ship goes {np.degrees(middle):.2g}° to one side: the heading's axis is "

@@ -8,19 +8,16 @@ from fmus.scale import Scale
 
 from ..cleaning import LONG
 from ..files.reading import Run
-from .evidence import Evidence, evidence
+from .evidence import Evidence, evidence, large
 from .wraps import wraps
-
-TURNING = 0.5  # of the largest mean yaw rate of a window, from which on it counts as a turn (chosen)
 
 
 class Closure(NamedTuple):
-    """What windows of a run miss by.
+    """What windows of a run miss by; NaN where no velocity or no yaw rate is measured.
 
     Attributes:
-        position: median distance between where the ship is and where velocity and heading take it [m];
-            NaN where no velocity is measured.
-        heading: RMS of the heading less the integrated yaw rate, in turns [rad]; NaN where none is.
+        position: median distance between where the ship is and where velocity and heading take it [m].
+        heading: RMS of the heading less the integrated yaw rate, in turns [rad].
     """
 
     position: float
@@ -44,8 +41,7 @@ def closure(run: Run, track: float, turn: float) -> Closure:
     if e is not None and e.rate is not None:
         first, last = _windows(e, turn)
         said = e.turned[last] - e.turned[first]
-        much = np.abs(said) > TURNING * np.abs(said).max(initial=0.0)
-        off = (e.psi[last] - e.psi[first] - said)[much]
+        off = (e.psi[last] - e.psi[first] - said)[large(said) if said.size else []]
         heading = float(np.sqrt(np.mean(off**2))) if off.size else np.nan
     return Closure(position, heading)
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from fmus.frames import rotate_to_body, rotate_to_earth
 
@@ -21,14 +22,12 @@ class Correction:
 
     Attributes:
         values: (channel, kind) -> size of each constant fault.
-        log: (m,), times of the log [s]; None: the clock is right.
-        true: (m,), true times of the same instants [s].
+        clock: times (m,) of the log, and true times of the same instants [s]; empty: it is right.
         gaps: jumps of the clock.
     """
 
     values: Mapping[tuple[str, str], float]
-    log: np.ndarray | None = None
-    true: np.ndarray | None = None
+    clock: tuple[np.ndarray, ...] = ()
     gaps: Sequence[SensorFinding] = ()
 
     def of(self, channel: str, kind: str, usual: float = 0.0) -> float:
@@ -44,9 +43,7 @@ def corrected(e: Evidence, fix: Correction) -> Run:
     """
     run, time = e.run, e.time
     measured, pose = dict(run.measured), run.pose.copy()
-    deviation = sum(
-        (fix.of("psi", k) * law(e.psi) for k, law in DEVIATIONS.items()), np.zeros(time.size)
-    )
+    deviation = np.sum([fix.of("psi", k) * law(e.psi) for k, law in DEVIATIONS.items()], axis=0)
     psi, pose[:, 2] = e.psi - deviation, pose[:, 2] - deviation
     rate = e.rate
     if rate is not None:
@@ -57,7 +54,7 @@ def corrected(e: Evidence, fix: Correction) -> Run:
         velocity = _punctual(e, fix.of(e.by[0], "delay")) / fix.of(e.by[0], "scale", 1.0)
         heading = fix.of("psi", "offset")
         axes = fix.of(e.by[1], "offset") * (-1.0 if e.by[1] == "y_dot" else 1.0)
-        turned = (heading or axes) + (deviation if e.by == ("u", "v") else np.zeros(time.size))
+        turned = (heading or axes) + deviation * (e.by == ("u", "v"))
         velocity = np.column_stack(rotate_to_body(turned, *velocity.T))
         if heading and heading_is_off(e, heading):
             psi, pose[:, 2] = psi - heading, pose[:, 2] - heading
@@ -66,18 +63,14 @@ def corrected(e: Evidence, fix: Correction) -> Run:
         swing = rotate_to_earth(psi, -aside * turning, ahead * turning)
         measured |= _as_given(e, velocity + np.column_stack(swing), psi)
     repaired = replace(run, pose=pose, measured=measured)
-    return repaired if fix.log is None or fix.true is None else _retimed(repaired, e, fix)
+    return _retimed(repaired, e, fix) if fix.clock else repaired
 
 
 def heading_is_off(e: Evidence, offset: float) -> bool:
-    """Whether rather the heading is off than the axes of the velocity.
+    """Whether rather the heading is off than the axes of the velocity, which differ by an offset [rad].
 
     A ship goes ahead where nothing pushes: what of track against heading, and of the velocity in its own
     axes, has clearly less leeway on straight legs is right.
-
-    Args:
-        e: evidence.
-        offset: by which heading and axes of the velocity differ [rad].
     """
     assert e.velocity is not None
     legs = straight(np.gradient(e.psi, e.time) if e.rate is None else e.rate)
@@ -88,11 +81,7 @@ def heading_is_off(e: Evidence, offset: float) -> bool:
 
 def _later(time: np.ndarray, values: np.ndarray, delay: float) -> np.ndarray:
     """Values (n,) or (n, k) as they are some time [s] later."""
-    if not delay:
-        return values
-    flat = values.reshape(time.size, -1)
-    moved = [np.interp(time + delay, time, column) for column in flat.T]
-    return np.column_stack(moved).reshape(values.shape)
+    return make_interp_spline(time, values, 1)(np.clip(time + delay, time[0], time[-1]))
 
 
 def _punctual(e: Evidence, delay: float) -> np.ndarray:
@@ -119,10 +108,9 @@ def _as_given(e: Evidence, velocity: np.ndarray, psi: np.ndarray) -> dict[str, n
 
 def _retimed(run: Run, e: Evidence, fix: Correction) -> Run:
     """The run on its true time: rows within a jump of the clock are left out."""
-    assert fix.log is not None
-    assert fix.true is not None
-    clock = np.interp(run.time, fix.log, fix.true)
-    clock += np.minimum(run.time - fix.log[0], 0.0) + np.maximum(run.time - fix.log[-1], 0.0)
+    log, true = fix.clock
+    clock = np.interp(run.time, log, true)
+    clock += np.minimum(run.time - log[0], 0.0) + np.maximum(run.time - log[-1], 0.0)
     keep = np.ones(run.time.size, bool)
     for gap in fix.gaps:
         clock += np.where(run.time >= gap.end, gap.value, 0.0)

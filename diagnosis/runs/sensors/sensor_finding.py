@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
+from ..cleaning import Z95
 from ..files.reading import Run
 from .constants import Kind
 
-Z95 = 1.96  # standard deviations, 95 % of a normal distribution
 MOST_STRETCHES = 3  # of a clock, each with its line; chosen
 
 
@@ -81,29 +80,12 @@ class Examined:
         return Examined(other.run, findings, notes, self.agreeing | other.agreeing)
 
 
-class Told(Protocol):
-    """What is needed of a finding, or of its result in a file."""
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def value(self) -> float | None: ...
-    @property
-    def start(self) -> float | None: ...
-    @property
-    def end(self) -> float | None: ...
-    @property
-    def sentence(self) -> str: ...
-    @property
-    def repaired(self) -> bool: ...
-
-
-def sensor_lines(found: Iterable[Told]) -> Iterator[str]:
+def sensor_lines(found: Iterable[SensorFinding]) -> Iterator[str]:
     """A line for each fault; many stretches of a clock share one."""
     found = list(found)
     rates = [f for f in found if f.kind == "clock_rate"]
     if len(rates) > MOST_STRETCHES:
-        values = [f.value for f in rates if f.value is not None]
+        values = [f.value for f in rates]
         span = f"{min(values):.3g} to {max(values):.3g} s pass in a second of it"
         yield f"the log's clock runs unevenly: {span}, in {len(rates)} stretches"
         found = [f for f in found if f.kind != "clock_rate"]

@@ -1,7 +1,7 @@
 """Channels in another unit, or with another sign, than was said."""
 
-from collections.abc import Mapping
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -11,23 +11,14 @@ from fmus.scale import Scale
 from ..columns.columns import POSE
 from ..columns.unit_check import UNITS
 from ..files.reading import Run
-from .evidence import AGREED, SURE, Evidence, blocked_fit, evidence, integral, spread_of
+from .evidence import AGREED, ALIKE, SURE, Evidence, blocked_fit, evidence, integral, large, spread_of
 from .sensor_finding import Examined, SensorFinding
 
 WINDOW = 10.0  # s over which channels are compared, or ten samples; chosen
-MOST = 0.35  # a factor nearer to one than this is a scale, and is estimated with all else (chosen)
 NEAR = 0.15  # relative distance within which a factor is that of a unit (chosen)
 FEWEST = 8  # windows; chosen
 SIGN = "the other sign"  # and nothing else
 OPPOSITE = "its sign is the other one"
-
-
-def unit_factors(quantity: str) -> dict[str, float]:
-    """``UNIT in place of UNIT`` -> by how much numbers are too large when units are mistaken so."""
-    sizes = UNITS[quantity]
-    return {
-        f"{a} in place of {b}": sizes[b] / sizes[a] for a in sizes for b in sizes if sizes[a] != sizes[b]
-    }
 
 
 def units(run: Run, scale: Scale) -> Examined:
@@ -125,7 +116,7 @@ def _judged(
 ) -> Examined:
     """What the ratio of a channel to the pose says, and the run with the channel in its right unit."""
     size = np.hypot.reduce(said, axis=1) if said.shape[1] > 1 else np.abs(said[:, 0])
-    much = size > 0.5 * np.quantile(size, 0.9)
+    much = large(size)
     if much.sum() < FEWEST:
         return found
     pose, said, size = pose[much], said[much], size[much]
@@ -137,11 +128,11 @@ def _judged(
         note = f"{told} and the pose do not tell of the same motion: {told} is left out"
         return replace(found, run=replace(found.run, measured=measured), notes=(*found.notes, note))
     middle = float(np.median(ratio))
-    if abs(middle - 1.0) < MOST:
+    if abs(middle - 1.0) < ALIKE:  # a scale, which is estimated with all else
         return found
     value = 1.0 / middle
     s = spread_of(1.0 / ratio) / float(np.sqrt(ratio.size))
-    name, factor = _nearest(abs(value), unit_factors(quantity))
+    name, factor = _nearest(abs(value), quantity)
     true = np.copysign(factor, value) if name else value
     text = f"{told} is {value:.4g} times what the pose says"
     text += f": {name}" if name and abs(true) != 1.0 else f": {OPPOSITE}" if value < 0.0 else ""
@@ -150,9 +141,11 @@ def _judged(
     return replace(found, run=replace(found.run, measured=measured), findings=(*found.findings, finding))
 
 
-def _nearest(value: float, factors: Mapping[str, float]) -> tuple[str, float]:
+def _nearest(value: float, quantity: str) -> tuple[str, float]:
     """The mistake of units that is nearest to a factor, and its factor; no name: it is none."""
-    known = {"": value, **factors} if abs(value - 1.0) > NEAR else {SIGN: 1.0}
-    apart = {name: abs(np.log(value / f)) for name, f in known.items() if name}
-    best = min(apart, key=lambda name: apart[name])
-    return (best, known[best]) if apart[best] < NEAR else ("", value)
+    pairs = permutations(UNITS[quantity].items(), 2)
+    known = {f"{a} in place of {b}": of_b / of_a for (a, of_a), (b, of_b) in pairs if of_a != of_b}
+    if abs(value - 1.0) <= NEAR:
+        known = {SIGN: 1.0}
+    best = min(known, key=lambda name: abs(np.log(value / known[name])))
+    return (best, known[best]) if abs(np.log(value / known[best])) < NEAR else ("", value)

@@ -7,15 +7,11 @@ import numpy as np
 from fmus.scale import Scale
 
 from ..files.reading import Run
-from .evidence import groups_of
+from ..files.telegrams import groups_of
+from .evidence import FAR, LEAST_TURN
 from .sensor_finding import Examined, SensorFinding
 
 ANGLES = ("psi", "psi_2", "course")
-LARGE = 8.0  # times the usual step of an angle: no ship turns so much faster than it does else (chosen)
-LEAST = (
-    0.1  # rad; a smaller step is none of an angle that leads through a turn within a few rows (chosen)
-)
-MOST = int(2.0 * np.pi / LEAST)  # rows between two telegrams, of which a line leads through the turn
 
 
 def wraps(run: Run, scale: Scale) -> Examined:
@@ -35,9 +31,7 @@ def wraps(run: Run, scale: Scale) -> Examined:
         text = f"{name} was interpolated where it wraps, in {rows.size} rows"
         many, time = float(rows.size), run.time[rows]
         findings.append(SensorFinding.estimated((name, "wrap", "1"), many, 0.0, time, text))
-    if not findings:
-        return Examined(run)
-    return Examined(replace(run, pose=pose, measured=measured), tuple(findings))
+    return Examined(replace(run, pose=pose, measured=measured) if findings else run, tuple(findings))
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -45,14 +39,14 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     there = np.flatnonzero(np.isfinite(values))
     angle, step = values[there].copy(), np.diff(values[there])
     usual = float(np.median(np.abs(step))) if step.size else 0.0
-    large = np.abs(step) > max(LARGE * usual, LEAST)
+    large = np.abs(step) > max(FAR * usual, LEAST_TURN)
     same = large[1:] & large[:-1] & (np.sign(step[1:]) == np.sign(step[:-1]))
     changed = []
     for begin, end in groups_of(same):
         a, b = begin, end + 1  # rows before and after all those large steps
         total = angle[b] - angle[a]
         turn = float(np.angle(np.exp(1j * total)))
-        if b - a > MOST or abs(total - turn) < np.pi or abs(turn) > 0.5 * abs(total):
+        if (b - a) * LEAST_TURN > 2.0 * np.pi or abs(total) < max(np.pi, 2.0 * abs(turn)):
             continue
         inside = np.arange(a + 1, b)
         angle[inside] = angle[a] + turn * (inside - a) / (b - a)

@@ -11,21 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmus.scale import Scale
+from fmus.scale import REFERENCE_LENGTH, Scale
 
-from ..cleaning import Track
+from ..cleaning import Track, impulse
 from ..linear_filter import filtered
 from .spline import Knots
 
 # Of CyberShip Enterprise 1, times the scale of the ship.
-# m/s, m/s, rad/s: a ship slower than that at the start of a run had no thrusters at work before.
-IDLE = (0.02, 0.02, 0.05)
+# m/s, of each of its ends: a ship slower than that at a run's start had no thrusters at work before.
+IDLE = 0.02
 FORGETTING = 30.0  # s, T; a slower motion by the commands is like any smooth motion (chosen)
 
 
 def idle(scale: Scale) -> np.ndarray:
     """(3,), speeds [m/s, m/s, rad/s] below which a ship of a size hardly moves."""
-    return np.multiply(IDLE, scale.speeds)
+    return np.multiply((IDLE, IDLE, 2.0 * IDLE / REFERENCE_LENGTH), scale.speeds)
 
 
 class CommandResponse(NamedTuple):
@@ -42,12 +42,6 @@ class CommandResponse(NamedTuple):
     eta_ddot: np.ndarray
     delay: float = np.nan
     sure: bool = False
-
-    @classmethod
-    def none(cls, n: int) -> "CommandResponse":
-        """No response, for n samples."""
-        still = np.zeros((n, 3))
-        return cls(still, still, still)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +79,6 @@ class Commands:
         return np.concatenate(self.parts)
 
     @cached_property
-    def first(self) -> np.ndarray:
-        """Index of the start of each stretch but the first among them."""
-        return np.cumsum([part.size for part in self.parts])[:-1]
-
-    @cached_property
     def rotation(self) -> np.ndarray:
         """(m,), from body to earth: a rotation in the complex plane, north its real axis."""
         known = np.isfinite(self.psi)
@@ -111,9 +100,7 @@ class Commands:
     @cached_property
     def _impulses(self) -> np.ndarray:
         """(n, 3), integral of the commands until each row [N s, N s, N m s]."""
-        run = self.track.run
-        steps = run.tau_cmd[:-1] * np.diff(run.time)[:, None]
-        return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        return impulse(self.track.run.time, self.track.run.tau_cmd)
 
     def _impulse(self, time: np.ndarray) -> np.ndarray:
         """Integral (m, 3) of the commands until times (m,) [s]."""
@@ -141,7 +128,7 @@ class Commands:
 
     def _recursion(self, x: np.ndarray, kept: float) -> np.ndarray:
         """y (m, k) with y_i = kept y_(i-1) + x_(i-1), from zero in each stretch."""
-        parts = np.split(x, self.first)
+        parts = np.split(x, np.cumsum([part.size for part in self.parts])[:-1])
         return np.concatenate([filtered((0.0, 1.0), (1.0, -kept), part) for part in parts])
 
     def response(self, gains: np.ndarray, delay: float) -> CommandResponse:
@@ -150,12 +137,6 @@ class Commands:
         a = np.column_stack([self.rotation * (surge + 1j * sway), yaw])
         x, x_dot = self.motion(a)
         x_ddot = a - 2.0 * x_dot / self.forgetting - x / self.forgetting**2
-        eta, eta_dot, eta_ddot = (
-            _channels(self.sampled(each, self.track.run.time)) for each in (x, x_dot, x_ddot)
-        )
-        return CommandResponse(eta, eta_dot, eta_ddot, delay)
-
-
-def _channels(x: np.ndarray) -> np.ndarray:
-    """North, east and heading (n, 3) of the first two as one complex number, and the third (n, 2)."""
-    return np.column_stack([np.real(x[:, 0]), np.imag(x[:, 0]), np.real(x[:, 1])])
+        sampled = (self.sampled(each, self.track.run.time).T for each in (x, x_dot, x_ddot))
+        eta = [np.column_stack([plane.real, plane.imag, yaw.real]) for plane, yaw in sampled]
+        return CommandResponse(eta[0], eta[1], eta[2], delay)

@@ -19,13 +19,9 @@ import numpy as np
 
 from .command_motion import CommandResponse, Commands
 from .delay import Regression, likeliest_delay
-from .likelihood import adapt, deviance, likeliest
+from .likelihood import ROUNDS, adapt, deviance, likeliest
 from .outliers import Inliers
 from .penalised import Fit, Problem, solve
-
-ROUNDS = 3  # of gains and smoothness in turn; further ones change neither (chosen)
-# Least fall of -2 log L by gains and delay: twice their number, 9 + 1 (Akaike's criterion).
-PARAMETERS = 20.0
 
 
 def with_commands(
@@ -43,20 +39,24 @@ def with_commands(
     """
     weights, run = alone.weights, commands.track.run
     time = run.time[p.rows] - run.time[0]
-    near = likeliest(p, weights, alone.even)
-    least = deviance(p, weights, near) - PARAMETERS
-    delay, sure = likeliest_delay(Regression(p, fit, commands, time))
+    near = alone.even
+    regression = Regression(p, fit, commands, time)
+    delay, sure = likeliest_delay(regression)
+    gains = regression.gains(delay)
+    # By Akaike's criterion -2 log L falls by more than twice the number of gains and delay.
+    least = deviance(p, weights, near) - 2.0 * (gains.size + 1)
     found: tuple[Problem, np.ndarray, CommandResponse] | None = None
     for _ in range(ROUNDS):
-        response = commands.response(Regression(p, fit, commands, time).gains(delay), delay)
+        response = commands.response(gains, delay)
         rest = p._replace(z=p.z - response.eta[p.rows])
         near = likeliest(rest, weights, near)
         cost = deviance(rest, weights, near)
         if cost >= least:
             break
         found, least = (rest, near, response._replace(sure=sure)), cost
-        fit = solve(rest, near, weights)
+        gains = Regression(p, solve(rest, near, weights), commands, time).gains(delay)
     if found is None:
-        return alone.problem, alone.smoothness, CommandResponse.none(commands.psi.size)
+        still = np.zeros((commands.psi.size, 3))
+        return alone.problem, alone.smoothness, CommandResponse(still, still, still)
     rest, near, response = found
     return *adapt(rest, near, weights), response

@@ -3,7 +3,7 @@
 The likeliest delay is that of the largest likelihood. Alone it proves nothing: the response of
 :mod:`.command_motion` knows neither damping nor any other force, and where commands are slow, a delay
 makes up for what is missing. Therefore each delay is compared with none *beside* what a ship with
-damping would make of commands that act at once: motions by the commands behind lags of LAGS seconds. A
+damping would make of commands that act at once: motions by the commands behind some lags. A
 slow command cannot tell those from a delay, a jump can.
 
 The likelihood ratio of two delays is a sum over blocks of time. A delay is sure if it is above zero by
@@ -14,23 +14,16 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import LinAlgError
+from scipy.linalg import LinAlgError, orth
 from scipy.special import stdtrit
 
-from .command_motion import Commands
-from .penalised import JERK, POSE, Fit, Problem, Rates, Spline, solve
-from .spline import basis, knots, middles
+from ..cleaning import BRIEF, DIGITS, WIDTH
+from .command_motion import FORGETTING, Commands
+from .penalised import Fit, Problem
+from .spline import middles
 
-# Seconds are those of CyberShip Enterprise 1, times the scale of the ship.
-LONGEST = 1.0  # s, of these; the ship has 0.4 s (docs/studies/measured_ship)
-FINE = 0.01  # s, to which a delay is found, or a sampling period if that is longer
-NOTICED = 0.1  # s; a shorter delay is as good as none, and not reported (chosen)
-RANK = 1e-9  # of the largest singular value; below, commands do not differ and share their effect evenly
-# s, lags of motions that are no delay's. Chosen: a ship's own time constants, by factors of four; no
-# shorter one, as a thruster's lag of half a second is a delay for what follows.
-LAGS = (1.0, 4.0, 16.0)
-# s; chosen: residuals of a spline are correlated over less than its time constant, a second.
-LATENESS_BLOCK = 5.0
+# s, times the scale of the ship; CyberShip Enterprise 1 has 0.4 s (docs/studies/measured_ship)
+LONGEST = 1.0
 CHANCE = 0.01  # of a delay where there is none, divided by the number of delays that were tried
 
 
@@ -53,9 +46,7 @@ class Regression:
     def gains(self, delay: float) -> np.ndarray:
         """Body-fixed acceleration by a unit of each command, (3, 3), for a delay [s]."""
         motions = self.motions(self.commands.delayed(delay))
-        flat, turn = (
-            least_squares(a, z[:, 0], size_of(a)) for a, z in zip(motions, self.pose, strict=True)
-        )
+        flat, turn = (least_squares(a, z[:, 0]) for a, z in zip(motions, self.pose, strict=True))
         return np.vstack([flat.reshape(2, 3), turn])
 
     def motions(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,83 +69,19 @@ class Regression:
 
     @property
     def block(self) -> np.ndarray:
-        """Number of the block of time, LATENESS_BLOCK, of each row of r(x)."""
-        rows = np.concatenate([self.time, middles(self.problem.spline.grid, 2)])
-        return np.unique(rows // (LATENESS_BLOCK * self.time_scale), return_inverse=True)[1]
+        """Number of the block of time of each row of r(x).
 
-    def thinned(self) -> "Regression":
-        """The same on means of the pose over NOTICED seconds, where a spline with such knots does.
-
-        It does if its time constant, its spacing times the sixth root of its smoothness, is no shorter.
+        Residuals of a spline are correlated over less than its time constant, a second.
         """
-        p, spline = self.problem, self.problem.spline
-        systems, grid = self.fit.systems, spline.grid
-        many = int(NOTICED * self.time_scale / grid.spacing)
-        if many < 2:
-            return self
-        smoothness = np.array([s.precision[JERK] / s.precision[POSE] for s in systems]) / many**5.0
-        if (smoothness < 1.0).any():
-            return self
-        coarse = knots(grid.start, grid.end, many * grid.spacing)
-        part = np.unique(basis(coarse, self.time).first, return_inverse=True)[1]
-        weights = systems[0].equations.root[: part.size] ** 2
-        counts = np.bincount(part, weights)
-        there = counts > 0.0
-        time, *z = (np.bincount(part, weights * x)[there] / counts[there] for x in (self.time, *p.z.T))
-        at, to = (middles(each) for each in (grid, coarse))
-        stiffness = np.array([np.interp(to, at, each) for each in spline.stiffness])
-        thin = p._replace(
-            z=np.column_stack(z),
-            spline=Spline(coarse, basis(coarse, time), stiffness, Rates.none(coarse)),
-        )
-        return Regression(thin, solve(thin, smoothness, counts[there]), self.commands, time)
+        rows = np.concatenate([self.time, middles(self.problem.spline.grid)])
+        return np.unique(rows // (WIDTH * self.time_scale), return_inverse=True)[1]
 
 
-def size_of(a: np.ndarray) -> np.ndarray:
-    """Norms (k,) of columns, none of them zero."""
-    return np.sqrt(np.maximum((a * a).sum(axis=0), 1e-300))
-
-
-def least_squares(a: np.ndarray, z: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """x of least |z - a x|, for columns of which a part below RANK of their size counts as zero."""
+def least_squares(a: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """x of least |z - a x|; columns that do not differ share their effect evenly."""
+    size = np.maximum(np.linalg.norm(a, axis=0), np.finfo(float).tiny)
     scaled = a / size
-    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=RANK)[0] / size
-
-
-class Lateness:
-    """The likelihood of delays, beside motions that follow the commands without one.
-
-    Args:
-        regression: of the run.
-    """
-
-    def __init__(self, regression: Regression) -> None:
-        self._regression, self._block = regression, regression.block
-        tau = regression.commands.delayed(0.0)
-        lagged = [
-            regression.motions(regression.commands.lagging(tau, lag * regression.time_scale))
-            for lag in LAGS
-        ]
-        self._aside = [orthonormal(np.hstack(part)) for part in zip(*lagged, strict=True)]
-        self._pose = [z - q @ (q.T @ z) for q, z in zip(self._aside, regression.pose, strict=True)]
-
-    def left(self, delay: float) -> np.ndarray:
-        """(blocks,), what a delay [s] leaves of -2 log L in each block."""
-        tau = self._regression.commands.delayed(delay)
-        total = np.zeros(self._block.max() + 1)
-        for q, z, a in zip(self._aside, self._pose, self._regression.motions(tau), strict=True):
-            own = a - q @ (q.T @ a)
-            off = z[:, 0] - own @ least_squares(own, z[:, 0], size_of(a))
-            total += np.bincount(np.tile(self._block, off.size // self._block.size), off**2)
-        return total
-
-
-def orthonormal(a: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of the columns, without directions below RANK."""
-    scaled = a / size_of(a)
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > RANK * values[-1]
-    return scaled @ (vectors[:, kept] / np.sqrt(values[kept]))
+    return np.linalg.lstsq(scaled.T @ scaled, scaled.T @ z, rcond=DIGITS)[0] / size
 
 
 def likeliest_delay(regression: Regression) -> tuple[float, bool]:
@@ -164,36 +91,45 @@ def likeliest_delay(regression: Regression) -> tuple[float, bool]:
     that is likelier than none by less than chance finds among so many (Akaike's criterion, and twice the
     logarithm of their number) is zero.
     """
-    period, lateness = regression.commands.track.period, Lateness(regression.thinned())
-    longest, fine, noticed = (x * regression.time_scale for x in (LONGEST, FINE, NOTICED))
-    coarse = 2.0 * noticed  # between the delays that are tried first
+    commands, block, time_scale = regression.commands, regression.block, regression.time_scale
+    period, longest, noticed = commands.track.period, LONGEST * time_scale, BRIEF * time_scale
+    # Lags of a ship's own. A thruster's, shorter than the longest delay, is one for what follows.
+    lags = np.geomspace(LONGEST, FORGETTING, 3) * time_scale
+    prompt = commands.delayed(0.0)
+    lagged = [regression.motions(commands.lagging(prompt, lag)) for lag in lags.tolist()]
+    aside = [orth(np.hstack(part)) for part in zip(*lagged, strict=True)]
+    pose = [z - q @ (q.T @ z) for q, z in zip(aside, regression.pose, strict=True)]
 
     @cache
     def blocks(periods: int) -> Any:
-        return lateness.left(periods * period)
+        """(blocks,), what a delay leaves of -2 log L in each block."""
+        total = np.zeros(block.max() + 1)
+        motions = regression.motions(commands.delayed(periods * period))
+        for q, z, a in zip(aside, pose, motions, strict=True):
+            own = a - q @ (q.T @ a)
+            off = z[:, 0] - own @ least_squares(own, z[:, 0])
+            total += np.bincount(np.tile(block, off.size // block.size), off**2)
+        return total
 
     def left(periods: int) -> float:
         return float(blocks(periods).sum())
 
-    tried = {round(k * coarse / period) for k in range(round(longest / coarse) + 1)}
+    step = 2.0 * noticed / period  # between the delays that are tried first
+    tried = {round(k * step) for k in range(round(longest / (2.0 * noticed)) + 1)}
     best = min(sorted(tried), key=left)
-    step, finest = coarse / period, max(1, round(fine / period))
-    while step > finest:
-        step = max(finest, np.ceil(step / 2.0))
+    while step > 1:
+        step = np.ceil(step / 2.0)
         near = {max(best - int(step), 0), best + int(step)}
         tried |= near
         best = min((best, *sorted(near)), key=left)
     if left(0) - left(best) < 2.0 + 2.0 * np.log(len(tried)):
         return 0.0, False
-    prompt = min((k for k in tried if k * period < noticed), key=left)
-    sure = best != prompt and surely_positive(blocks(prompt) - blocks(best), CHANCE / len(tried))
+    short = min((k for k in tried if k * period < noticed), key=left)
+    sure = best != short and surely_positive(blocks(short) - blocks(best), CHANCE / len(tried))
     return best * period, sure
 
 
 def surely_positive(values: np.ndarray, chance: float) -> bool:
     """Whether the mean of independent values (k,) is above zero, by Student's one-sided test."""
     k = values.size
-    if k < 2:
-        return False
-    deviation = float(values.std(ddof=1)) / k**0.5
-    return float(values.mean()) > deviation * -float(stdtrit(k - 1, chance))
+    return k > 1 and bool(values.mean() > values.std(ddof=1) / k**0.5 * -stdtrit(k - 1, chance))

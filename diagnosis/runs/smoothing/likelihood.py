@@ -18,40 +18,28 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import KroghInterpolator
 from scipy.linalg import LinAlgError
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import toms748
 
 from .penalised import JERK, Equations, Problem, System, solve
 from .spline import third
 
-ADAPTIONS = 2  # rounds of adapting the penalty; a third changes less than the noise does (chosen)
+# Of adapting the penalty to the jerk, or gains to the penalty; a third changes less than noise (chosen).
+ROUNDS = 2
 LEAST_JERK = 0.2  # of the mean square: where there is none, it may yet begin (chosen)
-# Decades of the smoothness: from none at all to motions slower than 7 s at knots of 0.05 s.
-DECADES = (-8.0, 8.0)
-# Growth by decade of the logarithm of the roughness over its expected value, at the least. For white
-# jerk it is 5/6 log 10, the ratio of the integrals of h^2 and h over all frequencies w, with h = 1 / (1
-# + w^6); with less the root lies between both ends of the first step (chosen: two thirds).
-GROWTH = 1.3
-COARSE = 1.0  # decades, of the search for the valley and of the first step in it (chosen)
-# Decades, of the last step of inverse quadratic interpolation; what is left is a product of three
-# errors, 1e-8.
-LAST_STEP = 1e-4
-MOST_STEPS = 10  # of it, before the slower method of Brent; three are the rule (chosen)
+# Decades of the smoothness, to both sides of 1: from none at all to motions slower than 7 s at knots of
+# 0.05 s.
+DECADES = 8.0
 
 
 def likeliest(p: Problem, weights: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-    """The smoothness (3,) with the largest restricted likelihood.
+    """The smoothness (3,) with the largest restricted likelihood, for weights (n,) of the samples.
 
-    Args:
-        p: problem.
-        weights: (n,), of the samples.
-        near: (3,), smoothness to begin the search with; None: everywhere.
+    The search begins near a smoothness (3,), 1 by default.
     """
-    starts = [None] * 3 if near is None else np.log10(near).tolist()
-    return 10.0 ** np.array(
-        [c.minimum(start) for c, start in zip(criteria(p, weights), starts, strict=True)]
-    )
+    starts = np.zeros(3) if near is None else np.log10(near)
+    found = [c.minimum(x) for c, x in zip(criteria(p, weights), starts.tolist(), strict=True)]
+    return 10.0 ** np.array(found)
 
 
 def deviance(p: Problem, weights: np.ndarray, smoothness: np.ndarray) -> float:
@@ -66,13 +54,7 @@ def criteria(p: Problem, weights: np.ndarray) -> list["Criterion"]:
 
 
 class Criterion:
-    """-2 log L of one channel over its smoothness, in decades.
-
-    Args:
-        p: problem.
-        channel: 0 to 2.
-        equations: of the channel.
-    """
+    """-2 log L of one channel over its smoothness, in decades."""
 
     def __init__(self, p: Problem, channel: int, equations: Equations) -> None:
         self._problem, self._channel, self._equations = p, channel, equations
@@ -84,11 +66,8 @@ class Criterion:
         return system, system.residual(self._y, system.solve(self._y))
 
     def cost(self, decades: float) -> float:
-        """-2 log L, infinite where the spline is not determined."""
-        try:
-            system, off = self._solved(decades)
-        except LinAlgError:
-            return np.inf
+        """-2 log L."""
+        system, off = self._solved(decades)
         return system.deviance(off)
 
     def excess(self, decades: float) -> float:
@@ -105,54 +84,37 @@ class Criterion:
             raise LinAlgError("the likelihood of its smoothness is not finite")
         return float(np.log(found / expected)) if found > 0.0 else -np.inf
 
-    def minimum(self, near: float | None) -> float:
-        """Where it is least [decades]; searched downhill from nearby or, with None, everywhere."""
-        if near is None:
-            found: Any = minimize_scalar(
-                self.cost, bounds=DECADES, method="bounded", options={"xatol": COARSE}
-            )
-            near = float(found.x)
+    def minimum(self, near: float) -> float:
+        """Where it is least [decades]; searched downhill from nearby.
+
+        For white jerk the logarithm grows by 1.9 in a decade: a step as long as it leads past the root.
+        """
         excess = cache(self.excess)
-        before, step = near, float(np.clip(-excess(near) / GROWTH, -COARSE, COARSE))
-        if abs(step) < LAST_STEP**2:
-            return near
-        while True:
+        before, step = near, float(np.clip(-excess(near), -1.0, 1.0))
+        while step:
             try:
-                beyond = float(np.clip(before + step, *DECADES))
-                passed = excess(beyond) * step >= 0.0
+                beyond = float(np.clip(before + step, -DECADES, DECADES))
+                if excess(beyond) * step >= 0.0:
+                    low, high = sorted((before, beyond))
+                    root: Any = toms748(excess, low, high)
+                    return float(root)
             except LinAlgError:  # so little smoothing that the spline is not determined
-                return before
-            if passed:
                 break
-            if beyond in DECADES:
+            if abs(beyond) == DECADES:
                 return beyond
             before, step = beyond, 2.0 * step
-        tried = {excess(x): x for x in (before, beyond)}
-        for _ in range(MOST_STEPS):
-            nearest = sorted(tried, key=abs)[:3]
-            root = float(KroghInterpolator(nearest, [tried[f] for f in nearest])(0.0))
-            if not min(before, beyond) <= root <= max(before, beyond):
-                break
-            if abs(root - tried[nearest[0]]) < LAST_STEP:
-                return root
-            tried[excess(root)] = root
-        between: Any = brentq(excess, before, beyond, xtol=LAST_STEP**2)
-        return float(between)
+        return before
 
 
 def adapt(p: Problem, smoothness: np.ndarray, weights: np.ndarray) -> tuple[Problem, np.ndarray]:
     """A problem with its penalty adapted to the jerk, and the likeliest smoothness (3,) then.
 
-    The weight of each interval is the inverse of the local mean square of the jerk that a fit has.
-
-    Args:
-        p: problem with an even penalty.
-        smoothness: (3,), its likeliest.
-        weights: (n,), of the samples.
+    The weight of each interval is the inverse of the local mean square of the jerk that a fit has, which
+    begins with an even penalty and its likeliest smoothness. Samples have weights (n,).
     """
-    for _ in range(ADAPTIONS):
+    for _ in range(ROUNDS):
         square = third(p.spline.grid, solve(p, smoothness, weights).coefficients) ** 2
-        mean = np.maximum(square.mean(axis=0), 1e-30)
+        mean = np.maximum(square.mean(axis=0), np.finfo(float).tiny)
         local = running_mean(square, p.average)
         share = (local / mean + LEAST_JERK) / (1.0 + LEAST_JERK)
         p = p.adapted(stiffness=1.0 / share.T)

@@ -4,26 +4,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..cleaning import Z95
+from ..sensors.evidence import FAR
 from .likelihood import adapt, likeliest
 from .penalised import Problem, solve
 from .spline import WIDTH
 
 OUTLIER = 5.0  # standard deviations: one in 1.7 million samples of normal noise is refused
-# Standard deviations from which on the loss of Huber (1964) is linear. Chosen: 95 % of normal noise
-# counts in full.
-HUBER = 2.0
-# Times the 90 % quantile of |z|; beyond, a sample starts with less weight. Chosen: no ship is there.
-FAR = 10.0
 REWEIGHTINGS = 10  # most rounds of reweighting, and of the outlier test; two or three are the rule
-SAME_WEIGHT = 0.02  # change of a robust weight that ends the reweighting; the outlier test follows it
 
 
 class TooFewError(Exception):
-    """In some stretch hardly any sample agrees with the others.
-
-    Args:
-        rows: of the run, all samples of that stretch.
-    """
+    """In some stretch hardly any sample agrees with the others; its rows in the run."""
 
     def __init__(self, rows: np.ndarray) -> None:
         self.rows = rows
@@ -48,9 +40,8 @@ class Inliers(NamedTuple):
 def robust(p: Problem, local: np.ndarray) -> Inliers:
     """Which samples are no outliers, and the smoothness of the spline through them.
 
-    Args:
-        p: problem with an even penalty.
-        local: (3,), smoothness that follows a few samples, to find what sticks out.
+    The problem has an even penalty. With a local smoothness (3,) its spline follows a few samples, and
+    outliers stick out.
 
     Raises:
         TooFewError: in some stretch.
@@ -62,13 +53,17 @@ def robust(p: Problem, local: np.ndarray) -> Inliers:
 
 
 def robust_weights(p: Problem, smoothness: np.ndarray) -> np.ndarray:
-    """Weights (n,) of Huber's M-estimator by iterative reweighting: 1, and HUBER / |r| far off."""
+    """Weights (n,) by iterative reweighting of Huber's M-estimator (1964): 1, and Z95 / |r| far off.
+
+    It ends when the same samples are far off, as the outlier test follows.
+    """
     far = FAR * np.maximum(np.quantile(np.abs(p.z), 0.9, axis=0), p.sigma)
-    weights = np.minimum(1.0, (far / np.maximum(np.abs(p.z), far * 1e-9)).min(axis=1))
+    weights, same = (far / np.maximum(np.abs(p.z), far)).min(axis=1), np.zeros(0)
     for _ in range(REWEIGHTINGS):
         off = np.abs(p.z - p.spline.b(solve(p, smoothness, weights).coefficients)) / p.sigma
-        before, weights = weights, np.minimum(1.0, HUBER / np.maximum(off.max(axis=1), 1e-9))
-        if np.abs(weights - before).max() < SAME_WEIGHT:
+        weights = Z95 / np.maximum(off.max(axis=1), Z95)
+        before, same = same, np.flatnonzero(off.max(axis=1) > OUTLIER)
+        if np.array_equal(before, same):
             break
     return weights
 

@@ -18,28 +18,20 @@ from cosim import InputError
 from fmus.frames import rotate_to_body
 from fmus.scale import Scale
 
-from ..cleaning import SHORTEST, Counts, Track, noise
-from ..sensors.evidence import VELOCITIES, velocity_over_ground
+from ..cleaning import BRIEF, LONG, SHORTEST, WIDTH, Counts, Track, noise
+from ..sensors.evidence import FEWEST, VELOCITIES, velocity_over_ground
 from ..sensors.sensor_finding import Examined
 from .command_motion import Commands, idle
 from .command_response import with_commands
-from .delay import NOTICED
 from .likelihood import adapt
 from .outliers import Inliers, TooFewError, robust
 from .penalised import Problem, Rates, Spline, solve
-from .spline import Knots, basis, knots
+from .spline import DEGREE, Knots, basis, knots
 
 # Seconds and metres are those of CyberShip Enterprise 1, times the scale of the ship.
-# s; over a longer gap nothing is estimated. Chosen: as long as a window of the weak form.
-BREAK = 3.0
 SPACING = 0.05  # s between knots, or a sampling period if that is longer; a tenth of the quickest motion
-FEWEST = 20  # samples in a stretch; chosen: several times the degrees of freedom of a parabola
 # [m, m, rad]; a smaller noise is not to be believed, and the kinks of a stepwise force would be spikes.
 LEAST_NOISE = 2e-5
-# The smoothness that follows a few samples, in units of (period / spacing)^5: chosen so that the spline
-# has a time constant of two sampling periods, 64 = 2^6.
-LOCAL = 64.0
-
 
 # Channel -> standard deviation of what it says over a sampling period, in SI.
 Agreeing = Mapping[str, float]
@@ -123,7 +115,7 @@ class Smoothed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was found in the data, a line each."""
-        if not (self.late and self.delay >= NOTICED * self.scale.time):
+        if not (self.late and self.delay >= BRIEF * self.scale.time):
             return self.track.notes
         delay = (
             f"commands act {self.delay:.2f} s after they are given, as the pose tells without a model"
@@ -200,7 +192,8 @@ def _judged(track: Track) -> tuple[np.ndarray, Problem, np.ndarray, Inliers]:
     rows = np.flatnonzero(track.valid)
     while True:
         even, origin = _problem(track, rows)
-        local = np.full(3, LOCAL * (track.period / even.spline.grid.spacing) ** 5)
+        # A spline that follows a few samples: its time constant is two sampling periods.
+        local = np.full(3, 2.0 * (2.0 * track.period / even.spline.grid.spacing) ** DEGREE)
         try:
             return rows, even, origin, robust(even, local)
         except TooFewError as stretch:
@@ -244,7 +237,7 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
         eta_ddot_std,
         _body_std(motion, eta_std, eta_dot_std),
         sigma,
-        sigma**2 / (smoothness * grid.spacing**5),
+        sigma**2 / (smoothness * grid.spacing**DEGREE),
         response.delay,
         response.sure,
         pose_only,
@@ -254,17 +247,9 @@ def _smooth(track: Track, agreeing: Agreeing) -> Smoothed:
 def measured_rates(
     track: Track, rows: np.ndarray, psi: np.ndarray, agreeing: Agreeing, grid: Knots
 ) -> tuple[np.ndarray, Rates] | None:
-    """Measured derivatives at samples of the pose.
+    """Rows with a pose that have all derivatives that agree with it, and these; None: there are none.
 
-    Args:
-        track: the run.
-        rows: of the samples of the pose.
-        psi: (n,), heading [rad].
-        agreeing: channels that count, with their noise; no noise is less than that of third differences.
-        grid: knots of the spline.
-
-    Returns:
-        The rows that have them all, and the derivatives; None: there are none.
+    The noise of a channel is no less than that of its third differences.
     """
     run = track.run
     by = next((pair for pair in VELOCITIES if pair[0] in agreeing), None)
@@ -290,7 +275,7 @@ def breaks(rows: np.ndarray, track: Track) -> np.ndarray:
 
     Where a pose is missing, the commands lead over the gap; where they are missing, too, nothing does.
     """
-    long = np.diff(track.run.time[rows]) > max(BREAK * track.scale.time, 10.0 * track.period)
+    long = np.diff(track.run.time[rows]) > max(WIDTH * track.scale.time, LONG * track.period)
     return long | (np.diff(track.silences[rows]) > 0)
 
 

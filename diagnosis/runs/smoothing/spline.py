@@ -11,44 +11,33 @@ K the Gram matrix of the third derivatives in units of h.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline, PPoly
-from scipy.linalg import cholesky_banded
+from scipy.linalg import cholesky_banded, hilbert
 from scipy.sparse import csr_array
 
-DEGREE = 5  # of the smoothing spline with a penalty on the third derivative: 2 * 3 - 1
-WIDTH = DEGREE + 1  # basis functions that overlap
+from ..cleaning import DIGITS
+
+ORDER = 3  # of the derivative with the penalty
+DEGREE = 2 * ORDER - 1  # of the smoothing spline
 # Coefficients after which the recursion of the inverse has forgotten its start: its memory falls as
 # exp(-n / (2 s^(1/6))), to 5e-5 at the smoothness s = 1e6, to 1e-2 at the largest one, 1e8.
 MEMORY = 200
-ROUNDING = 1e-6  # of an interval: by so much a stretch may end beyond its last knot
-FIRST, SECOND = np.triu_indices(WIDTH)  # pairs of the basis functions that overlap
 
 
-def _pieces(degree: int) -> np.ndarray:
-    """(power, function): the basis functions on an interval, as polynomials over [0, 1]."""
+@cache
+def pieces(degree: int, derivative: int = 0) -> np.ndarray:
+    """(power, function): derivatives of the basis functions on an interval, polynomials over [0, 1]."""
     element = BSpline.basis_element(np.arange(degree + 2.0), extrapolate=False)
-    spline = PPoly.from_spline(element.tck)
+    spline = PPoly.from_spline(element.tck).derivative(derivative)
     return spline.c[::-1, np.searchsorted(spline.x, np.arange(degree + 1)[::-1])]
 
 
-PIECES = [_pieces(DEGREE)]  # and their derivatives
-for _ in range(3):
-    PIECES.append(np.arange(1.0, len(PIECES[-1]))[:, None] * PIECES[-1][1:])
-
-
-def _products(pieces: np.ndarray) -> np.ndarray:
-    """(functions, functions): integrals over [0, 1] of the products of polynomials (power, function)."""
-    powers = np.arange(len(pieces))
-    return pieces.T @ (1.0 / (powers[:, None] + powers + 1.0)) @ pieces
-
-
-PARABOLAS = _products(_pieces(DEGREE - 3))  # of the third derivative
-# Third difference of coefficients: a coefficient of the third derivative.
-DIFFERENCE = np.diff(np.eye(DEGREE - 1), 3, axis=0)[0]
+WIDTH = len(pieces(DEGREE))  # basis functions that overlap
+FIRST, SECOND = np.triu_indices(WIDTH)  # pairs of these
 
 
 class Knots(NamedTuple):
@@ -75,12 +64,12 @@ class Knots(NamedTuple):
     @property
     def rank(self) -> int:
         """Rank of the penalty: its null space is a parabola in each stretch."""
-        return self.size - 3 * self.start.size
+        return self.size - ORDER * self.start.size
 
 
 def knots(start: np.ndarray, end: np.ndarray, spacing: float) -> Knots:
     """Knots for stretches from ``start`` to ``end`` [s], no closer than ``spacing`` [s]."""
-    intervals = np.maximum(1, np.ceil((end - start) / spacing - ROUNDING)).astype(int)
+    intervals = np.maximum(1, np.ceil((end - start) / spacing - DIGITS)).astype(int)
     first = np.concatenate([[0], np.cumsum(intervals + DEGREE)[:-1]])
     return Knots(start, end, first, intervals, spacing)
 
@@ -135,7 +124,7 @@ def basis(grid: Knots, time: np.ndarray, derivative: int = 0) -> Basis:
     place = (time - grid.start[stretch]) / grid.spacing
     interval = np.clip(np.floor(place), 0, grid.intervals[stretch] - 1).astype(int)
     powers = np.vander(place - interval, WIDTH - derivative, increasing=True)
-    values = powers @ PIECES[derivative] / grid.spacing**derivative
+    values = powers @ pieces(DEGREE, derivative) / grid.spacing**derivative
     return Basis(grid.first[stretch] + interval, values, grid.size)
 
 
@@ -146,27 +135,26 @@ def roughness(grid: Knots, weights: np.ndarray) -> tuple[Basis, np.ndarray]:
     Cholesky factor of its Gram matrix times these differences. |R c|^2 is a sum of squares that loses no
     digits, where c^T K c is a small difference of large numbers.
 
-    Args:
-        grid: knots.
-        weights: (intervals,), of each interval, those of all stretches in a row.
-
-    Returns:
-        R, with two more rows than intervals in each stretch, and the lower band (6, size) of K.
+    Weights (intervals,) are those of all stretches in a row. R has two more rows than intervals in each
+    stretch, K is given by its lower band (6, size).
     """
+    parabolas = pieces(DEGREE - ORDER)  # of the third derivative, and the integrals of their products
+    products = parabolas.T @ hilbert(ORDER) @ parabolas
+    difference = np.diff(np.eye(ORDER + 1), ORDER, axis=0)[0]
     rows = grid.intervals + 2
-    band = np.zeros((3, int(rows.sum())))
+    band = np.zeros((ORDER, int(rows.sum())))
     at = successive(np.cumsum(rows) - rows, grid.intervals)
-    for j in range(3):
-        for k in range(j, 3):
-            band[k - j, at + j] += PARABOLAS[j, k] * weights
+    for j in range(ORDER):
+        for k in range(j, ORDER):
+            band[k - j, at + j] += products[j, k] * weights
     values = np.zeros((band.shape[1], WIDTH))
     for j, factor in enumerate(cholesky_banded(band, lower=True)):
-        values[:, j : j + 4] += factor[:, None] * DIFFERENCE
+        values[:, j : j + difference.size] += factor[:, None] * difference
     first, normal = successive(grid.first, rows), np.zeros((WIDTH, grid.size + 2))
     for j, k in zip(FIRST, SECOND, strict=True):
         normal[k - j, first + j] += values[:, j] * values[:, k]
     for k in (1, 2):  # entries beyond a stretch are zero
-        of = np.cumsum(rows) - 3 + k
+        of = np.cumsum(rows) - ORDER + k
         first[of], values[of] = first[of] - k, np.roll(values[of], k, axis=1)
     return Basis(first, values, grid.size), normal[:, : grid.size]
 
@@ -176,15 +164,15 @@ def successive(first: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
 
 
-def middles(grid: Knots, more: int = 0) -> np.ndarray:
-    """(intervals,): times [s] in the middle of all intervals, and of some more after each stretch."""
-    counts = grid.intervals + more
+def middles(grid: Knots) -> np.ndarray:
+    """(rows,): times [s] of the rows of R, middles of all intervals and of two after each stretch."""
+    counts = grid.intervals + 2
     return np.repeat(grid.start, counts) + (successive(0 * counts, counts) + 0.5) * grid.spacing
 
 
 def third(grid: Knots, coefficients: np.ndarray) -> np.ndarray:
     """(intervals, channels): third derivative in the middle of each interval."""
-    middle = 0.5 ** np.arange(WIDTH - 3) @ PIECES[3] / grid.spacing**3
+    middle = 0.5 ** np.arange(ORDER) @ pieces(DEGREE, ORDER) / grid.spacing**ORDER
     at = successive(grid.first, grid.intervals)
     return Basis(at, np.tile(middle, (at.size, 1)), grid.size)(coefficients)
 
@@ -193,13 +181,7 @@ def inverse_band(factors: np.ndarray) -> np.ndarray:
     """The part of the inverse of S = L L^T that lies in its band (Takahashi et al. 1973).
 
     The recursion runs backwards and forgets its start (:data:`MEMORY`), so that it runs in many parts at
-    once.
-
-    Args:
-        factors: (channels, 6, size), lower bands of L.
-
-    Returns:
-        (6, size, channels): lower bands of the inverses.
+    once. Factors are lower bands of L, (channels, 6, size), the inverses (6, size, channels).
     """
     channels, _, size = factors.shape
     parts = -(-size // MEMORY) + 1

@@ -12,7 +12,7 @@ stay where they are: the refinement moves them along afterwards.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import asinh, pi
 
 import numpy as np
@@ -23,12 +23,7 @@ from fmus.effects import Effect
 
 POINTS = 32  # of the Sobol sequence, besides the start; chosen: of one parameter every 3 % of the range
 REFINED = 3  # of the best; chosen
-EVALUATIONS = 25  # of the residual by each refinement, slopes not counted
-FAR = 10.0  # times its scale to both sides a parameter without limits is tried
-WIDE = 100.0  # ratio of its limits from which on a parameter is spread over its logarithm
-PROPORTIONAL = 1e-6  # relative difference between twice a force and that of twice the coefficient
-SAME = 1e-2  # of its scale, by which a parameter differs between two minima
-NOTHING = 1e-9  # RMS of a force in units of the model error, below which it is none
+FAR = 10.0  # times its scale to both sides a parameter without limits is tried; chosen
 
 Force = Callable[[Mapping[str, float]], np.ndarray]
 Values = dict[str, float]
@@ -44,7 +39,7 @@ class Landscape:
         y: (N,), model error; both in units of its root mean square on each axis.
         extent: how far the ship moved [m], by which lengths without limits are tried.
         values: of the parameters in the model so far.
-        units: what one unit of each parameter is at the size of the ship; 1 of what is not named.
+        units: what one unit of each parameter is at the size of the ship.
     """
 
     effect: Effect
@@ -52,7 +47,7 @@ class Landscape:
     y: np.ndarray
     extent: float
     values: Mapping[str, float]
-    units: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, float]
 
     def declared(self, names: Sequence[str]) -> list[Variable]:
         """The declarations of some parameters."""
@@ -63,13 +58,13 @@ class Landscape:
         """Of a parameter: its start, its limits, or how far the ship moved and turned."""
         ends = [abs(x) for x in (p.range.min, p.range.max) if x is not None]
         by_unit = {"m": self.extent / 5.0, "rad": pi / FAR}.get(p.unit, 0.0)
-        return max(abs(self.values[p.name]), by_unit) or max(ends, default=0.0) or self._one(p.name)
+        return max(abs(self.values[p.name]), by_unit) or max(ends, default=0.0) or self.units[p.name]
 
     def within(self, p: Variable, share: float) -> float:
         """The value at a share, 0 to 1, of the way through what is tried of a parameter."""
         low, high = p.range.min, p.range.max
         if low is not None and high is not None:
-            if low > 0.0 and high > WIDE * low:
+            if low > 0.0 and high > FAR**2 * low:  # further than both sides of a scale
                 return low * (high / low) ** share
             return low + share * (high - low)
         value = self.values[p.name] + self.scale(p) * np.sinh((2.0 * share - 1.0) * asinh(FAR))
@@ -86,18 +81,11 @@ class Landscape:
                 pairs = zip(self.declared(names), row, strict=True)
                 yield {p.name: self.within(p, share) for p, share in pairs}
 
-    def size(self, values: Mapping[str, float]) -> float:
-        """RMS of a force in units of the model error."""
-        return float(np.sqrt(np.mean(self.force(values) ** 2)))
-
     def unit(self, name: str) -> float:
         """One, or half of a coefficient's limit if that is less: the double is within it."""
         (p,) = self.declared([name])
-        one = self._one(name)
+        one = self.units[name]
         return one if p.range.max is None else min(one, 0.5 * p.range.max)
-
-    def _one(self, name: str) -> float:
-        return self.units.get(name, 1.0)
 
     def columns(self, shape: Mapping[str, float], linear: Sequence[str]) -> np.ndarray:
         """(N, p), force for one unit of each linear parameter."""
@@ -133,13 +121,13 @@ def linear_ones(of: Landscape) -> tuple[list[str], list[str]]:
     for name in names:
         unit = of.unit(name)
         none = dict.fromkeys(names, 0.0)
-        acting = (s for s in shapes if of.size({**s, **none, name: unit}) > NOTHING)
+        acting = (s for s in shapes if not np.allclose(of.force({**s, **none, name: unit}), 0.0))
         shape = next(acting, None)
         if shape is None:
             idle.append(name)
             continue
         once, twice = (of.force({**shape, **none, name: k * unit}) for k in (1.0, 2.0))
-        if np.abs(twice - 2.0 * once).max() <= PROPORTIONAL * np.abs(twice).max():
+        if np.allclose(twice, 2.0 * once):
             linear.append(name)
     return linear, idle
 
@@ -154,8 +142,7 @@ def best_values(
         coefficients: values to try of coefficients that the force is not proportional to, for a shape.
 
     Returns:
-        The values, best first, and the names of the coefficients that are fitted at them; no values
-        where nothing that was tried gives a force.
+        The values, best first, and the coefficients that are fitted at them; none where nothing acts.
     """
     linear, idle = linear_ones(of)
     if len(idle) == len(of.effect.coefficients):
@@ -169,17 +156,8 @@ def best_values(
         starts = [{**s, **c} for s in starts[:: len(others) + 1] for c in tried]
     losses = [float(np.sum(of.left(s, linear) ** 2)) for s in starts]
     best = np.argsort(losses, kind="stable")[:REFINED]
-    found = [refined(of, starts[k], linear) for k in best]
-    kept: list[Values] = []
-    for _, values in sorted(found, key=lambda f: f[0]):
-        if not any(same(of, values, other) for other in kept):
-            kept.append(values)
-    return kept, linear
-
-
-def same(of: Landscape, one: Values, other: Values) -> bool:
-    """Whether two sets of values are one minimum."""
-    return all(abs(one[p.name] - other[p.name]) < SAME * of.scale(p) for p in of.declared([*one]))
+    found = sorted((refined(of, starts[k], linear) for k in best), key=lambda f: f[0])
+    return [values for _, values in found], linear
 
 
 def refined(of: Landscape, start: Values, linear: Sequence[str]) -> tuple[float, Values]:
@@ -198,6 +176,5 @@ def refined(of: Landscape, start: Values, linear: Sequence[str]) -> tuple[float,
         np.clip(list(start.values()), low, high),
         bounds=(low, high),
         x_scale=[of.scale(p) for p in declared],
-        max_nfev=EVALUATIONS,
     )
     return 2.0 * float(fit.cost), dict(zip(names, fit.x.tolist(), strict=True))

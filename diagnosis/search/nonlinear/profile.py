@@ -17,25 +17,13 @@ from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 
 from ...predictors.ship_model import parameter_and_run
+from ..candidates import SMALL, model_error
 from ..conclusion import AcceptedEffect
-from ..refinement import (
-    SMALLEST_SCALE,
-    Estimate,
-    Refined,
-    Start,
-    TrainingSet,
-    bounded,
-    nuisance_of,
-    refine,
-    slope,
-)
-from .segmentation import LIKELY
+from ..most_likely import rise
+from ..refinement import Estimate, Refined, Start, TrainingSet, bounded, nuisance_of, refine, slope
 
-COARSER = 30.0  # times the step of a slope, with which it is compared: 3 % of the parameter
-ROUGH = 0.5  # share of itself by which a slope that means something differs between the two steps
-REACH = 1.5  # factor to both sides within which the best value is looked for
-TRIALS = 16  # of that search, at the most
-FINEST = 1e-4  # of REACH, to which the ends of an interval are found
+REACH = 1.5  # factor to both sides within which the best value is looked for; chosen
+FINEST = 1e-4  # of what is searched, to which a value and the ends of its interval are found; chosen
 
 Interval = tuple[float, float]
 
@@ -58,15 +46,13 @@ def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate,
     trial = _profile(t, at, p, name)
     present = at.start.value(name) + at.values[name]
     ends = sorted((present / REACH, present * REACH))
-    found: Any = minimize_scalar(
-        lambda x: trial(x).cost, bounds=ends, method="bounded", options={"maxiter": TRIALS}
-    )
+    finest = {"xatol": FINEST * (ends[1] - ends[0])}
+    found: Any = minimize_scalar(lambda x: trial(x).cost, bounds=ends, method="bounded", options=finest)
     best = min((trial(present), trial(float(found.x))), key=lambda r: r.cost)
-    value = best.estimate.values[name]
     start = at.start.value(name)
-    size = max(abs(start + value), SMALLEST_SCALE * at.start.unit(name))
-    present = start + value
-    low, high = (_end(trial, best.cost, present, present + k * REACH * size) for k in (-1.0, 1.0))
+    present = start + best.estimate.values[name]
+    size = REACH * max(abs(present), SMALL * at.start.unit(name))
+    low, high = (_end(trial, best.cost, present, present + k * size) for k in (-1.0, 1.0))
     own = [at.fitted.index(n) for n in p.names if n in at.fitted and n != name]
     precision = np.asarray(block_diag(best.estimate.precision, at.precision[own][:, own]))
     last = replace(best.estimate, precision=precision, held=at.held | {name})
@@ -74,17 +60,17 @@ def profiled(t: TrainingSet, at: Estimate, p: AcceptedEffect) -> tuple[Estimate,
 
 
 def is_rough(t: TrainingSet, at: Estimate, name: str) -> bool:
-    """Whether a slope by a parameter depends on its step, so that it is none."""
+    """Whether slopes by a parameter to both sides differ by more than half, so that they are none."""
     parameter, run = parameter_and_run(name)
     effects = at.start.ship.effects.values()
     effect = next(e for e in effects if parameter in {q.name for q in e.parameters})
     if run or effect.linear or effect.search.smooth:
         return False
     model, left = at.model(t.prior), t.error(at)
-    size = max(abs(at.start.value(name) + at.values[name]), SMALLEST_SCALE * model.unit(name))
-    fine = slope(t, model, left, name, size)
-    coarse = slope(t, model, left, name, COARSER * size)
-    return float(np.linalg.norm(fine - coarse)) > ROUGH * float(np.linalg.norm(coarse))
+    size = max(abs(at.start.value(name) + at.values[name]), SMALL * model.unit(name))
+    below = model.plus({name: -SMALL * size})
+    sides = slope(t, model, left, name, size), slope(t, below, model_error(t.data, below), name, size)
+    return bool(np.linalg.norm(sides[0] - sides[1]) > np.linalg.norm(sides[1]) / 2.0)
 
 
 def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Callable[[float], Refined]:
@@ -103,10 +89,10 @@ def _profile(t: TrainingSet, at: Estimate, p: AcceptedEffect, name: str) -> Call
 
 
 def _end(trial: Callable[[float], Refined], least: float, value: float, end: float) -> float:
-    """Where the cost passes its least by LIKELY between a value and an end; the end if nowhere."""
+    """Where the cost rises by :func:`rise` between a value and an end; the end if nowhere."""
 
     def beyond(x: float) -> float:
-        return trial(x).cost - least - LIKELY
+        return trial(x).cost - least - rise()
 
     if beyond(end) <= 0.0:
         return end

@@ -31,21 +31,16 @@ from fmus.scale import Scale
 
 from ...predictors import Model, WeakWindows
 from ...predictors.ship_model import of_run
-from ...predictors.weak_form import EVERY, OVERLAP, thrust_along
-from ..most_likely import ENOUGH, NORMAL_95, STEPS, ridge
+from ...predictors.weak_form import EVERY, OVERLAP, WIDTH, thrust_along
+from ..most_likely import ENOUGH, STEPS, ridge, rise
 
-# Seconds and newtons are those of CyberShip Enterprise 1, times the scale of the ship.
-# s; by which change points move at the least: a few samples. Longer where there were more than CELLS.
-CELL, CELLS = 0.1, 50_000
-DECIMALS = 6  # of a time [s], so that it reads as it was meant
-MOVES = (20, 5, 1)  # cells by which change points are moved, the coarse first
-LIKELY = NORMAL_95**2  # of cost above the least: the 95 % quantile of chi^2, one degree of freedom
+# N, N, N m; of CyberShip Enterprise 1, times the scale of the ship. Chosen: what a fit leaves is less
+# only by the arithmetic, or where it has more columns than windows.
+FLOOR = np.array([1e-3, 1e-3, 3e-4])
 
-SETTLED = 0.95  # share of the noise by which it must still fall for another round; chosen
-FLOOR = np.array([1e-3, 1e-3, 3e-4])  # N, N, N m: below, numbers are those of the arithmetic
-# Share of the time at work of a thruster in a run in which it fails at the most: what is so most of the
-# time is the rule and no failure, such as a dead band of small commands; chosen.
-EXCEPTION = 0.5
+# s, times the scale of the ship: by which change points move, and between rows of the signals in which
+# waves are looked for; a few samples, a fifth of the distance of windows.
+CELL = 0.1
 
 Interval = tuple[float, float]
 NuisanceParts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -76,7 +71,7 @@ class Problem:
     Attributes:
         sections: of the runs.
         lasting: whether an interval has no end but that of its run.
-        cell: how long each cell is [s].
+        cell: how long each cell is [s], by which change points move at the least: a few samples.
         y: (3 K,), model error.
         columns: (3 K, m), what each cell of a dead thruster adds to it.
         middles: (K,), cell, and part of it, in which the middle of each window lies.
@@ -100,11 +95,14 @@ class Problem:
     scale: Scale
 
     def passing(self, spans: Spans) -> bool:
-        """Whether in each run the thruster works for at least half of the time of its commands."""
+        """Whether in each run the thruster works for at least half of the time of its commands.
+
+        What is so most of the time is no failure, but the rule, such as a dead band of small commands.
+        """
         dead: Counter[str] = Counter()
         for a, b in spans:
             dead[self.section(a).run] += self.work[a:b].sum()
-        return self.lasting or all(share <= EXCEPTION for share in dead.values())
+        return self.lasting or all(2.0 * share <= 1.0 for share in dead.values())
 
     def without_end(self, spans: Spans) -> bool:
         """Whether there is one interval in each run at the most, and it lasts to the end of the run."""
@@ -114,6 +112,11 @@ class Problem:
     def section(self, cell: int) -> Section:
         """The section that a cell lies in."""
         return next(s for s in self.sections if cell < s.end)
+
+    @property
+    def moves(self) -> list[int]:
+        """Cells by which change points are moved: a window's width, the distance of windows, one."""
+        return [round(step * self.scale.time / self.cell) for step in (WIDTH, EVERY)] + [1]
 
     @property
     def charge(self) -> float:
@@ -140,7 +143,7 @@ class Problem:
 
     def seconds(self, s: Section, cell: int) -> float:
         """Time [s] in a run; where 0 would mean that an effect never begins, a cell later."""
-        time = round(s.first + self.cell * (cell - s.start), DECIMALS)
+        time = float(f"{s.first + self.cell * (cell - s.start):f}")  # so that it reads as it was meant
         return max(time, self.cell) if self.lasting else time
 
     def values(self, spans: Spans) -> dict[str, float]:
@@ -226,14 +229,12 @@ def intervals(p: Problem) -> Spans:
         p: in units of force.
     """
     spans: Spans = []
-    sigma = np.full(3, np.inf)
     for _ in range(STEPS):
         left = p.fitted(p.left(spans))[0].reshape(-1, 3)
-        smaller = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
-        if (smaller > SETTLED * sigma).all():
+        sigma = np.maximum(np.sqrt(np.square(left).mean(axis=0)), FLOOR * p.scale.forces)
+        before, spans = spans, segmented(p.weighted(sigma), spans)
+        if spans == before:
             break
-        sigma = np.minimum(smaller, sigma)
-        spans = segmented(p.weighted(sigma), spans)
     return spans
 
 
@@ -246,9 +247,8 @@ def programmed(gain: np.ndarray, charge: float, most: int, lasting: bool = False
         most: intervals, at the most.
         lasting: whether an interval has no end but that of the data.
     """
-    states = 1 + most * (
-        2 - lasting
-    )  # number of changes so far: the thruster is dead in those that are odd
+    # A state is the number of changes so far: the thruster is dead in those that are odd.
+    states = 1 + most * (2 - lasting)
     dead = np.arange(states) % 2
     total = np.full(states, np.inf)
     total[0] = 0.0
@@ -287,7 +287,7 @@ def around(p: Problem, spans: Spans, k: int, size: int) -> Iterator[Spans]:
 def moved(p: Problem, spans: Spans) -> Spans:
     """Intervals with change points moved one by one while the cost falls."""
     least = p.cost(spans)
-    for size in MOVES:
+    for size in p.moves:
         for _ in range(STEPS):
             before = least
             for k in reversed(range(len(spans))):
@@ -302,22 +302,20 @@ def moved(p: Problem, spans: Spans) -> Spans:
 
 def likely(p: Problem, spans: Spans) -> dict[str, Interval]:
     """95 % intervals of all change points [s] by their names, each with the others held."""
-    least, found = p.cost(spans) + LIKELY, {}
+    least, found = p.cost(spans) + rise(), {}
     for k, (span, pair) in enumerate(zip(spans, p.keys(spans), strict=True)):
         section = p.section(span[0])
         for end, key in enumerate(pair):
             reached = []
-            for step in (-1, 1):
-                place = span[end]
-                for _ in range(MOVES[0]):
-                    there = [*span]
-                    there[end] = place + step
-                    trial = [*spans[:k], (there[0], there[1]), *spans[k + 1 :]]
-                    fits = section.start <= there[0] < there[1] <= section.end
-                    if not fits or p.cost(trial) > least:
+            for step in (-1, 1) if key else ():
+                there = [*span]
+                for _ in range(p.moves[0]):
+                    there[end] += step
+                    a, b = there
+                    inside = section.start <= a < b <= section.end
+                    if not inside or p.cost([*spans[:k], (a, b), *spans[k + 1 :]]) > least:
                         break
-                    place += step
-                reached.append(p.seconds(section, place + step))
+                reached.append(p.seconds(section, there[end]))
             if key:
                 found[key] = (reached[0], reached[1])
     return found
@@ -334,14 +332,13 @@ def problem(
 
     Args:
         data: windows of every run.
-        model: without the effect.
-        base: (K, 3), its model error.
+        model, base: without the effect, and its model error (K, 3).
         e: the effect.
         nuisance: columns (K, 3, q), prior precision, offset and unit of nuisance parameters; None: none.
     """
     ends = [(max(0.0, float(w.run.time[0])), float(w.run.time[-1]) + w.width) for w in data]
     scale = model.ship.scale
-    cell = max(CELL * scale.time, sum(last - first for first, last in ends) / CELLS)
+    cell = CELL * scale.time
     counts = [int(np.ceil((last - first) / cell)) for first, last in ends]
     # A force on each axis as one of the model error, by the inertia: rows are axes of the force.
     turned = np.linalg.solve(model.mass, np.eye(3)).T @ model.reference_mass.T
@@ -369,20 +366,10 @@ def problem(
         return None
     none = np.zeros((*base.shape, 0)), np.zeros((0, 0)), np.zeros(0), np.zeros(0)
     Z, precision, offset, unit = nuisance or none
-    return Problem(
-        sections,
-        not e.search.intervals[0][1],
-        cell,
-        base.ravel(),
-        columns,
-        np.concatenate(middles),
-        Z.reshape(base.size, -1),
-        precision,
-        offset,
-        unit,
-        np.concatenate(work),
-        scale,
-    )
+    lasting, middle = not e.search.intervals[0][1], np.concatenate(middles)
+    y, Z, time = base.ravel(), Z.reshape(base.size, -1), np.concatenate(work)
+    parts = sections, lasting, cell, y, columns, middle, Z, precision, offset, unit, time, scale
+    return Problem(*parts)
 
 
 def _set(model: Model, name: str, w: WeakWindows) -> bool:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks, spectrogram
 
 from fmus.frames import rotate_to_body
 from fmus.vessel.vessel import State
@@ -21,18 +22,15 @@ from ...predictors.thrust import Response, inflow, thrust
 from ...predictors.weak_form import acceleration, by_mass
 from ...runs import Motion, Run, Smoothed, without_commands
 from ..map_regression import REPLICATES
+from .segmentation import CELL
 
 # Seconds and Hz are those of CyberShip Enterprise 1, times the scale of the ship.
 # The thresholds below were chosen on simulated runs with and without waves (benchmarks.hidden_effects).
 BAND = (0.25, 1.2)  # Hz, in which waves are looked for: those of a basin for a ship of this size
 PEAK = 4.0  # times the spectrum around it, and its own flanks
-FOLLOWED = 0.25  # of a motion the smoother must follow: what it does not comes from the commands
 FEW = 20.0  # with one segment a peak must be so much higher, with n the n-th part of it
-AROUND = 0.9  # Hz, width of the spectrum around
 SEGMENT = 25.0  # s; six periods of the slowest wave
-NEAR = 0.4  # of the peak frequency, on both sides: what belongs to the waves
 DRAWINGS = 3  # of noise, whose mean spectrum counts; chosen: of one, a line is low by chance
-RATE = 10.0  # Hz; half of it is far above the band
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,8 @@ class Waves:
         peak: frequency [rad/s].
         force: standard deviation of the horizontal force around the peak [N].
         share: of the model error's power, on the axis where they stand out most.
-        confidence: share of bootstrap replicates in which they stand out.
+        confidence: share of bootstrap replicates in which they stand out; at most (n + 1) / (n + 2) of n
+            segments (rule of succession): what was seen in few of them may be by chance.
     """
 
     peak: float
@@ -74,30 +73,29 @@ def find_waves(runs: Sequence[Smoothed], model: Model, rng: np.random.Generator)
     if not left or not noise:
         return None
     time = model.ship.scale.time
-    frequency, segments = segments_of(left, time)
-    floor = segments_of(noise, time)[1].mean(axis=-1)
+    frequency, segments = segments_of(left, CELL * time)
+    floor = segments_of(noise, CELL * time)[1].mean(axis=-1)
     power = segments.mean(axis=-1)
     white = np.mean([part[2] for part in parts], axis=0)
     follows = followed(frequency, floor, white, model.reference_mass)
-    band = inside(frequency * time)[:, None] & (follows >= FOLLOWED)
-    around = AROUND / time
+    # What the smoother does not follow comes from the commands.
+    band = inside(frequency * time)[:, None] & (follows >= 1.0 / PEAK)
+    around = float(np.ptp(BAND)) / time
     level, found = peak(frequency, power, floor, band, around)
     count = segments.shape[-1]
     least = PEAK + FEW / count
     if found.height < least:
         return None
-    draws = rng.integers(0, count, (REPLICATES, count))
-    heights = [
-        peak(frequency, segments[..., d].mean(axis=-1), floor, band, around)[1].height for d in draws
-    ]
+    drawn = (segments[..., d].mean(axis=-1) for d in rng.integers(0, count, (REPLICATES, count)))
+    heights = np.array([peak(frequency, each, floor, band, around)[1].height for each in drawn])
     at = float(frequency[found.row])
-    near = np.abs(frequency - at) < NEAR * at
+    near = np.abs(frequency - at) < at / 2.0
     extra = np.maximum(power - level, 0.0)[near].sum(axis=0)
     return Waves(
         2.0 * np.pi * at,
         float(np.sqrt(extra[:2].sum() * frequency[1])),
         float(extra[found.axis] / power[:, found.axis].sum()),
-        float(np.mean(np.array(heights) >= least)),
+        min(float(np.mean(heights >= least)), (count + 1) / (count + 2)),
     )
 
 
@@ -105,49 +103,22 @@ def _signals(
     smoothed: Smoothed, drawn: np.ndarray, model: Model
 ) -> tuple[list[np.ndarray], list[np.ndarray], np.ndarray]:
     """Of a run stretches of its model error, of what drawn noise makes of that, and its noise (3,)."""
-    run, time, rate = smoothed.track.run, smoothed.time, RATE / smoothed.scale.time
+    run, time, step = smoothed.track.run, smoothed.time, CELL * smoothed.scale.time
     motion = without_commands(smoothed)
     error, noise = model_error(run, motion, model), []
     for each in drawn:  # the same run with other noise of the same strength
         pose = np.where(smoothed.used[:, None], motion.eta + smoothed.noise * each, smoothed.track.pose)
         other = model_error(run, without_commands(smoothed, pose), model)
-        noise += stretches(other - error, time, rate)
+        noise += stretches(other - error, time, step)
     white = 2.0 * smoothed.noise**2 * smoothed.track.period
-    return stretches(error, time, rate), noise, white
+    return stretches(error, time, step), noise, white
 
 
-def segments_of(parts: Sequence[np.ndarray], time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (m,) [Hz], and the spectrum of each segment of some signals (m, 3, segments).
-
-    Args:
-        parts: (n, 3), of each signal.
-        time: scale of the ship.
-    """
-    length = round(SEGMENT * RATE)
-    found = [spectra(x, time / RATE, length) for x in parts]
-    return np.fft.rfftfreq(length, time / RATE), np.concatenate(found, axis=-1)
-
-
-def spectra(x: np.ndarray, step: float, length: int) -> np.ndarray:
-    """One-sided power spectral density (m, 3, segments) of a signal (n, 3).
-
-    Segments overlap by an eighth, are without their linear trend, and tapered over a quarter (Tukey), as
-    those of ``scipy.signal.spectrogram``, which takes longer to import than waves take to look for.
-
-    Args:
-        x: the signal, a row each ``step`` [s].
-        step: see there.
-        length: of a segment [rows].
-    """
-    t = np.arange(length)
-    window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(1.0, 8.0 * np.minimum(t, length - t) / length))
-    parts = sliding_window_view(x, length, axis=0)[:: length - length // 8]
-    t = t - t.mean()
-    parts = parts - parts.mean(axis=-1, keepdims=True)
-    parts = parts - (parts @ t / (t @ t))[..., None] * t
-    power = np.abs(np.fft.rfft(parts * window)) ** 2 * step / (window @ window)
-    power[..., 1 : (length + 1) // 2] *= 2.0
-    return power.T
+def segments_of(parts: Sequence[np.ndarray], step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [Hz], and spectra (m, 3, segments) of signals (n, 3), a row each ``step`` [s]."""
+    length = round(SEGMENT / CELL)
+    found = [spectrogram(x, 1.0 / step, nperseg=length, axis=0, detrend="linear")[2] for x in parts]
+    return np.fft.rfftfreq(length, step), np.concatenate(found, axis=-1)
 
 
 def followed(
@@ -163,7 +134,7 @@ def followed(
     """
     level = np.array([white[:2].mean(), white[:2].mean(), white[2]])
     whole = np.diag(mass) ** 2 * level * (2.0 * np.pi * frequency[:, None]) ** 4
-    share = running_median(noise[1:] / whole[1:], 2)
+    share = median_filter(noise[1:] / whole[1:], size=(5, 1), mode="nearest")
     low = share < 0.25  # half of a motion is a quarter of its power
     corner = np.where(low.any(axis=0), frequency[1:][low.argmax(axis=0)], np.inf)
     return 1.0 / (1.0 + (frequency[:, None] / corner) ** 6)
@@ -180,41 +151,20 @@ def peak(
     """The spectrum around each frequency (m, 3), and the highest peak above it in a band.
 
     Args:
-        frequency: (m,) [Hz].
-        power: (m, 3), spectrum.
+        frequency, power: (m,) [Hz] and (m, 3), the spectrum.
         floor: (m, 3), what noise alone makes; the smoother takes away what is quick.
-        band: (m, 3), where a peak counts.
-        around: width of the spectrum around [Hz].
+        band, around: (m, 3), where a peak counts, and width of the spectrum around [Hz].
     """
-    reach = int(around / frequency[1] / 2.0)
+    width = 2 * int(around / frequency[1] / 2.0) + 1
     floor = np.maximum(floor, 1e-3 * floor.max(axis=0))
-    level = floor * running_median(power / floor, reach)
+    level = floor * median_filter(power / floor, size=(width, 1), mode="nearest")
     # Where the error of a slow motion falls into the band its flank is above the median, and no peak.
     above = np.zeros_like(band)
-    for axis, spectrum in enumerate(np.log(np.maximum(power, 1e-300)).T):
-        above[prominent(spectrum, np.log(PEAK)), axis] = True
-    height = np.where(band & above, power / np.maximum(level, 1e-12), 0.0)
+    for axis, spectrum in enumerate(np.log(np.maximum(power, np.finfo(float).tiny)).T):
+        above[find_peaks(spectrum, prominence=np.log(PEAK))[0], axis] = True
+    height = np.where(band & above, power / np.maximum(level, np.finfo(float).tiny), 0.0)
     row, axis = np.unravel_index(int(np.argmax(height)), height.shape)
     return level, Peak(int(row), int(axis), float(height[row, axis]))
-
-
-def running_median(x: np.ndarray, reach: int) -> np.ndarray:
-    """Median (m, 3) of each value of x (m, 3) and those up to ``reach`` rows away; the ends go on."""
-    longer = np.pad(x, ((reach, reach), (0, 0)), mode="edge")
-    return np.median(sliding_window_view(longer, 2 * reach + 1, axis=0), axis=-1)
-
-
-def prominent(x: np.ndarray, least: float) -> list[int]:
-    """Rows of the maxima of x (m,) from which one must go down by ``least`` to get to a higher one."""
-    found = []
-    for k in 1 + np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])):
-        higher = np.flatnonzero(x > x[k])
-        before, after = higher[higher < k], higher[higher > k]
-        left = x[before[-1] if before.size else 0 : k].min()
-        right = x[k : after[0] if after.size else None].min()
-        if x[k] - max(left, right) >= least:
-            found.append(int(k))
-    return found
 
 
 def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
@@ -230,17 +180,17 @@ def model_error(run: Run, motion: Motion, model: Model) -> np.ndarray:
     return (nu_dot - free - driven) @ model.reference_mass.T
 
 
-def stretches(error: np.ndarray, time: np.ndarray, rate: float) -> list[np.ndarray]:
-    """Parts (m, 3) without a gap and long enough for a spectrum, at a rate [Hz]."""
+def stretches(error: np.ndarray, time: np.ndarray, step: float) -> list[np.ndarray]:
+    """Parts (m, 3) without a gap and long enough for a spectrum, a row each ``step`` [s]."""
     known = np.isfinite(error).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     found = []
     for first, end in edges.reshape(-1, 2):
-        even = np.arange(float(time[first]), float(time[end - 1]), 1.0 / rate)
-        if even.size <= SEGMENT * RATE:  # one is lost by the difference
+        even = np.arange(float(time[first]), float(time[end - 1]), step)
+        if even.size <= SEGMENT / CELL:  # one is lost by the difference
             continue
         # Means over each interval: what is quicker must not pass for something slow.
         sums = np.cumsum(error[first:end] * np.gradient(time[first:end])[:, None], axis=0)
         at = np.column_stack([np.interp(even, time[first:end], sums[:, k]) for k in range(3)])
-        found.append(np.diff(at, axis=0) * rate)
+        found.append(np.diff(at, axis=0) / step)
     return found

@@ -10,7 +10,7 @@ motion.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -34,13 +34,12 @@ from .refit import Outcome
 LIFT, RESISTANCE = 3.0, 0.5
 LEFT_OUT = dict.fromkeys(("Y_uv", "Y_ur", "N_uv", "N_ur", "X_vr", "X_rr"), LIFT)
 LEFT_OUT |= dict.fromkeys(("X_u", "X_uuu"), RESISTANCE)
-HEADING, AXIS = "heading_offset", 0.035  # rad, of a heading's axis: two degrees; chosen
+AXIS = 0.035  # rad, prior standard deviation of a heading's axis: two degrees; chosen
 # Prior standard deviation of the water's velocity in units of the ship's size: 0.28 m/s, half a knot,
 # for a ship of 34 m; chosen.
-CURRENT, STREAM = "current", 0.05
+STREAM = 0.05
 CONSTANTS = ("body_bias_Y", "body_bias_N")  # of each run
 FLOOR = 0.05  # of the mean square that is missed: what is not linear about a prediction; chosen
-LENGTH = (1.0,)  # of the windows: those in which predictions are shown
 
 
 class Calibration(PredictionFit):
@@ -122,7 +121,7 @@ class Calibrator:
     @cached_property
     def windows(self) -> list[Shooting]:
         """Those in which predictions are shown."""
-        return shootings(self.train, LENGTH)
+        return shootings(self.train, [1.0])
 
     def still(self) -> Outcome:
         """The calibrated model in still water."""
@@ -131,24 +130,16 @@ class Calibrator:
     def flowing(self, still: Outcome) -> Outcome:
         """The same with a current that all runs are in."""
         near = still.findings.estimate
-        return self._fitted(begin(self.start, self.prior, {CURRENT: STREAM}, near))
+        return self._fitted(begin(self.start, self.prior, {"current": STREAM}, near))
 
     def _fitted(self, at: Estimate) -> Outcome:
         problem = Calibration(self.train, self.windows, at, self.prior)
         fitted = fit_to(problem, at)
         at = fitted.estimate
-        model = at.model(self.prior)
-        learned = replace(
-            self.found,
-            effects=[],
-            model=model,
-            suspects=[],
-            refitted=model,
-            moved=dict(zip(self.prior.mean, at.offset.tolist(), strict=True)),
-            fold_models=problem.without_each_run(at),
-            refit=None,
-            estimate=at,
-        )
+        model, folds = at.model(self.prior), problem.without_each_run(at)
+        moved = dict(zip(self.prior.mean, at.offset.tolist(), strict=True))
+        f = self.found
+        learned = Findings([], f.ranking, model, [], f.sigma, model, moved, folds, None, at, f.searched)
         posterior = Posterior.of(fitted, self.prior)
         return Outcome(learned, posterior, unrecorded(self.train, model, fitted.push, {}))
 
@@ -162,8 +153,7 @@ def begin(
     """The first model with coefficients that it leaves out, zero as yet, and their prior precision.
 
     Args:
-        start: the first model.
-        prior: of the nominal coefficients.
+        start, prior: the first model, and the prior of its coefficients.
         further: effects beside those of LEFT_OUT, and their prior standard deviations.
         near: where to begin; None: at the first model.
     """
@@ -173,7 +163,7 @@ def begin(
         for i, size in (LEFT_OUT | dict(further or {})).items()
         if i in effects and i not in prior.mean
         for n in effects[i].coefficients
-    } | ({HEADING: AXIS} if HEADING in effects else {})
+    } | ({"heading_offset": AXIS} if "heading_offset" in effects else {})
     precision = np.diag([s**-2.0 for s in std.values()])
     values = dict.fromkeys(std, 0.0)
     if near is None:

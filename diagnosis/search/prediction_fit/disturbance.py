@@ -19,9 +19,7 @@ from ...predictors.weak_form import EVERY, WIDTH, kernel
 # s, times the scale of the ship; correlation times that are tried. A shorter one is white for windows of
 # the weak form, a longer one a bias.
 TIMES = np.geomspace(0.2, 12.0, 25)
-LAGS = 12  # windows: twice their width, from which on the covariance is hardly determined; chosen
-POINTS = 301  # of the kernel's integrals; chosen
-GAUSS = 4  # points of the integral of the noise between two instants; chosen, exact to its 8th power
+POINTS = 301  # of the kernel's integrals; chosen, a twentieth of the shortest of these times apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +30,15 @@ class Push:
     time: np.ndarray
 
 
-NO_PUSH = Push(np.zeros(3), np.ones(3))
-
-
 def _kernels() -> tuple[np.ndarray, np.ndarray]:
-    """Covariance of a window's mean at each lag: by TIMES (times, lags), by noise (lags,)."""
+    """Covariance of a window's mean at each lag: by TIMES (times, lags), by noise (lags,).
+
+    Beyond lags of twice the width of a window it is hardly determined.
+    """
     t = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, POINTS)
     w = kernel(2.0 * t / WIDTH)
     step = t[1] - t[0]
-    lags = EVERY * np.arange(LAGS + 1)
+    lags = np.arange(0.0, 2.0 * WIDTH + EVERY, EVERY)
     both = np.convolve(w, w) * step / (w.sum() * step) ** 2  # of the difference of two places
     apart = step * np.arange(-POINTS + 1, POINTS)
     force = np.exp(-np.abs(lags[:, None] + apart) / TIMES[:, None, None]) @ both * step
@@ -59,12 +57,11 @@ def estimate(
 
     Args:
         data: windows of every run.
-        error: (K, 3), what a model leaves in them [N, N, N m].
-        std: (K, 3), its standard deviation by the measurement's noise.
+        error, std: (K, 3), what a model leaves in them, and its standard deviation by noise [N, N, N m].
         time: (3,), correlation times among those that are tried, if they are known [s].
     """
     times = TIMES * data[0].scale.time
-    left = autocovariance(data, error, LAGS) - np.mean(std**2, axis=0) * OF_NOISE[:, None]
+    left = autocovariance(data, error, OF_NOISE.size - 1) - np.mean(std**2, axis=0) * OF_NOISE[:, None]
     variance = np.maximum(OF_FORCE @ left, 0.0) / np.sum(OF_FORCE**2, axis=1)[:, None]  # (times, 3)
     missed = np.sum((left - variance[..., None, :] * OF_FORCE[..., None]) ** 2, axis=1)
     best = np.argmin(missed, axis=0) if time is None else np.searchsorted(times, time)
@@ -96,18 +93,20 @@ def covariance(motion: Linear, at_start: np.ndarray, push: Push) -> np.ndarray:
 
 
 def _steps(motion: Linear, push: Push) -> tuple[np.ndarray, np.ndarray]:
-    """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds."""
+    """Transition (w, T, 9, 9) of state and force from instant to instant, and what noise adds.
+
+    Both are blocks of one exponential (C. F. Van Loan, Computing integrals involving the matrix
+    exponential, IEEE Transactions on Automatic Control 23, 1978).
+    """
     A = np.zeros((*motion.slope.shape[:2], 9, 9))
     A[..., :6, :6], A[..., 3:6, 6:] = motion.slope, motion.by_mass
     A[..., 6:, 6:] = -np.diag(1.0 / push.time)
-    if not push.size.any():
-        return _exponential(motion.every * A), np.zeros_like(A)
-    rate = np.broadcast_to(2.0 * push.size**2 / push.time, (len(A), 3))[:, None, None]
-    added = np.zeros_like(A)
-    for x, weight in zip(*np.polynomial.legendre.leggauss(GAUSS), strict=True):
-        G = _exponential(0.5 * motion.every * (x + 1.0) * A)[..., 6:]
-        added += 0.5 * motion.every * weight * (G * rate) @ np.swapaxes(G, -1, -2)
-    return _exponential(motion.every * A), added
+    noise = np.zeros_like(A)
+    noise[..., range(6, 9), range(6, 9)] = (2.0 * push.size**2 / push.time)[..., None, :]
+    both = np.block([[-A, noise], [np.zeros_like(A), np.swapaxes(A, -1, -2)]])
+    found = _exponential(motion.every * both)
+    over = np.swapaxes(found[..., 9:, 9:], -1, -2)
+    return over, over @ found[..., :9, 9:]
 
 
 def _exponential(A: np.ndarray) -> np.ndarray:

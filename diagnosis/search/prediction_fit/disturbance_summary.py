@@ -10,31 +10,20 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from ...predictors import Model, WeakWindows, omega
 from ...predictors.uncertainty import NOISE_TOLERANCE, omega_std
-from ...predictors.weak_form import kernel_integral
+from ...predictors.weak_form import BLOCK, kernel_integral
+from ...runs.sensors.evidence import spread_of
+from ..findings import MOST_REPORTED
+from ..most_likely import beyond
 from .disturbance import Push
 
-CHANCE = 0.01  # that a run without a push tells of one; that of the remainder
-MAD = 1.4826  # standard deviations of a normal distribution in a median absolute deviation
-MOST = 5  # pushes that are told, the clearest; chosen
-# s, times the scale of the ship; what lasts longer is no push but a remainder, and what is shorter than
-# a third of a window of the weak form cannot be told from a jump of the measured pose; chosen.
-SHORTEST, LONGEST = 1.0, 10.0
 AXES, UNITS, NAMES = ("X", "Y", "N"), ("N", "N", "N m"), ("surge", "sway", "yaw")
 
 
 class Stretch(NamedTuple):
-    """A push at a time.
-
-    Attributes:
-        run: name.
-        axis: X, Y or N.
-        start, end: [s].
-        size: force, were it constant [N or N m].
-    """
+    """A push at a time: run, axis X, Y or N, start and end [s], force, were it constant [N or N m]."""
 
     run: str
     axis: str
@@ -77,62 +66,52 @@ class Unrecorded:
     @property
     def pushes(self) -> str:
         """The pushes at a time; empty where there are none."""
-        each = [
-            f"{s.run} {s.start:.1f} to {s.end:.1f} s, {s.size:+.2g} {UNITS[AXES.index(s.axis)]} in "
-            f"{NAMES[AXES.index(s.axis)]}"
-            for s in self.stretches
-        ]
+        named = {axis: f"{unit} in {name}" for axis, unit, name in zip(AXES, UNITS, NAMES, strict=True)}
+        times = ((s, f"{s.run} {s.start:.1f} to {s.end:.1f} s") for s in self.stretches)
+        each = [f"{time}, {s.size:+.2g} {named[s.axis]}" for s, time in times]
         return f"Something pushed the ship at times: {'; '.join(each)}." if each else ""
 
 
 def unrecorded(
-    runs: Sequence[WeakWindows],
-    model: Model,
-    push: Push,
-    differing: Mapping[str, tuple[float, float]],
+    runs: Sequence[WeakWindows], model: Model, push: Push, differing: Mapping[str, tuple[float, float]]
 ) -> Unrecorded:
-    """What acts unrecorded.
-
-    Args:
-        runs: that were fitted to.
-        model: the fitted one.
-        push: that it leaves.
-        differing: see :class:`Unrecorded`.
-    """
+    """What acts unrecorded in runs that a model was fitted to; push and differing as in the result."""
     left = [omega(w, model) for w in runs]
     noise = [NOISE_TOLERANCE * omega_std(w, model) for w in runs]
     # As far as the noise of the measurement allows, the same in all runs.
-    usual = MAD * np.median(np.abs(np.concatenate(left)), axis=0)
-    beyond = -float(ndtri(0.5 * CHANCE / max(3 * sum(w.middle.size for w in runs), 1)))
+    whole = np.concatenate(left)
+    usual = [spread_of(np.append(x, -x)) for x in whole.T]  # about zero
+    limit = beyond(whole.size)
     found = []
     for w, error, std in zip(runs, left, noise, strict=True):
         for k in range(3):
-            found += _pushes(w, k, error[:, k], np.maximum(std[:, k], usual[k]), beyond)
-    clearest = sorted(found, key=lambda f: -f[0])[:MOST]
+            found += _pushes(w, k, error[:, k], np.maximum(std[:, k], usual[k]), limit)
+    clearest = sorted(found, key=lambda f: -f[0])[:MOST_REPORTED]
     return Unrecorded(push, differing, [stretch for _, stretch in clearest])
 
 
 def _pushes(
-    w: WeakWindows, axis: int, error: np.ndarray, std: np.ndarray, beyond: float
+    w: WeakWindows, axis: int, error: np.ndarray, std: np.ndarray, limit: float
 ) -> Iterator[tuple[float, Stretch]]:
-    """Pushes of a run on an axis, each with how many standard deviations are left at its clearest."""
-    z, time = error / std, w.scale.time
-    rows = np.flatnonzero(np.abs(z) > beyond)
+    """Pushes of a run on an axis, each with how many standard deviations are left at its clearest.
+
+    What lasts longer than a block is no push but a remainder, and what is shorter than a third of a
+    window of the weak form cannot be told from a jump of the measured pose.
+    """
+    z = error / std
+    rows = np.flatnonzero(np.abs(z) > limit)
     for part in np.split(rows, np.flatnonzero(np.diff(w.middle[rows]) > w.width) + 1):
-        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= LONGEST * time:
+        if part.size and w.middle[part[-1]] - w.middle[part[0]] <= BLOCK * w.scale.time:
             near = np.abs(w.middle - w.middle[part].mean()) <= 0.5 * np.ptp(w.middle[part]) + w.width
             start, end, size = box(w, near, error[near])
-            if end - start >= SHORTEST * time:
+            if end - start >= 2.0 * w.every:
                 yield np.abs(z[part]).max(), Stretch(w.run.name, AXES[axis], start, end, size)
 
 
 def box(w: WeakWindows, near: np.ndarray, error: np.ndarray) -> tuple[float, float, float]:
-    """Start, end [s] and size of the constant force whose means over windows are next to an error.
+    """Start, end [s] and size of the constant force whose means are next to an error (k,) [N or N m].
 
-    Args:
-        w: windows of a run.
-        near: (K,), which of them.
-        error: (k,), in these [N or N m].
+    The error is that in some of the windows of a run, those ``near`` (K,).
     """
     middle, half = w.middle[near], 0.5 * w.width
     times = np.arange(middle[0] - half, middle[-1] + half, 0.5 * w.every)
@@ -141,5 +120,5 @@ def box(w: WeakWindows, near: np.ndarray, error: np.ndarray) -> tuple[float, flo
     means = passed[last] - passed[first]
     power = np.einsum("ij,ij->i", means, means)
     along = means @ error
-    best = int(np.argmax(along**2 / np.maximum(power, 1e-9)))
+    best = int(np.argmax(along**2 / np.maximum(power, np.finfo(float).eps)))
     return float(times[first[best]]), float(times[last[best]]), float(along[best] / power[best])

@@ -31,13 +31,12 @@ from ...predictors import Model, WeakWindows
 from ...predictors.shooting import UNKNOWN, Around, Shooting
 from ...predictors.uncertainty import omega_std
 from ..candidates import SMALL, model_error
-from ..most_likely import STEPS, Quadratic, most_likely, ridge
+from ..most_likely import ROUNDING, STEPS, Quadratic, most_likely, ridge
 from ..prior import NominalPrior
-from ..refinement import SMALLEST_SCALE, Estimate
-from .disturbance import NO_PUSH, Push, covariance, estimate
+from ..refinement import Estimate
+from .disturbance import Push, covariance, estimate
 
 LENGTHS = (0.5, 1.0, 2.0)  # of the windows in which predictions are shown
-ROUNDING = 1e-10  # of the largest variance in a window
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +95,9 @@ class Information:
         """k, for a prior precision P (q, q)."""
         k = 1.0
         for _ in range(STEPS):
-            S = np.linalg.inv(regular(k * self.H + P))
+            S = np.linalg.inv(k * self.H + P + ridge(k * self.H + P))
             k = float(np.sum(S * self.H) / np.sum(S * self.G))
         return k
-
-
-def regular(H: np.ndarray) -> np.ndarray:
-    """A matrix with a slight ridge: collinear parameters share what they explain."""
-    return H + ridge(H)
 
 
 class PredictionFit:
@@ -118,16 +112,11 @@ class PredictionFit:
         assumed: the unrecorded force that counts where windows are weighed.
     """
 
-    assumed = NO_PUSH
-
     def __init__(
-        self,
-        runs: Sequence[WeakWindows],
-        windows: Sequence[Shooting],
-        at: Estimate,
-        prior: NominalPrior,
+        self, runs: Sequence[WeakWindows], windows: Sequence[Shooting], at: Estimate, prior: NominalPrior
     ) -> None:
         self.runs, self.prior, self.windows = runs, prior, windows
+        self.assumed = Push(np.zeros_like(runs[0].smoothed.noise), np.ones_like(runs[0].smoothed.noise))
         self._place = {id(w.smoothed): k for k, w in enumerate(runs)}
         self.std = np.concatenate([omega_std(w, at.start) for w in runs])
         names, believed = at.fitted, [*prior.std.values()]
@@ -135,13 +124,10 @@ class PredictionFit:
         units = [at.start.unit(n) for n in names]
         self._own = np.array([*units, *[1.0] * len(believed)])
         self.unit = np.array([*units, *believed])[self._kept]
-        scale = {
-            n: max(abs(at.values[n]), SMALLEST_SCALE * u) for n, u in zip(names, units, strict=True)
-        }
+        scale = {n: max(abs(at.values[n]), SMALL * u) for n, u in zip(names, units, strict=True)}
+        scale |= {n: s for n, s in prior.std.items() if s}
         self.names = [n for n, kept in zip([*names, *prior.std], self._kept, strict=True) if kept]
-        self._steps = {
-            n: SMALL * s for n, s in (scale | {n: s for n, s in prior.std.items() if s}).items()
-        }
+        self._steps = {n: SMALL * s for n, s in scale.items()}
         # Of an effect that adds to a nominal coefficient, such as a lag, the name stands twice.
         self._columns = [[*self._steps].index(n) for n in self.names]
         P = np.asarray(block_diag(at.precision, np.eye(len(believed)))) * np.outer(self._own, self._own)
@@ -184,10 +170,7 @@ class PredictionFit:
     def missed(self, s: Shooting, squares: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """(w, 3): mean square of what the model misses in the run of each window, both places alike.
 
-        Args:
-            s: windows.
-            squares: (w, T, 3), of the residuals, 0 where not seen.
-            seen: (w, T), which instants count.
+        ``squares`` (w, T, 3) are those of the residuals, 0 where the instants (w, T) are not seen.
         """
         missed = np.zeros((len(s.runs), 3))
         np.add.at(missed, s.run, squares.sum(axis=1))
@@ -256,8 +239,7 @@ def fit_predictions(
     """The most likely model by its predictions, and how sure it is.
 
     Args:
-        runs: to learn from.
-        windows: of these, see :func:`shootings`; at least one.
+        runs, windows: to learn from, and their windows, see :func:`shootings`; at least one.
         at: where to begin: a model with all effects that were accepted.
         prior: of the nominal coefficients.
     """
@@ -279,8 +261,8 @@ def fit_to(problem: PredictionFit, at: Estimate) -> Fitted:
     def about(at: Estimate) -> _Weighed:
         known = problem.information(at)
         k, weights = known.power(P), known.weights
-        H, right = regular(k * known.H + P), k * known.g - P @ problem.theta(at)
-        return _Weighed(H, right, lambda e: problem.cost(e, weights, k), known, k)
+        H, right = k * known.H + P, k * known.g - P @ problem.theta(at)
+        return _Weighed(H + ridge(H), right, lambda e: problem.cost(e, weights, k), known, k)
 
     at, here = most_likely(at, about, problem.moved)
     S = np.linalg.inv(here.H)

@@ -13,8 +13,6 @@ from ...predictors.measured_outputs import named, residual
 from ...predictors.weak_form import OVERLAP
 from ..prior import NominalPrior, Prior
 
-PASSES = 2  # of the fit, the second weighted by what the first leaves
-
 
 def fitted(runs: Sequence[WeakWindows], model: Model, prior: Prior, names: Iterable[str]) -> Model:
     """The model with the coefficients of actuators fitted to what is measured of them.
@@ -56,7 +54,7 @@ def _fitted(having: Sequence[WeakWindows], start: Model, belief: NominalPrior, n
         return np.concatenate(parts)
 
     offset = np.zeros(len(of))
-    for _ in range(PASSES):
+    for _ in range(2):  # the second is weighted by what the first leaves
         size = float(np.std(left(offset))) * np.sqrt(OVERLAP)
         if size > 0.0:
             weighted = lambda x, size=size: np.append(left(x) / size, x)  # noqa: E731

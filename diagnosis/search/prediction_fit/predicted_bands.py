@@ -7,29 +7,26 @@ from ...predictors.evaluation import Bands
 from ...predictors.shooting import Shooting
 from ...predictors.windows import Windows
 from ...runs import Smoothed
+from ..candidates import SMALL
 from .disturbance import Push, covariance
 from .joint_posterior import Posterior
-
-STEP = 0.1  # posterior standard deviations, of the finite differences; chosen
 
 
 def prediction_bands(
     smoothed: Smoothed, windows: Windows | None, model: Model, posterior: Posterior, push: Push
 ) -> Bands | None:
-    """The bands about a model's predictions in the windows of a run.
+    """The bands about a model's predictions in the windows of a run; None: it has none.
 
     Args:
-        smoothed: the run.
-        windows: of it; None: there is none, and there are no bands.
-        model: that predicts.
-        posterior: of its fitted values.
+        smoothed, windows: the run.
+        model, posterior: that predicts, and of its fitted values.
         push: the unrecorded force.
     """
     if windows is None:
         return None
     shots = Shooting([smoothed], windows.length)
     std = posterior.std
-    around = shots.around(model, {n: STEP * s for n, s in std.items() if s > 0.0})
+    around = shots.around(model, {n: SMALL * s for n, s in std.items() if s > 0.0})
     kept = [k for k, s in enumerate(std.values()) if s > 0.0]
     C = posterior.covariance[np.ix_(kept, kept)]
     later = covariance(around.motion, shots.at_start, push)

@@ -10,7 +10,6 @@ from ...predictors.uncertainty import omega_std
 from ..candidates import model_error
 from ..conclusion import interval, laplace_std, suspected
 from ..findings import Findings
-from ..gram import RUN
 from ..prior import NominalPrior
 from ..refinement import Estimate, TrainingSet, nuisance_of, refit
 from .disturbance import estimate
@@ -42,11 +41,10 @@ class Outcome:
 def to_predictions(
     found: Findings, runs: Sequence[WeakWindows], prior: NominalPrior, fits: bool
 ) -> Outcome:
-    """Fit what was found to predictions.
+    """Fit what was found to predictions of the runs that it was found on.
 
     Args:
-        found: the findings by the model error.
-        runs: that they were found on.
+        found, runs: the findings by the model error, and the runs.
         prior: of the nominal coefficients.
         fits: whether anything was learned that can be fitted.
     """
@@ -91,8 +89,7 @@ def fit_model_error(
     at: Estimate, sigma: np.ndarray, runs: Sequence[WeakWindows], prior: NominalPrior
 ) -> tuple[Estimate, dict[str, float]]:
     """The fit to the model error with the prior of the fit, and its standard deviations [SI]."""
-    blocks = np.concatenate([RUN * k + w.block for k, w in enumerate(runs)])
-    t = TrainingSet(runs, blocks, sigma, prior)
+    t = TrainingSet(runs, sigma, prior)
     nuisance = nuisance_of(t, at, t.error(at))
     last = refit(t, at, nuisance).estimate
     unit = np.array([*[1.0] * len(at.fitted), *prior.std.values()])

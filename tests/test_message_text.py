@@ -1,0 +1,83 @@
+"""What messages repeat of files: short, on one line, without control characters; the first fault of a file."""
+
+import json
+from typing import Annotated
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cybership.message_text import (
+    LONGEST_FAULT,
+    LONGEST_VALUE,
+    LONGEST_WORD,
+    brief,
+    first_fault,
+    printable,
+)
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    size: Annotated[float, Field(gt=0.0)]
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    parts: list[Inner] = []
+    kind: str | int = ""
+
+
+def fault(content, **options):
+    with pytest.raises(ValidationError) as error:
+        Outer.model_validate_json(json.dumps(content), strict=True)
+    return first_fault(error.value, **options)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ({"parts": [{"size": 1.0}, {"size": 0}]}, "parts[1].size: Input should be greater than 0"),
+        ({"parts": [{}]}, "parts[0].size: is missing"),
+        (
+            {"parts": [{"szie": 1.0}]},
+            "parts[0].szie: unknown key, like size",
+        ),  # before what it leaves missing
+        ({"\x1b[31mred\n": 1}, "\\x1b[31mred: unknown key, like size"),
+        ({"x" * 100_000: 1}, f"{'x' * 28}...{'x' * 28}: unknown key, like size"),
+        ([1], "the file: Input should be an object"),
+        ({"kind": []}, "kind: is text"),
+    ],
+)
+def test_the_first_fault_says_where_and_what(content, says):
+    def special(kind, location, value):
+        return "is text" if location[0:1] == ("kind",) else ""
+
+    found = fault(
+        content,
+        hint=lambda location: ", like size",
+        hidden=lambda part: part in ("str", "int"),
+        special=special,
+        whole="the file",
+    )
+    assert found == says
+
+
+@pytest.mark.parametrize("value", ["x" * 100_000, "x y " * 50_000, "\n\x1b[2J" * 10_000, "{0}" * 50_000])
+def test_values_are_cut_and_escaped(value):
+    told = brief(f"'{value}' is no law; there are 'a', 'b'")
+    quoted, _, rest = told[1:].partition("' ")
+    assert len(quoted) <= LONGEST_VALUE
+    assert rest == "is no law; there are 'a', 'b'"
+    assert told.isprintable()
+    unquoted = brief(f"there is no law {value}")
+    assert len(unquoted) <= LONGEST_FAULT
+    assert unquoted.isprintable()
+    assert max(map(len, unquoted.split())) <= LONGEST_VALUE + 4
+
+
+def test_what_is_short_stays():
+    text = "actuator 'port': there is no law 'propeler'; did you mean 'fixed_propeller'?"
+    assert brief(text) == printable(text) == text
+    assert len(printable("x" * 5000)) == LONGEST_WORD - 1

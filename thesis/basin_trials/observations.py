@@ -1,0 +1,190 @@
+"""The observations of 6.4.2 to 6.4.5 on the basin trials, each with what our runs show."""
+
+from collections.abc import Mapping, Sequence
+from math import isnan
+
+from studies.study_report import Verdict
+
+from ..monte_carlo import Interval
+from ..tracking.verdict import listed
+from .found import FAULTY, REGULAR, Found, Runs, lost, mean, share
+from .trials import ABS, CLE, CLZ, LABELS, RBS, TRIALS
+
+MUCH = 1.5  # times that count as "substantially"; chosen
+
+
+def answered(answers: Mapping[str, str | bool | None]) -> str:
+    """One word for each setting; None: no run kept up."""
+    words = {True: "yes", False: "no", None: "no run kept up"}
+    said = {setting: a if isinstance(a, str) else words[a] for setting, a in answers.items()}
+    return "; ".join(f"{setting}: {a}" for setting, a in said.items())
+
+
+def surely_below(ratios: Sequence[Interval]) -> str:
+    """Whether all ratios are below 1, surely; "no" where one surely is not."""
+    if any(isnan(s.mean) for s in ratios):
+        return "no run kept up"
+    if any(s.low > 1.0 for s in ratios):
+        return "no"
+    return "yes" if all(s.high < 1.0 for s in ratios) else "undecided"
+
+
+def as_in_the_basin(found: Found, trial: int) -> dict[str, Runs]:
+    """The runs of a trial with the guidance fault, as in the basin, and without."""
+    name = TRIALS[trial].name
+    return {"with the fault": found.trials[name, FAULTY], "without": found.trials[name, REGULAR]}
+
+
+def below(found: Found, thesis: str, trial: int, number: str, *pairs: tuple[str, str]) -> Verdict:
+    """Whether a number of the first of each pair of controllers is surely below that of the second."""
+    here, rows = {}, []
+    for name, runs in as_in_the_basin(found, trial).items():
+        ratios = {f"{LABELS[a]}/{LABELS[b]}": share(runs[a], runs[b], number) for a, b in pairs}
+        here[name] = surely_below(list(ratios.values()))
+        rows.append(f"{name}: {listed(ratios)}")
+    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+
+
+def held(found: Found, thesis: str, trial: int, number: str, low: float, high: float) -> Verdict:
+    """Whether the mean of a number lies between two limits for every controller that kept up."""
+    here, rows = {}, []
+    for name, runs in as_in_the_basin(found, trial).items():
+        means = {LABELS[c]: mean(each, number) for c, each in runs.items()}
+        known = [m.mean for m in means.values() if m.mean == m.mean]
+        here[name] = all(low < x < high for x in known) if known else None
+        rows.append(f"{name}: {listed(means)}")
+    return Verdict(thesis, answered(here), f"{number}, {TRIALS[trial].name}, {'; '.join(rows)}")
+
+
+def follow(found: Found, trial: int) -> Verdict:
+    """Whether every controller keeps up in every run."""
+    runs = as_in_the_basin(found, trial)
+    fell = {name: {LABELS[c]: lost(r) for c, r in each.items()} for name, each in runs.items()}
+    return Verdict(
+        "The controllers are able to follow the figure-eight",
+        answered({name: not any(each.values()) for name, each in fell.items()}),
+        f"{TRIALS[trial].name}, runs lost, "
+        + "; ".join(f"{n}: {', '.join(f'{c} {k}' for c, k in e.items())}" for n, e in fell.items()),
+    )
+
+
+def other_sections(found: Found) -> dict[str, Sequence[Verdict]]:
+    """What the thesis says of the other three trials, by section."""
+    old, new = (RBS, ABS), (CLZ, CLE)
+    both = [(a, b) for a in old for b in new]
+    ways = [(b, a) for a, b in both]
+    crossed = ((RBS, ABS), (CLE, CLZ))
+    return {
+        "The ellipse at 0.08 m/s (6.4.2)": (
+            held(found, "The ship is inside of the desired trajectory", 0, "inside", 0.0, float("inf")),
+            below(found, "Oscillations are stronger with concurrent learning", 0, "swing", *both),
+            below(found, "IAEWWT does not show them: it is less with CL", 0, "iaewwt", *ways),
+            below(found, "CLZ tracks best", 0, "cross_track", *((CLZ, c) for c in (RBS, ABS, CLE))),
+            held(found, "Nobody adapts in surge at all", 0, "omega_hat_X", -1e-12, 1e-12),
+        ),
+        "The eight at 0.16 (6.4.3)": (
+            follow(found, 1),
+            below(found, "RBS and ABS get closer to the path than CLZ and CLE", 1, "cross_track", *both),
+            below(found, "RBS and ABS come best out of the metrics", 1, "iaewwt", *both),
+            below(found, "ABS is a bit more energy efficient than RBS", 1, "work", (ABS, RBS)),
+            below(found, "CLE is the worst", 1, "iaewwt", *((c, CLE) for c in (RBS, ABS, CLZ))),
+        ),
+        "The eight at 0.32 (6.4.5)": (
+            follow(found, 3),
+            below(found, "ABS and CLZ oscillate more than RBS and CLE", 3, "swing", *crossed),
+            below(found, "So IAEWWT of ABS surpasses that of RBS, CLZ's CLE's", 3, "iaewwt", *crossed),
+            held(found, "The period of the oscillation is near 0.1 s", 3, "frequency", 5.0, 20.0),
+        ),
+    }
+
+
+def settings(found: Found) -> dict[str, tuple[Runs, Runs]]:
+    """With the guidance fault, as in the basin, and without: the slow runs and the fast ones."""
+    slow, fast = (as_in_the_basin(found, trial) for trial in (0, 2))
+    return {name: (slow[name], fast[name]) for name in slow}
+
+
+def grown(found: Found, thesis: str, number: str, unit: str) -> Verdict:
+    """Whether a number of every controller is much larger than at half the speed."""
+    here, rows = {}, []
+    for name, (slow, fast) in settings(found).items():
+        ratios = {c: share(fast[c], slow[c], number) for c in (RBS, ABS, CLZ, CLE)}
+        alive = [r.mean > MUCH for r in ratios.values() if r.mean == r.mean]
+        here[name] = all(alive) if alive else None
+        for c, r in ratios.items():
+            size = f"{mean(slow[c], number).mean:.3g}→{mean(fast[c], number).mean:.3g} {unit}"
+            fell = f", lost {lost(fast[c])} of {len(fast[c])}" if lost(fast[c]) else ""
+            rows.append(f"{LABELS[c]} {name} {size} (×{r.mean:.2g}{fell})")
+    return Verdict(thesis, answered(here), "; ".join(rows))
+
+
+def failing(found: Found) -> Verdict:
+    """Whether concurrent learning loses the ship more often than the others."""
+    here, rows = {}, []
+    for name, (_, fast) in settings(found).items():
+        fell = {c: lost(fast[c]) for c in (RBS, ABS, CLZ, CLE)}
+        worse = {c: share(fast[c], fast[RBS], "cross_track") for c in (CLZ, CLE)}
+        here[name] = min(fell[CLZ], fell[CLE]) > max(fell[RBS], fell[ABS]) or all(
+            s.low > MUCH for s in worse.values()
+        )
+        each = ", ".join(f"{LABELS[c]} {n} of {len(fast[c])}" for c, n in fell.items())
+        ratios = ", ".join(f"{LABELS[c]} {s}" for c, s in worse.items())
+        rows.append(f"{name}: lost {each}; cross-track error over that of RBS: {ratios}")
+    return Verdict("CLZ and CLE fail compared with RBS and ABS", answered(here), "; ".join(rows))
+
+
+def improving(found: Found) -> Verdict:
+    """Whether adaptive backstepping still tracks better than backstepping."""
+    here, rows = {}, []
+    for name, (_, fast) in settings(found).items():
+        ratio = share(fast[ABS], fast[RBS])
+        here[name] = ratio.high < 1.0 if ratio.mean == ratio.mean else None
+        aside = share(fast[ABS], fast[RBS], "cross_track")
+        rows.append(f"{name}: position {ratio}, cross-track {aside}")
+    return Verdict(
+        "ABS still manages to show improved performance compared to RBS",
+        answered(here),
+        f"ABS over RBS, {'; '.join(rows)}",
+    )
+
+
+def surge(found: Found) -> Verdict:
+    """Whether the model error in surge grows less than in proportion to the speed."""
+    here, rows = {}, []
+    for name, (slow, fast) in settings(found).items():
+        ratio = share(fast[RBS], slow[RBS], "omega_X")
+        here[name] = ratio.mean < MUCH if ratio.mean == ratio.mean else None
+        a, b = mean(slow[RBS], "omega_X").mean, mean(fast[RBS], "omega_X").mean
+        rows.append(f"{name}: {a:.2f}→{b:.2f} N (×{ratio.mean:.2f})")
+    return Verdict(
+        "The error in surge has not increased that much (0.4 N to 0.5 N)",
+        answered(here),
+        f"RBS, {'; '.join(rows)}",
+    )
+
+
+def sway(found: Found) -> Verdict:
+    """Whether the mean model error in sway leaves zero at the higher speed."""
+    here, rows = {}, []
+    for name, (slow, fast) in settings(found).items():
+        a, b = (mean(runs[RBS], "omega_Y") for runs in (slow, fast))
+        here[name] = abs(b.mean) > MUCH * abs(a.mean) if b.mean == b.mean else None
+        rows.append(f"{name}: {a.mean:.3f}→{b.mean:.3f} N")
+    return Verdict(
+        "The error in sway has drifted to the side",
+        answered(here),
+        f"its mean, RBS, {'; '.join(rows)}. The thesis suspects the bow thruster above 0.15 m/s; "
+        "rotational damping alone makes a mean error on a path that turns one way",
+    )
+
+
+def observations(found: Found) -> list[Verdict]:
+    """The observations in the order of 6.4.4."""
+    return [
+        grown(found, "Tracking is substantially decreased", "position", "m"),
+        grown(found, "The oscillations have increased", "swing", "rad/s"),
+        failing(found),
+        improving(found),
+        surge(found),
+        sway(found),
+    ]

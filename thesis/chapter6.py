@@ -1,0 +1,144 @@
+"""The basin trials of chapter 6 in simulation: ``python -m thesis.chapter6``.
+
+Four controllers follow both paths at two speeds with the gains of Table 6.4, through noise, freezes and
+spikes, with and without the fault of the guidance. The plant hides what the thesis identified of the
+real ship (SYSID4 of Table 7.1), or with ``--model`` what ``diagnosis.learn`` found of it. Each lesson
+of 6.5 and each observation of 6.4.4 is held against the result.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import cosim
+from cosim.results import draw, read_options
+from diagnosis.predictors import read_model
+from studies.study_command import run_study, study_parser
+from studies.study_report import Report
+
+from .basin_trials import sysid4
+from .basin_trials.chapter6_runs import FEW, Plant, folder, run
+from .basin_trials.found import FAULTY, Runs, label, lost, mean
+from .basin_trials.lessons import lessons
+from .basin_trials.observations import observations, other_sections
+from .basin_trials.trials import CONTROLLERS, LABELS, TRIALS
+from .error_models.model_loops import parameters_of
+
+LEFT_OUT = "Experiments on spikes, stores and delay: not made of this ship (`--trials`)."
+
+
+def table(report: Report, key: tuple[str, bool], runs: Runs) -> None:
+    """The numbers of one trial."""
+    names = ("position", "along", "cross_track", "heading", "lag", "inside", "omega_X", "iae", "work")
+    names += ("iaew", "iaewwt", "swing")
+    header = ["controller", "lost", "position [m]", "along the ship [m]", "cross-track [m]"]
+    header += ["heading [rad]", "z1_x [m]"]
+    header += ["inside by [m]", "ω in surge [N]", "IAE", "W", "IAEW", "IAEWWT", "swing [rad/s]"]
+    report.text(f"**{label(*key)}**")
+    rows = [[LABELS[c], str(lost(r)), *(str(mean(r, n)) for n in names)] for c, r in runs.items()]
+    report.table(header, rows)
+
+
+def pictures(report: Report, seed: int) -> None:
+    """The pictures of 6.4 for every trial, with the fault as in the basin (Figs. 6.10 to 6.25)."""
+    for trial in TRIALS:
+        name, place = label(trial.name, FAULTY), folder((trial.name, FAULTY))
+        logs = report.folder / "logs" / place
+        shown = {LABELS[c]: dict(cosim.read_log(logs / c / str(seed))) for c in CONTROLLERS}
+        told = {LABELS[c]: read_options(logs / c / str(seed)) for c in CONTROLLERS}
+        draw(shown, report.folder / place, told)
+        for file in ("trajectory", "errors", "metrics", "forces", "model_error"):
+            caption = f"{name}: {file.replace('_', ' ')} (seed {seed})"
+            report.picture(f"{place}/{file}.png", caption)
+
+
+def hidden(model: Path | None) -> tuple[str, Plant]:
+    """What is hidden in the plant, in words and as parameters.
+
+    Raises:
+        InputError: a file that is no parameter set of vessel and thrusters.
+    """
+    if model is None:
+        text = (
+            "Table 2.1 (corrected) with SYSID4 of Table 7.1 in it: X_|u|u, X_u and X_|u|r added, the "
+            "damping by the yaw rate replaced, 30 % of the surge force and 31 % of the yaw moment lost."
+        )
+        return text, sysid4.parameters()
+    values = parameters_of(read_model(model))
+    if not values:
+        raise cosim.InputError(f"'{model}' holds no parameter of vessel or thrusters")
+    listed = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+    return f"Table 2.1 (corrected) with what `{model.name}` adds to it: {listed}.", values
+
+
+def study(
+    out: Path,
+    seeds: Sequence[int],
+    shorter: float,
+    jobs: int | None,
+    model: Path | None = None,
+    causes: bool = True,
+) -> Path:
+    """Run everything and write the report; returns its path."""
+    text, plant = hidden(model)
+    found = run(out, seeds, shorter, jobs, plant, causes)
+    name = "SYSID4" if model is None else "the ship that was learned"
+    report = Report(out, f"Chapter 6 in simulation, {name}: which lessons come out again?", seeds)
+    report.text(
+        f"Plant: {text} Controllers: gains of Table 6.4, ignorant of all that. Noise 0.2 mm and "
+        "0.3 mrad, freezes of 0.1 to 1 s once in 20 s, and once a minute a single sample that is 0.1 m "
+        "and 0.1 rad off. `fault`: guidance set to a quarter of the speed, and called four times as "
+        "often. The eight at 0.16 and 0.32 is 0.01-0.03 and 0.02-0.067 m/s. Concurrent learning forms "
+        "stored errors anew, unless it says `as printed`. "
+        + (f"Experiments on delay and stores: {len(seeds[:FEW])} seeds." if causes else LEFT_OUT)
+    )
+    report.heading("The ellipse at 0.16 m/s (6.4.4)")
+    report.verdicts("observations", observations(found))
+    for section, rows in other_sections(found).items():
+        report.heading(section)
+        report.verdicts(section, rows)
+    report.heading("Lessons learned (6.5)")
+    report.verdicts("lessons", lessons(found), "numbers and cause")
+    report.heading("The trials")
+    report.text(
+        "Means over the seeds with their 95 % intervals, over the runs that kept up with the target; "
+        "`lost` is how many did not. Position, its part along the ship, and z1_x over the second half, "
+        "others from 20 s on. z1_x is the controller's, of the estimated pose, the rest is true."
+    )
+    for key, runs in found.trials.items():
+        table(report, key, runs)
+    report.heading("Pictures")
+    pictures(report, seeds[0])
+    for name, group in found._asdict().items():
+        flat = {str(k) if isinstance(k, str) else f"{k[0]}, {k[1]}": v for k, v in group.items()}
+        report.result(name, flat)
+    return report.write()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = study_parser(
+        "thesis.chapter6",
+        "Run the basin trials of chapter 6 in simulation and check the lessons learned (6.5).",
+        "  python -m thesis.chapter6 --seeds 3\n"
+        "  python -m thesis.chapter6 --model results/learn/model.ssv --out results/chapter6_learned\n"
+        "  python -m thesis.chapter6 --quick --out results/first_look",
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="parameter set of the ship, as diagnosis.learn writes it (SYSID4)",
+    )
+    parser.add_argument(
+        "--trials", action="store_true", help="the trials alone, without the experiments on causes"
+    )
+    options = parser.parse_args(arguments)
+    seeds, shorter = range(2 if options.quick else options.seeds), 0.25 if options.quick else 1.0
+    run_study(
+        partial(study, options.out, seeds, shorter, options.jobs, options.model, not options.trials)
+    )
+
+
+if __name__ == "__main__":
+    main()

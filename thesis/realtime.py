@@ -1,0 +1,131 @@
+"""Hardware in the loop, in software (6.3.2): ``python -m thesis.realtime``.
+
+The thesis ran its controllers against a simulated ship on the ship's own computer, to see whether the
+computer keeps up. Here the same scenario is paced to the wall clock, at 1 and more times real time: how
+often is a step late, and does anything else change?
+"""
+
+import hashlib
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+import cosim
+from studies.study_command import progress, run_study, study_parser
+from studies.study_report import Report
+
+from .monte_carlo import Content, shipped, vary
+
+CONTROLLERS = ("controller_bs", "controller_abs", "controller_cl_win_z2", "controller_cl_svd_eps")
+FACTORS = (1.0, 10.0, 100.0)
+
+
+class Paced(NamedTuple):
+    """A run against the clock: late steps, all steps, latest and jitter [s], hash of the log."""
+
+    misses: int
+    steps: int
+    worst: float
+    jitter: float
+    log: str
+
+
+def run(content: Content, factor: float | None, folder: Path) -> Paced:
+    """Run a scenario at ``factor`` times the wall clock; None: as fast as it goes.
+
+    Raises:
+        SimulationError: the run failed.
+    """
+    result = cosim.simulate(cosim.load_scenario(content), folder, realtime=factor)
+    if result.status == "interrupted":
+        raise KeyboardInterrupt
+    if result.status != "done":
+        raise cosim.SimulationError(f"'{folder}' {result.status}: {result.message}")
+    digest = hashlib.sha256((folder / "log.csv").read_bytes()).hexdigest()
+    pace = result.pace or {"deadline_misses": 0, "lateness_max": 0.0, "jitter_rms": 0.0}
+    steps = round(content["stop"] / content["step"])
+    return Paced(int(pace["deadline_misses"]), steps, pace["lateness_max"], pace["jitter_rms"], digest)
+
+
+def picture(runs: dict[str, dict[float, Paced]], step: float) -> Figure:
+    """Jitter and largest lateness over the factor, with the deadline."""
+    figure = Figure(figsize=(7.0, 3.5), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    factors = list(next(iter(runs.values())))
+    for axes, title, which in ((left, "jitter", "jitter"), (right, "largest lateness", "worst")):
+        for name, by_factor in runs.items():
+            lateness = [1000.0 * getattr(by_factor[f], which) for f in factors]
+            axes.loglog(factors, lateness, "o-", label=name)
+        axes.loglog(factors, [1000.0 * step / f for f in factors], "k--", label="deadline: one step")
+        axes.set(title=title, xlabel="times real time", ylabel="[ms]")
+        axes.grid(alpha=0.3)
+    right.legend(fontsize=7)
+    return figure
+
+
+def study(out: Path, seconds: float, factors: Sequence[float], controllers: Sequence[str]) -> Path:
+    """Pace every controller at every factor and write the report; returns its path."""
+    ellipse = vary(shipped("ellipse"), stop=seconds, metrics={"from": 0.0})
+    runs: dict[str, dict[float, Paced]] = {}
+    free: dict[str, Paced] = {}
+    with progress(len(controllers) * (len(factors) + 1), "pacing") as advance:
+        for name in controllers:
+            content = vary(ellipse, {"controller": f"{name}.fmu"})
+            free[name] = run(content, None, out / "logs" / name / "free")
+            advance()
+            runs[name] = {}
+            for factor in factors:
+                runs[name][factor] = run(content, factor, out / "logs" / name / f"{factor:g}")
+                advance()
+    report = Report(out, "Hardware in the loop in software (6.3.2)", [ellipse["seed"]])
+    report.text(
+        f"The ellipse with noise and freezes, {seconds:g} s in steps of {ellipse['step']:g} s, paced to "
+        "the wall clock. A step misses its deadline when it ends more than one step late. Jitter is the "
+        "standard deviation of the lateness."
+    )
+    header = ["controller", "times real time", "deadline misses", "largest lateness [ms]", "jitter [ms]"]
+    rows = [
+        [name, f"{factor:g}", f"{p.misses} of {p.steps}", 1000.0 * p.worst, 1000.0 * p.jitter]
+        for name, by_factor in runs.items()
+        for factor, p in by_factor.items()
+    ]
+    report.table([*header, "log as without pacing"], [
+        [*row, "same" if runs[row[0]][f].log == free[row[0]].log else "different"]
+        for row, f in zip(rows, list(factors) * len(runs), strict=True)
+    ])  # fmt: skip
+    report.figure("pace", picture(runs, ellipse["step"]), "Lateness against the deadline.")
+    report.text(
+        "The operating system is an ordinary one: what else the machine does shows as single late "
+        "steps, and the next run of this study gives other numbers. What the pacing may never change is "
+        "the simulation itself; the last column compares the logs to the byte."
+    )
+    report.result("runs", runs)
+    return report.write()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = study_parser(
+        "thesis.realtime",
+        "Pace a scenario to the wall clock and report deadline misses and jitter (6.3.2).",
+        "  python -m thesis.realtime\n  python -m thesis.realtime --factor 1 2 5 --seconds 10",
+        seeds=None,
+        jobs=False,
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=20.0, metavar="S", help="simulated time of a run (%(default)s)"
+    )
+    parser.add_argument(
+        "--factor", type=float, nargs="+", default=list(FACTORS), metavar="F", help="times real time"
+    )
+    options = parser.parse_args(arguments)
+    if options.quick:
+        options.seconds, options.factor = min(options.seconds, 2.0), options.factor[-1:]
+    run_study(partial(study, options.out, options.seconds, options.factor, CONTROLLERS))
+
+
+if __name__ == "__main__":
+    main()
