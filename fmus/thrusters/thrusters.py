@@ -33,9 +33,9 @@ from ..signals import Force, VelocityInCurrent
 class Applied(NamedTuple):
     """Forces of a thrusters' FMU."""
 
-    tau_cmd_X: Annotated[float, "N", "commanded surge force, as the allocation believes"] = 0.0
-    tau_cmd_Y: Annotated[float, "N", "commanded sway force, as the allocation believes"] = 0.0
-    tau_cmd_N: Annotated[float, "N.m", "commanded yaw moment, as the allocation believes"] = 0.0
+    tau_cmd_X: Annotated[float, "N", "surge force of the commands, by the allocation"] = 0.0
+    tau_cmd_Y: Annotated[float, "N", "sway force of the commands, by the allocation"] = 0.0
+    tau_cmd_N: Annotated[float, "N.m", "yaw moment of the commands, by the allocation"] = 0.0
     tau_act_X: Annotated[float, "N", "surge force that acts"] = 0.0
     tau_act_Y: Annotated[float, "N", "sway force that acts"] = 0.0
     tau_act_N: Annotated[float, "N.m", "yaw moment that acts"] = 0.0
