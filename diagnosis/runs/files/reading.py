@@ -86,9 +86,16 @@ class Run:
     def commanded(self) -> dict[str, np.ndarray]:
         """Signal -> (n,), the commands in the form in which they were given."""
         settings = ship(description=self.ship).power_settings
-        forms = [(self.signals, self.commands), (settings, self.power)]
-        given = [form for form in forms if form[1] is not None] or [(TAU, self.tau_cmd)]
-        return {s: c for names, table in given for s, c in zip(names, table.T, strict=True)}
+        forms = [
+            (names, c)
+            for names, c in ((self.signals, self.commands), (settings, self.power))
+            if c is not None
+        ]
+        return {
+            s: c
+            for names, table in forms or [(TAU, self.tau_cmd)]
+            for s, c in zip(names, table.T, strict=True)
+        }
 
     def rows(self, keep: np.ndarray) -> "Run":
         """The run with only some of its rows."""
